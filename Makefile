@@ -1,0 +1,38 @@
+# catseye: `make` lists the verbs. Needs Python >= 3.11 and make, nothing else.
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.catseye-installed
+
+.PHONY: help setup check test test-all demo bench clean
+
+help:  ## list the verbs
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "catseye needs Python 3.11 or newer, this is " + sys.version.split()[0])'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+setup: $(STAMP)  ## make .venv and install catseye in it
+
+check: setup  ## style, types, layers
+	$(BIN)/ruff check src tests bench
+	$(BIN)/ruff format --check src tests bench
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: check  ## check, then the tests
+	$(BIN)/python -m pytest
+
+test-all: check  ## the same with the long scatter and fault runs
+	$(BIN)/python -m pytest -m 'slow or not slow'
+
+demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
+	$(BIN)/catseye demo demo-night-01
+
+bench: setup  ## benchmarks, as ratios in one run
+	$(BIN)/python bench/bench_reduce.py
+
+clean:  ## remove .venv and everything that can be made again
+	rm -rf .venv demo-night-01 .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

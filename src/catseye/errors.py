@@ -1,0 +1,28 @@
+"""What can go wrong, as a tree. Each error's text is one line: what, where, the value, the limit, what to do.
+
+    CatseyeError
+    ├── InputError        a file, table or record that cannot be used
+    ├── ValidityError     a value outside the range where a formula holds
+    ├── FrameError        transforms or points whose frames do not join
+    └── EstimationError   an adjustment that gave no answer, raised only when the answer is required
+"""
+
+
+class CatseyeError(Exception):
+    """Anything that catseye refuses; the command line prints its one line and exits with 1."""
+
+
+class InputError(CatseyeError):
+    """A file, table or record that cannot be used."""
+
+
+class ValidityError(CatseyeError, ValueError):
+    """A value outside the range where a formula holds."""
+
+
+class FrameError(CatseyeError, ValueError):
+    """Transforms or points whose frames do not join."""
+
+
+class EstimationError(CatseyeError):
+    """An adjustment that gave no answer, raised only when the answer is required."""
