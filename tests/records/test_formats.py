@@ -1,0 +1,79 @@
+"""A file format once released always loads: one file a kind and version stays in tests/vectors/formats."""
+
+from datetime import date
+from pathlib import Path
+
+import pytest
+
+from catseye.errors import InputError
+from catseye.records.mirror import Mirror
+from catseye.records.monument import Monument
+from catseye.records.reading import Folder, read_record
+from catseye.records.record import Record
+from catseye.records.shot import Shot, read_buffers
+from catseye.records.site import Site
+from catseye.records.target import Benchmark, FeedArm, Targets
+from catseye.records.triplet import Triplet
+from catseye.records.weather import WeatherSample
+
+FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
+RECORDS: dict[str, type[Record]] = {
+    "site-1.toml": Site,
+    "monument-1.toml": Monument,
+    "monument-1-signed.toml": Monument,
+    "mirror-1.toml": Mirror,
+    "mirror-1-signed.toml": Mirror,
+    "triplet-1.toml": Triplet,
+    "triplet-1-signed.toml": Triplet,
+    "targets-1.toml": Targets,
+    "feedarm-1.toml": FeedArm,
+}
+TABLES: dict[str, tuple[type[Record], int]] = {
+    "benchmarks-1.csv": (Benchmark, 6),
+    "weather-1.csv": (WeatherSample, 5),
+    "shots-1.csv": (Shot, 5),
+}
+
+
+@pytest.mark.parametrize("file", RECORDS)
+def test_a_released_record_still_loads_and_survives_the_round_trip(file):
+    record = read_record(FORMATS / file, RECORDS[file])
+    assert RECORDS[file].model_validate(record.model_dump()) == record
+
+
+@pytest.mark.parametrize("file", TABLES)
+def test_a_released_table_still_loads(file):
+    kind, rows = TABLES[file]
+    records = Folder(FORMATS).table(file, kind)
+    assert len(records) == rows
+    assert all(kind.model_validate(record.model_dump()) == record for record in records)
+
+
+def test_released_buffers_still_load():
+    buffers = read_buffers(Folder(FORMATS), "frames-1.npy")
+    assert buffers.shape == (2, 192)
+    assert buffers[1, 0] == 192
+
+
+def test_every_file_kept_here_is_tested():
+    assert {path.name for path in FORMATS.iterdir()} == {*RECORDS, *TABLES, "frames-1.npy"}
+
+
+@pytest.mark.parametrize("kind", ["monument", "mirror", "triplet"])
+def test_provenance_is_read_where_given_and_unknown_where_not(kind):
+    signed = read_record(FORMATS / f"{kind}-1-signed.toml", RECORDS[f"{kind}-1.toml"])
+    unsigned = read_record(FORMATS / f"{kind}-1.toml", RECORDS[f"{kind}-1.toml"])
+    keys = ("serial", "measured_on", "valid_until", "by", "report")
+    assert [getattr(signed, key) for key in keys] == ["A-7", date(2003, 5, 14), date(2004, 5, 14), "dhp", "GBT-0117"]
+    assert [getattr(unsigned, key) for key in keys] == [None] * 5
+
+
+@pytest.mark.parametrize("version", ["2", '"catseye-mirror-2"', '"catseye-monument-1"', "true", "1.0"])
+def test_an_unknown_version_is_refused_with_the_known_ones(tmp_path, version):
+    text = (FORMATS / "mirror-1.toml").read_text(encoding="utf-8")
+    (tmp_path / "M.toml").write_text(f"format = {version}\nnew_key = 1\n{text}", encoding="utf-8")
+    shown = version.replace('"', "'").replace("true", "True")
+    with pytest.raises(InputError) as refusal:
+        read_record(tmp_path / "M.toml", Mirror)
+    expected = "expected 1 or 'catseye-mirror-1', the versions known here"
+    assert str(refusal.value) == f"M.toml: format = {shown} ({expected})"
