@@ -47,4 +47,69 @@ SOURCES: dict[str, Source] = {
             "D.3 gives n_air at 20.5 C, the value belongs to 20.0 C; D.4 prints -0.985e-6, -0.895887e-6 is right",
         ),
     ),
+    "SHUSTER93": Source(
+        title="M. D. Shuster, A survey of attitude representations, Journal of the Astronautical Sciences 41, 1993",
+        locator="J. Astronaut. Sci. 41 (4), pages 439-517",
+        used="the rotation vector and Rodrigues' formula; the cross-product matrix, there with the opposite sign",
+    ),
+    "SHEPPERD78": Source(
+        title="S. W. Shepperd, Quaternion from rotation matrix, Journal of Guidance and Control 1, 1978",
+        locator="doi:10.2514/3.55767b",
+        used="the choice of the largest quaternion element",
+    ),
+    "SCHOTT14": Source(
+        title="Schott AG, Data sheet N-BK7 517642.251, 2014",
+        locator="Schott optical glass data sheets, 1 February 2014",
+        used="the six constants of the Sellmeier dispersion formula, 312.6 to 2325.4 nm",
+    ),
+    "TIE29": Source(
+        title="Schott AG, Technical information TIE-29: Refractive index and dispersion, 2005",
+        locator="Schott Advanced Optics, April 2005",
+        used="section 1: catalogue indices are relative to air",
+    ),
+    "RUEGER90": Source(
+        title="J. M. Rüeger, Electronic Distance Measurement: An Introduction, third edition, Springer, 1990",
+        locator="doi:10.1007/978-3-642-97196-9",
+        used="eqs. 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them",
+    ),
+    "OWENS67": Source(
+        title="J. C. Owens, Optical refractive index of air: dependence on pressure, temperature and composition, 1967",
+        locator="doi:10.1364/AO.6.000051",
+        used="density factors of dry air and vapour, dispersion of vapour",
+        errata=(
+            "its dry coefficients imply an ice point of 273.16 K (our inference): at 273.15 K, 1e-8 of index too much",
+        ),
+    ),
+    "PECK72": Source(
+        title="E. R. Peck and K. Reeder, Dispersion of air, 1972",
+        locator="doi:10.1364/JOSA.62.000958",
+        used="the two-resonance dispersion of dry air, scaled to Owens' density factor",
+    ),
+    "CIDDOR96": Source(
+        title="P. E. Ciddor, Refractive index of air: new equations for the visible and near infrared, 1996",
+        locator="doi:10.1364/AO.35.001566",
+        used="eqs. 1-3, 5 and the constants of appendix A: dispersion, compressibility, saturation, enhancement",
+        errata=("its procedure for the group index is not rigorous: CIDDOR99 replaces it",),
+    ),
+    "CIDDOR99": Source(
+        title="P. E. Ciddor and R. J. Hill, Refractive index of air. 2. Group index, 1999",
+        locator="doi:10.1364/AO.38.001663",
+        used="group refractivity of dry air and of vapour",
+        errata=("B2 has the wrong sign in the derivative of the dry-air term, 1e-6 of index; it is positive",),
+    ),
+    "IAG99": Source(
+        title="International Association of Geodesy, resolution 3 of the XXII General Assembly, Birmingham, 1999",
+        locator="IUGG XXII General Assembly, July 1999, IAG resolution 3",
+        used="the choice of CIDDOR96 with CIDDOR99 for work better than 1 ppm",
+    ),
+    "IAPWS97": Source(
+        title="IAPWS, Revised release on the industrial formulation 1997 for water and steam, 2012",
+        locator="IAPWS R7-97(2012)",
+        used="eq. 30 and table 34: saturation pressure; table 35 as test values",
+    ),
+    "MURPHY05": Source(
+        title="D. M. Murphy and T. Koop, Review of the vapour pressures of ice and supercooled water, 2005",
+        locator="doi:10.1256/qj.04.94",
+        used="eq. 10: vapour pressure of supercooled water, as a yardstick below 0 °C",
+    ),
 }

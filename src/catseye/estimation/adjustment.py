@@ -1,0 +1,275 @@
+"""Least squares: Gauss-Newton over groups of (correlated) observations, with the statistics that make it checkable.
+
+Systematic effects are parameters with priors, and a prior is an observation like any other ([FOERSTNER16] 4.4). The
+solver is scale-free: it converges on the size of a step in its own standard deviations, and judges rank on the normal
+matrix scaled to a unit diagonal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, lapack, solve_triangular
+
+from catseye.errors import EstimationError
+from catseye.estimation.observations import Observations
+
+CONVERGED = "converged"
+NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
+check the starting coordinates"
+RANK_DEFICIENT = "rank deficient: {names} not held by any observation; add one, or give a prior"
+
+NONCENTRALITY = 4.13  # test at 0.1 % with power 80 %, [BAARDA68] table: smallest shift that is found four times in five
+STEP_IN_SIGMAS = 1e-4  # a step below this no longer moves any answer
+WORST_CONDITION = 1e-14  # of the scaled normal matrix: beyond it double precision holds no digit
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How one group of observations fits; arrays over its m observations.
+
+    name              the group's
+    active            took part in the solution
+    residual          observed minus predicted
+    sigma             standard uncertainty of the observed value, as claimed before
+    redundancy        share of an error in the observation that shows in its own residual; 0 to 1 if uncorrelated
+    standardised      the residual's test statistic, N(0, 1) if the claim holds: Baarda's w with correlations; of an
+                      inactive observation that of its prediction by the others
+    estimated_error   the error in the observation that would explain it best
+    detectable_error  the smallest error that the test finds with power 80 % at the level 0.1 %
+    pvv               v' C^-1 v of the active ones
+    """
+
+    name: str
+    active: np.ndarray
+    residual: np.ndarray
+    sigma: np.ndarray
+    redundancy: np.ndarray
+    standardised: np.ndarray
+    estimated_error: np.ndarray
+    detectable_error: np.ndarray
+    pvv: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The answer of an adjustment.
+
+    x            (n,) parameters
+    covariance   (n, n); rows and columns of held parameters are zero
+    status       "converged", or one line that says what to do
+    iterations   Gauss-Newton steps taken
+    fits         one a group, in the order given
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    status: str
+    iterations: int
+    fits: tuple[Fit, ...]
+
+    def require_converged(self) -> "Solution":
+        """This solution, or EstimationError with its status."""
+        if self.status != CONVERGED:
+            raise EstimationError(self.status)
+        return self
+
+    def variance_factor(self, names: Sequence[str] | None = None) -> tuple[float, float]:
+        """[pvv] / degrees of freedom, expectation 1, and the degrees of freedom, over the groups named (all if None).
+
+        Over all groups the degrees of freedom are observations minus free parameters; over some they are the sum of
+        their redundancy numbers.
+
+        Source: [FOERSTNER16] eq. 4.90 and 4.114.
+        """
+        chosen = [f for f in self.fits if names is None or f.name in names]
+        degrees = float(sum(np.sum(f.redundancy[f.active]) for f in chosen))
+        return (sum(f.pvv for f in chosen) / degrees if degrees > 1e-9 else float("nan")), degrees
+
+
+@dataclass(frozen=True)
+class _Block:
+    """One group, cut to its active rows, with the Cholesky factor of their covariance (its root where independent)."""
+
+    group: Observations
+    rows: np.ndarray
+    factor: np.ndarray
+
+    def whiten(self, a: np.ndarray) -> np.ndarray:
+        if self.factor.ndim == 1:
+            return a / (self.factor if a.ndim == 1 else self.factor[:, None])
+        return solve_triangular(self.factor, a, lower=True, check_finite=False)
+
+
+def _blocks(
+    groups: Sequence[Observations],
+    active: Sequence[np.ndarray] | None,
+    extra_variance: Sequence[np.ndarray] | None,
+) -> list[_Block]:
+    blocks = []
+    for i, group in enumerate(groups):
+        rows = np.arange(len(group.observed)) if active is None else np.flatnonzero(active[i])
+        extra = extra_variance[i][rows] if extra_variance is not None else 0.0
+        try:
+            if group.covariance.ndim == 1:
+                variance = group.covariance[rows] + extra
+                if not np.all(variance > 0.0):
+                    raise np.linalg.LinAlgError
+                factor = np.sqrt(variance)
+            else:
+                factor = np.linalg.cholesky(group.covariance[np.ix_(rows, rows)] + np.diag(np.zeros(len(rows)) + extra))
+        except np.linalg.LinAlgError:
+            raise EstimationError(
+                f"{group.name}: the covariance of its {len(rows)} observations is not positive definite; "
+                "a sigma is zero or two observations repeat each other"
+            ) from None
+        blocks.append(_Block(group, rows, factor))
+    return blocks
+
+
+def _cost(blocks: Sequence[_Block], x: np.ndarray) -> float:
+    return sum(float(np.sum(b.whiten((b.group.observed - b.group.predict(x)[0])[b.rows]) ** 2)) for b in blocks)
+
+
+def _normal_equations(blocks: Sequence[_Block], x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    normal, right, cost = np.zeros((len(x), len(x))), np.zeros(len(x)), 0.0
+    for block in blocks:
+        values, jacobian = block.group.predict(x)
+        a = block.whiten(jacobian[block.rows])
+        v = block.whiten((block.group.observed - values)[block.rows])
+        columns = block.group.columns
+        normal[np.ix_(columns, columns)] += a.T @ a
+        right[columns] += a.T @ v
+        cost += float(v @ v)
+    return normal, right, cost
+
+
+def _floating(scaled: np.ndarray, names: Sequence[str] | None) -> str:
+    """Names of the parameters that take part in the null space of a unit-diagonal normal matrix."""
+    values, vectors = np.linalg.eigh(scaled)
+    null = vectors[:, values < max(len(scaled) * 1e-13, values[0] * 10)]
+    part = np.sum(null**2, axis=1)
+    worst = [int(i) for i in np.argsort(-part)[:4] if part[i] > 1e-3]
+    label = [names[i] if names is not None else f"parameter {i}" for i in worst]
+    return ", ".join(label) + (" ..." if np.sum(part > 1e-3) > len(label) else "")
+
+
+def adjust(
+    x0: np.ndarray,
+    groups: Sequence[Observations],
+    *,
+    free: np.ndarray | None = None,
+    active: Sequence[np.ndarray] | None = None,
+    extra_variance: Sequence[np.ndarray] | None = None,
+    names: Sequence[str] | None = None,
+    iterations: int = 20,
+    tests: bool = True,
+) -> Solution:
+    """The parameters that fit groups of observations best, with full covariance and a fit per observation.
+
+    x0              (n,) start values
+    groups          observations; groups are independent of each other, inside one they may be correlated
+    free            (n,) bool: False holds a parameter at its start value (default: all free)
+    active          one (m,) bool array a group: False leaves an observation out, but still predicts it
+    extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
+    names           (n,) what the parameters are called, for the status
+    iterations      cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
+    tests           False leaves the fits at residual and sigma, for steps on the way to an answer
+
+    Returns a Solution whose status says what happened; raises EstimationError only for a covariance that is none.
+
+    Source: [FOERSTNER16] section 4.2 (estimation), [BAARDA68] (w test, detectable errors; here with correlations).
+    """
+    x = np.array(x0, dtype=float)
+    n = len(x)
+    moving = np.arange(n) if free is None else np.flatnonzero(free)
+    blocks = _blocks(groups, active, extra_variance)
+    inverse = np.zeros((len(moving), len(moving)))
+    status, taken = CONVERGED, 0
+    for taken in range(1, iterations + 1):
+        normal, right, cost = _normal_equations(blocks, x)
+        normal, right = normal[np.ix_(moving, moving)], right[moving]
+        diagonal = np.diag(normal)
+        label = None if names is None else [names[i] for i in moving]
+        if np.any(diagonal <= 0.0):
+            unseen = [label[i] if label else f"parameter {moving[i]}" for i in np.flatnonzero(diagonal <= 0.0)]
+            status = RANK_DEFICIENT.format(names=", ".join(unseen[:4]) + (" ..." if len(unseen) > 4 else ""))
+            break
+        scale = 1.0 / np.sqrt(diagonal)
+        scaled = normal * scale[:, None] * scale
+        try:
+            factor = cho_factor(scaled, lower=True, check_finite=False)
+            condition = lapack.dpocon(factor[0], np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
+        except np.linalg.LinAlgError:
+            condition = 0.0
+        if condition < WORST_CONDITION:
+            status = RANK_DEFICIENT.format(names=_floating(scaled, label))
+            break
+        step = scale * cho_solve(factor, scale * right, check_finite=False)
+        size = float(np.sqrt(max(right @ step, 0.0)))
+        inverse = lapack.dpotri(factor[0], lower=1)[0]
+        inverse = (np.tril(inverse) + np.tril(inverse, -1).T) * scale[:, None] * scale
+        if size < STEP_IN_SIGMAS:
+            break
+        for halving in range(11):
+            trial = x.copy()
+            trial[moving] += step * 0.5**halving
+            if _cost(blocks, trial) <= cost:
+                break
+        x = trial
+    else:
+        status = NOT_CONVERGED.format(step=size, iterations=taken)
+    covariance = np.zeros((n, n))
+    covariance[np.ix_(moving, moving)] = inverse
+    return Solution(x, covariance, status, taken, tuple(_fit(block, x, covariance, tests) for block in blocks))
+
+
+def _fit(block: _Block, x: np.ndarray, covariance: np.ndarray, tests: bool) -> Fit:
+    """Residuals and tests of one group, exact with correlations inside the group.
+
+    With P = C^-1 and P_v = P - P A Q A' P over the active rows: w = (P v) / sqrt(diag P_v), estimated error
+    (P v) / diag P_v, redundancy diag(P_v C). An inactive row is predicted from the parameters and from the residuals
+    of the rows that it is correlated with.
+    """
+    group, rows = block.group, block.rows
+    m = len(group.observed)
+    values, jacobian = group.predict(x)
+    residual = group.observed - values
+    active = np.zeros(m, dtype=bool)
+    active[rows] = True
+    correlated = group.covariance.ndim == 2
+    variance = np.diag(group.covariance) if correlated else group.covariance
+    redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
+    fit = Fit(
+        group.name, active, residual, np.sqrt(variance), redundancy, standardised, error, detectable,
+        float(np.sum(block.whiten(residual[rows]) ** 2)),
+    )
+    if not tests:
+        return fit
+    q = covariance[np.ix_(group.columns, group.columns)]
+    seen = jacobian[rows]
+    if correlated:
+        weight = block.whiten(np.eye(len(rows)))
+        weight = weight.T @ weight
+        weighted, pv, own = weight @ seen, weight @ residual[rows], np.diag(weight)
+    else:
+        weighted, pv, own = seen / variance[rows, None], residual[rows] / variance[rows], 1.0 / variance[rows]
+    spread = weighted @ q
+    visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
+    redundancy[rows] = 1.0 - np.sum(spread * seen, axis=1)
+    standardised[rows] = pv / np.sqrt(visible)
+    error[rows] = pv / visible
+    detectable[rows] = NONCENTRALITY / np.sqrt(visible)
+
+    out = np.flatnonzero(~active)
+    if len(out):
+        cross = group.covariance[np.ix_(out, rows)] if correlated else np.zeros((len(out), len(rows)))
+        gain = cross @ weight if correlated else cross
+        surprise = residual[out] - gain @ residual[rows]
+        rest = jacobian[out] - gain @ seen
+        expected = variance[out] - np.sum(gain * cross, axis=1) + np.sum((rest @ q) * rest, axis=1)
+        standardised[out] = surprise / np.sqrt(expected)
+        error[out] = surprise
+        detectable[out] = NONCENTRALITY * np.sqrt(expected)
+        redundancy[out] = 1.0
+    return fit

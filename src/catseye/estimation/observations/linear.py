@@ -1,0 +1,32 @@
+"""Observations that are linear in the parameters: priors, coordinates, vectors between points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Linear:
+    """observed = matrix @ x[columns] + error.
+
+    name         what the group is, for reports
+    observed     (m,)
+    covariance   (m, m), positive definite; or (m,) variances of independent ones
+    columns      (k,) indices of parameters, without repeats
+    matrix       (m, k)
+    """
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    columns: np.ndarray
+    matrix: np.ndarray
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian (m, k) at the parameters x.
+
+        >>> rod = Linear("rod", np.array([2.0]), np.eye(1), np.array([0, 3]), np.array([[-1.0, 1.0]]))
+        >>> rod.predict(np.array([1.0, 0.0, 0.0, 3.5]))[0]
+        array([2.5])
+        """
+        return self.matrix @ x[self.columns], self.matrix

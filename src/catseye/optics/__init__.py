@@ -1,0 +1,1 @@
+"""What the light meets: glass, cube-corner prisms, the cat's-eye ball."""

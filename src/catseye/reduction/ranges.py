@@ -1,0 +1,199 @@
+"""From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import SECONDS_PER_DAY
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.reduction.settings import Settings
+from catseye.signal.drift import drift_at, reference_surprise
+from catseye.signal.leakage import subtract_leakage
+from catseye.signal.phase import detect
+
+Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
+
+SURPRISE = 5.0  # standard uncertainties by which a reference may miss its neighbours' prediction
+WARM_UP = 0.03  # rad, more allowed at the ends of a ranger's block, where a transient is extrapolated
+BEND = 0.005  # rad, more allowed inside, where only its curvature counts
+REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which something else is in it
+
+
+@dataclass(frozen=True, eq=False)
+class Phases:
+    """What every shot's samples say, in the order of the campaign's shots.
+
+    phasor      V, complex, free of leakage
+    u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter
+    offset      V
+    harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
+    largest     V, largest magnitude of a sample
+    reason      why a shot cannot be used, "" where it can
+    """
+
+    phasor: np.ndarray
+    u_phasor: np.ndarray
+    offset: np.ndarray
+    harmonics: np.ndarray
+    largest: np.ndarray
+    reason: tuple[str, ...]
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """V."""
+        return np.abs(self.phasor)
+
+    @property
+    def phase(self) -> np.ndarray:
+        """rad in [0, 2 pi)."""
+        return np.mod(np.angle(self.phasor), 2 * np.pi)
+
+    @property
+    def u_phase(self) -> np.ndarray:
+        """rad, from the samples' noise; infinite without a return."""
+        amplitude = self.amplitude
+        return np.divide(
+            self.u_phasor, amplitude, out=np.full_like(self.u_phasor, np.inf), where=amplitude > 0.0
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Electronics:
+    """The drifting phase of one ranger's electronics at its usable target shots.
+
+    shots        (m,) indices into the campaign's shots
+    phase        (m,) rad
+    covariance   (m, m) rad^2, from the noise of the references and the walk between them
+    reference    (m,) V, complex: the reference phasor that the leakage acts on
+    """
+
+    shots: np.ndarray
+    phase: np.ndarray
+    covariance: np.ndarray
+    reference: np.ndarray
+
+
+def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | None = None) -> Phases:
+    """Phase and amplitude of every shot, leakage removed, with the reason where a shot shows no light.
+
+    A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
+    leakage included; clipped when a sample stands at the converter's end.
+    """
+    shots, adc = campaign.shots, campaign.site.adc
+    n = len(shots.shot)
+    volts_per_code = adc.full_scale_volt / 2 ** (adc.bits - 1)
+    ends = (-(2 ** (adc.bits - 1)), 2 ** (adc.bits - 1) - 1)
+    raw = np.zeros(n, dtype=complex)
+    u_phasor, offset, largest, clipped = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=int)
+    harmonics = np.zeros((n, 2))
+    shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
+    done = 0
+    for cycles, samples_per_cycle in shapes:
+        alike = np.flatnonzero((shots.cycles == cycles) & (shots.samples_per_cycle == samples_per_cycle))
+        for start in range(0, len(alike), 64):
+            rows = alike[start : start + 64]
+            samples = campaign.frames[shots.frame[rows], : cycles * samples_per_cycle]
+            found = detect(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+            raw[rows], u_phasor[rows], offset[rows] = found.phasor, found.u_phasor, found.offset
+            harmonics[rows], largest[rows], clipped[rows] = found.harmonics, found.largest, found.clipped
+            done += len(rows)
+            if progress is not None:
+                progress("samples to phases", done, n)
+
+    mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
+    phasor = subtract_leakage(
+        raw,
+        np.array([m.leakage_amplitude_volt for m in mirrors]),
+        np.array([m.leakage_phase_rad for m in mirrors]),
+    )
+    u_dark = np.hypot(u_phasor, [m.u_leakage_volt for m in mirrors])
+    amplitude = np.abs(phasor)
+    usual = _usual_amplitude(campaign, amplitude)
+    reason = []
+    for k in range(n):
+        limit = settings.smallest_return * u_dark[k]
+        if clipped[k]:
+            reason.append(f"clipped: {clipped[k]} samples at the converter's end ({largest[k]:.2f} V)")
+        elif not amplitude[k] >= limit:
+            reason.append(
+                f"blocked: return {amplitude[k]:.4f} V, below the limit of {limit:.4f} V (usual {usual[k]:.2f} V)"
+            )
+        else:
+            reason.append("")
+    return Phases(phasor, u_phasor, offset, harmonics, largest, tuple(reason))
+
+
+def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
+    """Median amplitude of each shot's ranger, reference and target shots apart."""
+    key = np.array([f"{r} {t == REFERENCE}" for r, t in zip(campaign.shots.ranger, campaign.shots.target, strict=True)])
+    usual = np.zeros(len(amplitude))
+    for each in np.unique(key):
+        usual[key == each] = np.median(amplitude[key == each])
+    return usual
+
+
+def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, Electronics], dict[int, str]]:
+    """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
+
+    References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
+    ranger without any good reference cannot range.
+
+    Source: [PARKER04] eqs. 5.12 and 5.13; between references the electronics walk at random by the site's figure.
+    """
+    shots = campaign.shots
+    seconds = (shots.mjd_utc - shots.mjd_utc[0]) * SECONDS_PER_DAY
+    walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * 1e-3 / 60.0
+    ranger, target = np.array(shots.ranger), np.array(shots.target)
+    usable = np.array([not r for r in phases.reason])
+    variance = np.where(usable, phases.u_phase, 0.0) ** 2
+    rejected: dict[int, str] = {}
+    electronics: dict[str, Electronics] = {}
+    for name in campaign.rangers:
+        mine = ranger == name
+        lit = np.flatnonzero(mine & usable & (target != REFERENCE))
+        references = np.flatnonzero(mine & usable & (target == REFERENCE))
+        references = references[np.argsort(seconds[references], kind="stable")]
+        wrong = _wrong_references(seconds, phases, variance, references, walk)
+        rejected.update(wrong)
+        references = np.array([k for k in references if k not in wrong], dtype=int)
+        if not len(references):
+            rejected.update(
+                {int(k): f"no reference: {name} has no usable shot on its internal cube, its drift is unknown"
+                 for k in lit}
+            )
+            continue
+        unwrapped = np.unwrap(np.angle(phases.phasor[references]))
+        phase, covariance = drift_at(
+            seconds[references], unwrapped, variance[references], seconds[lit], random_walk=walk
+        )
+        level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
+        electronics[name] = Electronics(lit, phase, covariance, level * np.exp(1j * phase))
+    return electronics, rejected
+
+
+def _wrong_references(
+    seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
+) -> dict[int, str]:
+    wrong: dict[int, str] = {}
+    usual = float(np.median(phases.amplitude[references])) if len(references) else 0.0
+    for k in references:
+        if len(references) > 2 and abs(phases.amplitude[k] / usual - 1.0) > REFERENCE_AMPLITUDE:
+            wrong[int(k)] = (
+                f"reference: return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: "
+                "something else is in the beam"
+            )
+    while True:
+        left = np.array([k for k in references if k not in wrong], dtype=int)
+        if len(left) < 3:
+            return wrong
+        phase = np.unwrap(np.angle(phases.phasor[left]))
+        difference, u = reference_surprise(seconds[left], phase, variance[left], random_walk=walk)
+        allowed = SURPRISE * u + np.where((np.arange(len(left)) % (len(left) - 1)) == 0, WARM_UP, BEND)
+        worst = int(np.argmax(np.abs(difference) / allowed))
+        if abs(difference[worst]) <= allowed[worst]:
+            return wrong
+        wrong[int(left[worst])] = (
+            f"reference: phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
+            f"(allowed {allowed[worst]:.4f})"
+        )

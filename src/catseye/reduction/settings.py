@@ -1,0 +1,31 @@
+"""What a reduction assumes beyond the records: each number with its unit and its reason."""
+
+from dataclasses import dataclass
+
+from catseye.constants import DEGREE
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Assumptions of a reduction; the defaults are those of the campaign layout's README.
+
+    air_model               name in `catseye.atmosphere.air.MODELS`
+    critical                |w| above which a shot is rejected; 3.5 rejects one good shot in 2000
+    smallest_return         amplitude over its own standard uncertainty below which a shot counts as blocked
+    u_thermometer_c         °C, offset of a station thermometer that was not compared with a standard
+    u_profile_c             °C, bend of the temperature profile half-way between the stations' heights against a line
+    u_gradient_c_per_m      °C/m, where there is one station height only and no gradient was measured
+    u_normal                rad, each direction, of the normal of a single prism
+    u_plate_normal          rad, each direction, of the plate and the axis of a triplet
+    u_position              m, each coordinate, of a typed approximate position
+    """
+
+    air_model: str = "ciddor_hill1999"
+    critical: float = 3.5
+    smallest_return: float = 5.0
+    u_thermometer_c: float = 0.3
+    u_profile_c: float = 0.03
+    u_gradient_c_per_m: float = 0.02
+    u_normal: float = 0.1 * DEGREE
+    u_plate_normal: float = 0.3 * DEGREE
+    u_position: float = 0.015

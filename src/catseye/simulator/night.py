@@ -1,0 +1,186 @@
+"""A whole synthetic night: the campaign as the files would tell it, and the truth that they do not."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from catseye.errors import InputError, ValidityError
+from catseye.simulator import sheets
+from catseye.simulator.air import NIGHT, Air, Conditions, WeatherReading, weather_readings
+from catseye.simulator.faults import Faults, Planted, Streams
+from catseye.simulator.head import Return, returns_of_ranger, sampled_frames
+from catseye.simulator.posture import posture
+from catseye.simulator.schedule import (
+    PlannedShot,
+    Schedule,
+    feed_arm_targets,
+    ground_targets,
+    plan_shots,
+)
+from catseye.simulator.structure import Structure, Target, structure, typed_mm, typing_error
+from catseye.simulator.truth import Truth, truth_of
+from catseye.simulator.world import (
+    FEED_ARM_RANGERS,
+    GROUND_RANGERS,
+    Benchmark,
+    Head,
+    Monument,
+    benchmarks,
+    head,
+    monument,
+)
+
+START_MJD_UTC = 52889.125
+
+
+@dataclass(frozen=True)
+class Night:
+    """A campaign: what its files hold (`write` makes them), and the `truth`."""
+
+    name: str
+    seed: int
+    azimuth_deg: float
+    elevation_deg: float
+    start_mjd_utc: float
+    conditions: Conditions
+    monuments: dict[str, Monument]
+    heads: dict[str, Head]
+    telescope: Structure
+    benchmarks: list[Benchmark]
+    single_targets: list[Target]
+    weather: list[WeatherReading]
+    shots: list[PlannedShot]  # by time; row i of frames is shot i + 1
+    frames: np.ndarray  # int16, (shots, 8192)
+    truth: Truth
+
+    def write(self, directory: str | Path) -> Path:
+        """Write the campaign into a new or empty directory; either all of it or nothing."""
+        directory = Path(directory)
+        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+            raise InputError(f"{directory}: exists and is not an empty directory; name a new one")
+        partial = directory.with_name(directory.name + ".partial")
+        partial.mkdir(parents=True)
+        try:
+            sheets.write_campaign(self, partial)
+            partial.replace(directory)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+        return directory
+
+
+def simulate_night(
+    seed: int,
+    *,
+    azimuth_deg: float = 145.3,
+    elevation_deg: float = 30.0,
+    dish_prisms: int = 60,
+    triplets: int = 10,
+    faults: Faults | None = None,
+    conditions: Conditions = NIGHT,
+    schedule: Schedule | None = None,
+    planted: Planted | None = None,
+) -> Night:
+    """A night in the manner of night-01, from one seed.
+
+    azimuth_deg     clockwise from north
+    elevation_deg   5 to 90
+    dish_prisms     0 to 999
+    triplets        0 to 99
+    """
+    if not 5.0 <= elevation_deg <= 90.0:
+        raise ValidityError(f"elevation {elevation_deg} deg is outside 5-90 deg, where the telescope moves")
+    if not (0 <= dish_prisms <= 999 and 0 <= triplets <= 99):
+        raise ValidityError(f"{dish_prisms} dish prisms and {triplets} triplets: expected 0-999 and 0-99")
+    faults, rule, planted = faults or Faults(), schedule or Schedule(), planted or Planted()
+    streams = Streams(seed)
+    heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
+    monuments = {r: monument(r, heads[r], streams, planted) for r in GROUND_RANGERS}
+    marks = benchmarks(monuments, streams, planted)
+    pose = posture(azimuth_deg, elevation_deg, streams, planted)
+    telescope = structure(
+        pose, dish_count=dish_prisms, triplet_count=triplets, streams=streams, faults=faults, planted=planted
+    )
+    cubes = benchmark_targets(marks, streams, planted)
+    targets = telescope.targets | {t.name: t for t in cubes}
+    points = {r: m.true_scan_point for r, m in monuments.items()} | {t.name: t.point for t in targets.values()}
+    points = shifted(points, planted)
+    for ranger in planted.d0_error_mm:
+        if ranger not in heads:
+            raise InputError(f"a D0 error planted on {ranger!r}: expected a ranger, ZY101 to ZY118")
+
+    lists = ground_targets(rule, monuments=monuments, telescope=telescope, marks=marks, pose=pose, streams=streams) | {
+        r: feed_arm_targets(r, rule, telescope, faults, streams) for r in FEED_ARM_RANGERS
+    }
+    plan = plan_shots(rule, lists, streams)
+    air = Air(conditions, planted.gain("stratification"))
+    returns = {
+        r: returns_of_ranger(
+            heads[r],
+            plan[r],
+            points=points,
+            targets=targets,
+            air=air,
+            faults=faults,
+            planted=planted,
+            streams=streams,
+        )
+        for r in heads
+    }
+    ordered, frames = in_time(heads, returns, streams, planted)
+    weather, offsets = weather_readings(
+        air, streams=streams, faults=faults, planted=planted, until_s=ordered[-1].shot.seconds
+    )
+    truth = truth_of(
+        heads=heads,
+        monuments=monuments,
+        telescope=telescope,
+        points=points,
+        returns=ordered,
+        air=air,
+        thermometer_offsets_c=offsets,
+        pose=pose,
+    )
+    return Night(
+        name=f"simulated-{seed}",
+        seed=seed,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=elevation_deg,
+        start_mjd_utc=START_MJD_UTC,
+        conditions=conditions,
+        monuments=monuments,
+        heads=heads,
+        telescope=telescope,
+        benchmarks=marks,
+        single_targets=[*telescope.dish, *telescope.structural, *cubes],
+        weather=weather,
+        shots=[r.shot for r in ordered],
+        frames=frames,
+        truth=truth,
+    )
+
+
+def benchmark_targets(marks: list[Benchmark], streams: Streams, planted: Planted) -> list[Target]:
+    """The benchmarks as targets with approximate positions."""
+    rng = streams("benchmark positions")
+    typed = [typed_mm(b.true_point + typing_error(planted, rng)) for b in marks]
+    return [Target(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
+
+
+def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.ndarray]:
+    """The points with the planted shifts."""
+    for name in planted.shifts:
+        if name not in points:
+            raise InputError(f"a shift planted on {name!r}: the night has no such point")
+    return points | {name: points[name] + np.asarray(by, dtype=float) for name, by in planted.shifts.items()}
+
+
+def in_time(
+    heads: dict[str, Head], returns: dict[str, list[Return]], streams: Streams, planted: Planted
+) -> tuple[list[Return], np.ndarray]:
+    """All returns in the order of their triggers, with their frames."""
+    every = [r for ranger in heads for r in returns[ranger]]
+    order = np.argsort([r.shot.seconds for r in every], kind="stable")
+    frames = np.concatenate([sampled_frames(heads[z], returns[z], streams, planted) for z in heads])
+    return [every[i] for i in order], frames[order]

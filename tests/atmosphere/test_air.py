@@ -1,0 +1,101 @@
+"""The registry, the refusals and the collected answer."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from catseye.atmosphere import ciddor_hill1999, humidity
+from catseye.atmosphere.air import MODELS, air, group_refractivity, phase_refractivity
+from catseye.errors import ValidityError
+
+GOOD = {"temperature_c": 20.0, "pressure_hpa": 933.0, "humidity_percent": 50.0}
+REFUSED = [
+    ({"wavelength_um": 10.6}, "wavelength 10.6 um is outside 0.30-1.69 um, where [CIDDOR96] holds"),
+    ({"temperature_c": 120.0}, "temperature 120 C is outside -40 to 100 C, where [CIDDOR96] holds"),
+    ({"temperature_c": 293.15}, "temperature 293.15 C is outside -40 to 100 C, where [CIDDOR96] holds"),
+    ({"pressure_hpa": 93300.0}, "pressure 93300 hPa is outside 100-1400 hPa, where [CIDDOR96] holds"),
+    ({"pressure_hpa": -1.0}, "pressure -1 hPa is outside 100-1400 hPa, where [CIDDOR96] holds"),
+    ({"humidity_percent": 100.1}, "relative humidity 100.1 % is outside 0-100 %, where [CIDDOR96] holds"),
+    ({"humidity_percent": -0.1}, "relative humidity -0.1 % is outside 0-100 %, where [CIDDOR96] holds"),
+    ({"co2_ppm": 5000.0}, "carbon dioxide 5000 ppm is outside 0-2000 ppm, where [CIDDOR96] holds"),
+    (
+        {"model": "rueger1990", "pressure_hpa": 499.0},
+        "pressure 499 hPa is outside 500-1100 hPa, where [RUEGER90] holds",
+    ),
+    ({"model": "rueger1990", "temperature_c": 51.0}, "temperature 51 C is outside -40 to 50 C, where [RUEGER90] holds"),
+    ({"temperature_c": float("nan")}, "temperature is not a number; give a value in -40 to 100 C"),
+    ({"temperature_c": float("inf")}, "temperature inf C is outside -40 to 100 C, where [CIDDOR96] holds"),
+    (
+        {"humidity_percent": [50.0, float("nan")]},
+        "relative humidity is not a number (element 1 of 2); give a value in 0-100 %",
+    ),
+    (
+        {"temperature_c": [20.0, 21.0, 212.0]},
+        "temperature 212 C (element 2 of 3) is outside -40 to 100 C, where [CIDDOR96] holds",
+    ),
+    (
+        {"temperature_c": 95.0, "humidity_percent": 100.0, "pressure_hpa": 500.0},
+        "vapour's share of the pressure 170.397 % is outside 0-100 %, where [CIDDOR96] holds",
+    ),
+    ({"model": "edlen"}, "air model 'edlen' is unknown; choose one of ciddor_hill1999, rueger1990"),
+]
+
+
+@pytest.mark.parametrize(("change", "text"), REFUSED, ids=[text[:60] for _, text in REFUSED])
+@pytest.mark.parametrize("function", [group_refractivity, phase_refractivity, air])
+def test_a_value_outside_the_limits_is_refused_in_one_line(function, change, text):
+    with pytest.raises(ValidityError) as refusal:
+        function(**{**GOOD, **change})
+    assert str(refusal.value) == text
+
+
+def test_a_modulation_of_nothing_is_refused():
+    with pytest.raises(ValidityError, match="modulation frequency 0 Hz"):
+        air(20.0, 933.0, 50.0, modulation_hz=0.0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_limit_itself_is_legal(model):
+    limits = MODELS[model].limits
+    for end in ("lower", "upper"):
+        for argument, limit in limits.items():
+            # at both ends of everything else the vapour would fill the air; one limit at a time
+            value = air(**{**GOOD, "model": model, argument: getattr(limit, end)})
+            assert np.isfinite(value.group_refractivity), argument
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_zero_celsius_and_zero_humidity_are_legal(model):
+    dry = air(0.0, 1013.25, 0.0, model=model)
+    assert dry.vapour_pressure_hpa == 0.0
+    assert np.isnan(dry.dew_point_c)
+    # at 0 °C dry air is heavier than at 15 °C by 288.15/273.15, to its compressibility (2e-4)
+    warm = air(15.0, 1013.25, 0.0, model=model)
+    assert dry.group_refractivity / warm.group_refractivity == pytest.approx(288.15 / 273.15, rel=3e-4)
+
+
+def test_the_registry_names_each_model_as_the_model_names_itself():
+    for name, model in MODELS.items():
+        assert model.name == name
+        assert model.vapour_formula in humidity.FORMULAS
+        assert 0.0 < model.standard_uncertainty < 1e-6
+        assert set(model.limits) == {"temperature_c", "pressure_hpa", "humidity_percent", "wavelength_um", "co2_ppm"}
+
+
+def test_the_default_model_is_todays():
+    assert group_refractivity(**GOOD) == ciddor_hill1999.group_refractivity(**GOOD)
+    assert air(**GOOD).model == "ciddor_hill1999"
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_collected_answer_agrees_with_the_single_functions(model):
+    answer = air(**GOOD, model=model, wavelength_um=0.85, modulation_hz=1.0e9)
+    light = {"model": model, "wavelength_um": 0.85}
+    assert answer.group_refractivity == group_refractivity(**GOOD, **light)
+    assert answer.phase_refractivity == phase_refractivity(**GOOD, **light)
+    assert answer.group_index == 1.0 + answer.group_refractivity
+    assert answer.group_wavelength * answer.group_index * 1.0e9 == pytest.approx(299_792_458.0, rel=1e-15)
+    assert answer.sensitivity._asdict().keys() == GOOD.keys()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        answer.model = "other"

@@ -1,0 +1,45 @@
+"""The printed numbers in vectors/signal.toml, each to its own tolerance."""
+
+import importlib
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from catseye.constants import SPEED_OF_LIGHT
+
+UNITS = {"_mm": 1e-3, "_um": 1e-6, "_inch": 0.0254, "_deg": np.pi / 180, "_arcsec": np.pi / 648000}
+KEEP = ("wavelength_um",)  # an argument's own unit, not ours to convert
+VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "signal.toml").read_text())["vector"]
+DERIVED = {
+    "half_wavelength": lambda frequency, index: SPEED_OF_LIGHT / (2 * frequency * index),
+    "wavelength": lambda frequency, index: SPEED_OF_LIGHT / (frequency * index),
+}
+
+
+def si(name, value):
+    """The name without its unit, and the value in metres or radians."""
+    for suffix, factor in UNITS.items():
+        if name.endswith(suffix) and name not in KEEP:
+            return name.removesuffix(suffix), np.multiply(value, factor)
+    return name, value
+
+
+def formula(name):
+    if name in DERIVED:
+        return DERIVED[name]
+    module, _, function = name.rpartition(".")
+    return getattr(importlib.import_module(f"catseye.{module}"), function)
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=[v["name"] for v in VECTORS])
+def test_printed_number_is_reproduced(vector):
+    answer = formula(vector["function"])(**dict(si(k, v) for k, v in vector["inputs"].items()))
+    key = next(k for k in vector if k.startswith("expected"))
+    unit = si(key, 1.0)[1]
+    np.testing.assert_allclose(np.asarray(answer) / unit, vector[key], rtol=0, atol=vector["tolerance"])
+    if "truncated_digits" in vector:
+        scale = 10.0 ** vector["truncated_digits"]
+        printed = np.rint(np.multiply(vector[key], scale))
+        assert np.array_equal(np.trunc(np.asarray(answer) / unit * scale), printed)
