@@ -15,6 +15,7 @@ from catseye.constants import ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
 PA_PER_HPA = 100.0
+DRY_BELOW_HPA = 1e-9  # air with less vapour (a dew point below -135 °C) counts as perfectly dry
 
 # [PARKER04] eq. 1.3, over liquid water: hPa, 1, 1/hPa, 1, °C
 BUCK_E0, BUCK_F0, BUCK_FP, BUCK_A, BUCK_B = 6.1121, 1.0007, 3.46e-6, 17.502, 240.97
@@ -145,18 +146,19 @@ def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="
 def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     """Temperature at which this air, cooled at constant pressure, is saturated over liquid water, in °C.
 
-    vapour_pressure_hpa   partial pressure of water vapour, above 0 hPa; dry air (0) has no dew point: nan
+    vapour_pressure_hpa   partial pressure of water vapour, 1e-9 to 1000 hPa; drier air has no dew point: nan
     pressure_hpa          total pressure, 500 to 1100 hPa
     formula               the one that gave the vapour pressure: then saturated air's dew point is its temperature
 
     Source: [PARKER04] eq. 1.7 for `buck`; the others are inverted by Newton's method in 1/T from there, at most
-    eight steps, nan where a step still exceeds 1e-9 of T. The inversion is exact to 1e-9 °C.
+    eight steps, nan where a step still exceeds 1e-9 of T (`iapws` below -100 °C). The inversion is exact to 1e-9 °C.
 
     >>> round(float(dew_point_c(11.7323, 933.0)), 3)
     9.267
     """
     e, p = np.asarray(vapour_pressure_hpa, float), np.asarray(pressure_hpa, float)
-    log_ratio = np.log(np.where(e > 0.0, e, np.nan) / (BUCK_E0 * (BUCK_F0 + BUCK_FP * p)))
+    e = np.where(e >= DRY_BELOW_HPA, e, np.nan)
+    log_ratio = np.log(e / (BUCK_E0 * (BUCK_F0 + BUCK_FP * p)))
     buck = BUCK_B * log_ratio / (BUCK_A - log_ratio)
     return buck if formula == "buck" else _newton_dew_point_c(e, p, formula, buck)
 
@@ -166,7 +168,7 @@ def _newton_dew_point_c(e, p, formula, start_c):
     for _ in range(8):
         at = saturation(kelvin - ZERO_CELSIUS_K, p, formula)
         # ln E is nearly straight in 1/T, so that Newton's step is taken there
-        step = np.log(np.where(e > 0.0, e, np.nan) / at.pressure_hpa) * at.pressure_hpa / (at.per_c * kelvin)
+        step = np.log(e / at.pressure_hpa) * at.pressure_hpa / (at.per_c * kelvin)
         kelvin = kelvin / (1.0 - step)
     return np.where(np.abs(step) < 1e-9, kelvin - ZERO_CELSIUS_K, np.nan)[()]
 
