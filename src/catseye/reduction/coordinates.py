@@ -694,12 +694,12 @@ def _notes(network: _Network, solution: Solution, air: dict[str, tuple[float, fl
                 if not active:
                     notes.append(f"{name}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
     typed = [n for n, p in sorted(network.places.items()) if p.typed]
-    moved = np.array(
-        [np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed]
-    )
-    if len(moved) > 5:
-        usual = float(np.median(moved)) / 1.538  # the median of a chi distribution with 3 degrees of freedom
-        for name, distance in zip(typed, moved, strict=True):
-            if distance > 4.0 * usual:
-                notes.append(f"{name}: its typed position is {distance / MILLIMETRE:.1f} mm off (others {usual * 1538:.0f})")
+    moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
+    unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
+    usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
+    wrong = {unit.get(n, n): d for n, d in zip(typed, moved, strict=True) if d > 4.0 * usual}
+    notes += [
+        f"{n}: its typed position is {d / MILLIMETRE:.0f} mm off, the others' some {np.median(moved) / MILLIMETRE:.0f}"
+        for n, d in wrong.items()
+    ]
     return notes

@@ -72,6 +72,11 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
 def _misfit(coordinates: Coordinates, row: int, settings: Settings) -> str:
     ranges = coordinates.ranges
     error, w = ranges.residual[row], ranges.standardised[row]
+    if abs(w) <= settings.critical:
+        return (
+            f"undecided: this shot and another on {ranges.target[row]} contradict each other, and nothing says which "
+            "is wrong; both are left out"
+        )
     return (
         f"reflected: range {abs(error) * 1e3:.3f} mm too {'long' if error > 0 else 'short'} "
         f"for the adjusted points (w {w:.1f}, limit {settings.critical}): light from elsewhere in the return"

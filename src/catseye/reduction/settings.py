@@ -17,7 +17,7 @@ class Settings:
     u_gradient_c_per_m      °C/m, where there is one station height only and no gradient was measured
     u_normal                rad, each direction, of the normal of a single prism
     u_plate_normal          rad, each direction, of the plate and the axis of a triplet
-    u_position              m, each coordinate, of a typed approximate position
+    u_position              m, each coordinate, of a typed approximate position: some 15 mm in space
     """
 
     air_model: str = "ciddor_hill1999"
@@ -28,4 +28,4 @@ class Settings:
     u_gradient_c_per_m: float = 0.02
     u_normal: float = 0.1 * DEGREE
     u_plate_normal: float = 0.3 * DEGREE
-    u_position: float = 0.015
+    u_position: float = 0.010

@@ -32,7 +32,7 @@ class Conditions:
     humidity_percent: float = 70.5
     humidity_drift_percent_per_h: float = 2.4
     thermometer_offset_c: float = 0.3  # one sigma, each station
-    index_fluctuation_ppm: float = 0.15  # one sigma, each shot
+    index_fluctuation_ppm: float = 0.15  # one sigma, each path from a ranger to a target, all through the campaign
 
 
 NIGHT = Conditions()

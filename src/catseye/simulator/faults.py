@@ -13,7 +13,7 @@ EFFECTS = (
     "drift",  # random walk of the electronic phase
     "feed_arm",  # deflection of the feed arm against the dish
     "h_corr",  # height of the ball centre above the prism mid-point
-    "index_fluctuation",  # refractivity of one shot against smooth air
+    "index_fluctuation",  # refractivity of one path against smooth air
     "lateral",  # ball centre aside of the prism mid-point
     "leakage",  # crosstalk phasor of a head
     "mirror_offset",  # dx, dy, dz of a ground head

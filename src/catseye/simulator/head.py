@@ -99,7 +99,8 @@ def returns_of_ranger(
     seconds = np.array([s.seconds for s in shots])
     phase_e = electronic_phase(head, seconds, streams, planted)
     rng = streams(f"returns/{head.ranger}")
-    fluctuation = rng.normal(0.0, air.conditions.index_fluctuation_ppm, len(shots)) * PPM
+    paths = {name: streams(f"air/{head.ranger}/{name}").normal() for name in targets}
+    fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
     flicker = 1.0 + planted.gain("scintillation") * 0.022 * rng.normal(size=len(shots))
     fate, foreign = rng.uniform(size=len(shots)), rng.uniform(size=(len(shots), 4))
     here = points[head.ranger]
