@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, lapack, solve_triangular
+from scipy.linalg import lapack, solve_triangular
 
 from catseye.errors import EstimationError
 from catseye.estimation.observations import Observations
@@ -21,6 +21,7 @@ RANK_DEFICIENT = "rank deficient: {names} not held by any observation; add one, 
 
 NONCENTRALITY = 4.13  # test at 0.1 % with power 80 %, [BAARDA68] table: smallest shift that is found four times in five
 STEP_IN_SIGMAS = 1e-4  # a step below this no longer moves any answer
+ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not count as uphill
 WORST_CONDITION = 1e-14  # of the scaled normal matrix: beyond it double precision holds no digit
 
 
@@ -144,16 +145,6 @@ def _normal_equations(blocks: Sequence[_Block], x: np.ndarray) -> tuple[np.ndarr
     return normal, right, cost
 
 
-def _floating(scaled: np.ndarray, names: Sequence[str] | None) -> str:
-    """Names of the parameters that take part in the null space of a unit-diagonal normal matrix."""
-    values, vectors = np.linalg.eigh(scaled)
-    null = vectors[:, values < max(len(scaled) * 1e-13, values[0] * 10)]
-    part = np.sum(null**2, axis=1)
-    worst = [int(i) for i in np.argsort(-part)[:4] if part[i] > 1e-3]
-    label = [names[i] if names is not None else f"parameter {i}" for i in worst]
-    return ", ".join(label) + (" ..." if np.sum(part > 1e-3) > len(label) else "")
-
-
 def adjust(
     x0: np.ndarray,
     groups: Sequence[Observations],
@@ -181,47 +172,50 @@ def adjust(
     Source: [FOERSTNER16] section 4.2 (estimation), [BAARDA68] (w test, detectable errors; here with correlations).
     """
     x = np.array(x0, dtype=float)
-    n = len(x)
-    moving = np.arange(n) if free is None else np.flatnonzero(free)
+    moving = np.arange(len(x)) if free is None else np.flatnonzero(free)
     blocks = _blocks(groups, active, extra_variance)
-    inverse = np.zeros((len(moving), len(moving)))
-    status, taken = CONVERGED, 0
-    for taken in range(1, iterations + 1):
+    covariance = np.zeros((len(x), len(x)))
+    status, taken, size = NOT_CONVERGED, 0, np.inf
+    while taken < iterations:
+        taken += 1
         normal, right, cost = _normal_equations(blocks, x)
-        normal, right = normal[np.ix_(moving, moving)], right[moving]
-        diagonal = np.diag(normal)
-        label = None if names is None else [names[i] for i in moving]
-        if np.any(diagonal <= 0.0):
-            unseen = [label[i] if label else f"parameter {moving[i]}" for i in np.flatnonzero(diagonal <= 0.0)]
-            status = RANK_DEFICIENT.format(names=", ".join(unseen[:4]) + (" ..." if len(unseen) > 4 else ""))
+        inverse, floating = _invert(normal[np.ix_(moving, moving)])
+        if floating is not None:
+            called = [names[int(moving[i])] if names is not None else f"parameter {moving[i]}" for i in floating]
+            status = RANK_DEFICIENT.format(names=", ".join(called[:4]) + (" ..." if len(called) > 4 else ""))
             break
-        scale = 1.0 / np.sqrt(diagonal)
-        scaled = normal * scale[:, None] * scale
-        try:
-            factor = cho_factor(scaled, lower=True, check_finite=False)
-            condition = lapack.dpocon(factor[0], np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
-        except np.linalg.LinAlgError:
-            condition = 0.0
-        if condition < WORST_CONDITION:
-            status = RANK_DEFICIENT.format(names=_floating(scaled, label))
-            break
-        step = scale * cho_solve(factor, scale * right, check_finite=False)
-        size = float(np.sqrt(max(right @ step, 0.0)))
-        inverse = lapack.dpotri(factor[0], lower=1)[0]
-        inverse = (np.tril(inverse) + np.tril(inverse, -1).T) * scale[:, None] * scale
+        covariance[np.ix_(moving, moving)] = inverse
+        step = np.zeros(len(x))
+        step[moving] = inverse @ right[moving]
+        size = max(float(right @ step), 0.0) ** 0.5
         if size < STEP_IN_SIGMAS:
+            status = CONVERGED
             break
-        for halving in range(11):
-            trial = x.copy()
-            trial[moving] += step * 0.5**halving
-            if _cost(blocks, trial) <= cost:
-                break
-        x = trial
-    else:
+        trials = [x + step * 0.5**halving for halving in range(11)]
+        x = next((trial for trial in trials if _cost(blocks, trial) <= cost * ROUNDING), x)
+    if status == NOT_CONVERGED:
         status = NOT_CONVERGED.format(step=size, iterations=taken)
-    covariance = np.zeros((n, n))
-    covariance[np.ix_(moving, moving)] = inverse
     return Solution(x, covariance, status, taken, tuple(_fit(block, x, covariance, tests) for block in blocks))
+
+
+def _invert(normal: np.ndarray) -> tuple[np.ndarray, Sequence[int] | None]:
+    """The inverse of a normal matrix, and None; or the indices of the parameters that float, the worst first.
+
+    Judged on the matrix scaled to a unit diagonal, so that metres, radians, volts and degrees weigh alike.
+    """
+    diagonal = np.diag(normal)
+    if np.any(diagonal <= 0.0):
+        return normal, np.flatnonzero(diagonal <= 0.0).tolist()
+    scale = 1.0 / np.sqrt(diagonal)
+    scaled = normal * scale[:, None] * scale
+    factor, failed = lapack.dpotrf(scaled, lower=1)
+    condition = 0.0 if failed else lapack.dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
+    if condition < WORST_CONDITION:
+        values, vectors = np.linalg.eigh(scaled)
+        part = np.sum(vectors[:, values < max(len(scaled) * 1e-13, values[0] * 10)] ** 2, axis=1)
+        return normal, [int(i) for i in np.argsort(-part) if part[i] > 1e-3]
+    inverse = np.tril(lapack.dpotri(factor, lower=1)[0])
+    return (inverse + np.tril(inverse, -1).T) * scale[:, None] * scale, None
 
 
 def _fit(block: _Block, x: np.ndarray, covariance: np.ndarray, tests: bool) -> Fit:
@@ -241,7 +235,14 @@ def _fit(block: _Block, x: np.ndarray, covariance: np.ndarray, tests: bool) -> F
     variance = np.diag(group.covariance) if correlated else group.covariance
     redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
     fit = Fit(
-        group.name, active, residual, np.sqrt(variance), redundancy, standardised, error, detectable,
+        group.name,
+        active,
+        residual,
+        np.sqrt(variance),
+        redundancy,
+        standardised,
+        error,
+        detectable,
         float(np.sum(block.whiten(residual[rows]) ** 2)),
     )
     if not tests:

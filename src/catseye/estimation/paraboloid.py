@@ -63,7 +63,9 @@ def fit_paraboloid(
         scale = np.linalg.norm(design, axis=0)
         orthogonal, triangle = np.linalg.qr(design / scale)
         if np.min(np.abs(np.diag(triangle))) < 1e-10:
-            raise EstimationError(f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis")
+            raise EstimationError(
+                f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis"
+            )
         gain = np.linalg.solve(triangle, orthogonal.T) / scale[:, None]
         step = gain @ deviation
         translation, turn = translation + step[:3], turn + step[3:]
@@ -83,9 +85,7 @@ def fit_paraboloid(
         translation=translation,
         rotation=tilts @ turn,
         covariance=carried @ along @ carried.T,
-        frame=Transform(
-            nominal.to, nominal.from_, rotation @ nominal.rotation, nominal.translation + translation
-        ),
+        frame=Transform(nominal.to, nominal.from_, rotation @ nominal.rotation, nominal.translation + translation),
         local=local,
         deviation=deviation,
         deviation_covariance=rest @ along @ rest.T,

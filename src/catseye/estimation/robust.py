@@ -1,4 +1,4 @@
-"""Which observations are wrong: a robust start, the smallest conflict of each point, then removal and return by test."""
+"""Which observations are wrong: a robust start, the smallest conflict of each point, then removal by test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -72,9 +72,7 @@ def adjust_robustly(
             limit = max(critical, 0.8 * worst)
             active = [a & (t < limit) for t, a in zip(tests, active, strict=True)]
             continue
-        back = [
-            ~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)
-        ]
+        back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
         if not any(b.any() for b in back):
             return _without_undecided(solution, groups, removable, points, free, names)
         active = [a | b for a, b in zip(active, back, strict=True)]

@@ -106,6 +106,14 @@ class AirField:
             ),
         )
 
+    def steepest(self, offsets: np.ndarray) -> float:
+        """Mean temperature gradient from lowest to highest station, °C/m, offsets removed; 0 at one height."""
+        if self.names[-1] == "gradient":
+            return 0.0
+        mean = np.array([values[:, 0].mean() for values in self.readings]) - offsets
+        low, high = int(np.argmin(self.heights)), int(np.argmax(self.heights))
+        return float((mean[high] - mean[low]) / (self.heights[high] - self.heights[low]))
+
     def _shares(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How much each station counts at heights z (m, k): (m, k, stations); and the profile of the last parameter."""
         middle, span = self.heights.mean(), np.ptp(self.heights)

@@ -53,9 +53,7 @@ class Phases:
     def u_phase(self) -> np.ndarray:
         """rad, from the samples' noise; infinite without a return."""
         amplitude = self.amplitude
-        return np.divide(
-            self.u_phasor, amplitude, out=np.full_like(self.u_phasor, np.inf), where=amplitude > 0.0
-        )
+        return np.divide(self.u_phasor, amplitude, out=np.full_like(self.u_phasor, np.inf), where=amplitude > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +157,10 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
         references = np.array([k for k in references if k not in wrong], dtype=int)
         if not len(references):
             rejected.update(
-                {int(k): f"no reference: {name} has no usable shot on its internal cube, its drift is unknown"
-                 for k in lit}
+                {
+                    int(k): f"no reference: {name} has no usable shot on its internal cube, its drift is unknown"
+                    for k in lit
+                }
             )
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))

@@ -9,7 +9,8 @@ from catseye.constants import DEGREE
 class Settings:
     """Assumptions of a reduction; the defaults are those of the campaign layout's README.
 
-    air_model               name in `catseye.atmosphere.air.MODELS`
+    air_model               name in `catseye.atmosphere.air.MODELS`; version 1 of the layout prescribes the notes' model
+                            (ciddor_hill1999 moves night-01's feed arm by 12 um)
     critical                |w| above which a shot is rejected; 3.5 rejects one good shot in 2000
     smallest_return         amplitude over its own standard uncertainty below which a shot counts as blocked
     u_thermometer_c         °C, offset of a station thermometer that was not compared with a standard
@@ -20,7 +21,7 @@ class Settings:
     u_position              m, each coordinate, of a typed approximate position: some 15 mm in space
     """
 
-    air_model: str = "ciddor_hill1999"
+    air_model: str = "rueger1990"
     critical: float = 3.5
     smallest_return: float = 5.0
     u_thermometer_c: float = 0.3

@@ -9,7 +9,8 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.records.campaign import Campaign
-from catseye.reduction.coordinates import Coordinates, nominal_frame
+from catseye.reduction.coordinates import Coordinates
+from catseye.reduction.places import nominal_frame
 
 FEWEST_CHECKS = 3  # used shots at a prism before it may shape the dish
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"

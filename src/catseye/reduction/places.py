@@ -1,0 +1,111 @@
+"""What can be ranged to or from, at its approximate place in the ground frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.geometry.antenna import ground_from_reflector
+from catseye.geometry.frame import Transform
+from catseye.geometry.mount import gamma, scan_point
+from catseye.records.campaign import Campaign
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point of the network that can be ranged to.
+
+    name       of the point
+    kind       "ranger", "prism", "ball" or "hollow"
+    start      (3,) m, ground frame
+    normal     (3,) of a prism's entry face, ground frame, or None
+    height     m, of a prism
+    constant   m, range constant Pc of its glass; 0 for hollow cubes
+    group      what its normal's error is shared with: its own name, or its triplet's; "" for none
+    typed      its start is an approximate position that somebody typed
+    """
+
+    name: str
+    kind: str
+    start: np.ndarray
+    normal: np.ndarray | None = None
+    height: float = 0.0
+    constant: float = 0.0
+    group: str = ""
+    typed: bool = True
+
+
+def nominal_frame(campaign: Campaign) -> Transform:
+    """Reflector to ground at the campaign's posture, if the telescope were rigid and perfectly placed."""
+    reflector = campaign.site.frames.reflector
+    return ground_from_reflector(
+        np.radians(campaign.site.campaign.azimuth_deg),
+        np.radians(campaign.site.campaign.elevation_deg),
+        elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
+        reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
+    )
+
+
+def places_of(campaign: Campaign) -> dict[str, Place]:
+    """Everything that can be ranged to, by name, at its approximate position in the ground frame.
+
+    Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
+    [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side.
+    """
+    to_ground = {"reflector": nominal_frame(campaign), "ground": Transform("ground", "ground", np.eye(3), np.zeros(3))}
+    places: dict[str, Place] = {}
+    for name, monument in campaign.monuments.items():
+        mirror = campaign.mirror_of(name)
+        places[name] = Place(
+            name,
+            "ranger",
+            scan_point(
+                np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE,
+                gamma(monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad),
+                np.array([mirror.dx_mm, mirror.dy_mm, mirror.dz_mm]) * MILLIMETRE,
+            ),
+            typed=False,
+        )
+    for ranger in campaign.feedarm.ranger:
+        where = to_ground["reflector"].points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE)
+        places[ranger.name] = Place(ranger.name, "ranger", where)
+    for target in campaign.targets.values():
+        frame = to_ground[target.frame]
+        where = frame.points(np.array(target.position_mm) * MILLIMETRE)
+        if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
+            places[target.name] = Place(
+                target.name,
+                "prism",
+                where,
+                unit(frame.directions(target.normal)),
+                target.height_mm * MILLIMETRE,
+                target.pc_mm * MILLIMETRE,
+                target.name,
+            )
+        else:
+            places[target.name] = Place(target.name, "hollow", where)
+    for triplet in campaign.triplets.values():
+        frame = to_ground[triplet.frame]
+        ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
+        normal, axis = unit(frame.directions(triplet.normal)), unit(frame.directions(triplet.axis))
+        middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
+        half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
+        for prism, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
+            places[prism.target] = Place(
+                prism.target,
+                "prism",
+                where,
+                normal,
+                prism.height_mm * MILLIMETRE,
+                prism.pc_mm * MILLIMETRE,
+                triplet.triplet,
+            )
+        places[triplet.ball.target] = Place(
+            triplet.ball.target, "ball", ball, constant=triplet.ball.pc_b_mm * MILLIMETRE
+        )
+    return places
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    """The vector (3,) at length 1."""
+    return v / np.linalg.norm(v)

@@ -1,0 +1,132 @@
+"""A ranger's shots as observations: distances in optical metres, with every correction and its derivative."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.estimation.observations import Distances
+from catseye.optics.prism import obliquity_correction, obliquity_slope
+from catseye.reduction.network import AIR, Network
+from catseye.reduction.places import unit
+from catseye.reduction.ranges import Electronics
+from catseye.signal.cycles import fraction, whole_cycles
+
+
+@dataclass(frozen=True, eq=False)
+class ShotParts:
+    """The pieces of one ranger's ranges, for the record of every correction."""
+
+    name: str
+    electronics: Electronics
+    target: tuple[str, ...]
+    phase: np.ndarray
+    cycles: np.ndarray
+    margin: np.ndarray
+    refractivity: np.ndarray
+    incidence: np.ndarray
+    glass: np.ndarray
+    obliquity: np.ndarray
+    leakage_slope: np.ndarray
+
+
+def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, ShotParts]:
+    """One ranger's shots as distances in optical metres, with everything that depends on where things are."""
+    campaign, layout, places = network.campaign, network.layout, network.places
+    electronics, phases = network.electronics[name], network.phases
+    rows = electronics.shots
+    targets = tuple(campaign.shots.target[k] for k in rows)
+    m = len(rows)
+    origin = np.full(m, layout.at[name])
+    target = np.array([layout.at[t] for t in targets])
+    a = x[origin[:, None] + np.arange(3)]
+    b = x[target[:, None] + np.arange(3)]
+    towards = a - b
+    distance = np.linalg.norm(towards, axis=1)
+    towards = towards / distance[:, None]
+
+    air_columns = layout.columns(AIR, len(network.field.names))
+    air = network.field.along(campaign.shots.mjd_utc[rows], a, b, x[air_columns])
+    n = 1.0 + air.refractivity
+    d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
+    glass = np.array([places[t].constant for t in targets])
+    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, towards, x)
+
+    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
+    phase = fraction(phases.phase[rows], electronics.phase)
+    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]])
+    cycles, margin = whole_cycles(coarse, phase, half)
+    observed = (cycles - phase / TWO_PI) * half
+
+    # Leakage left over, complex dL: a phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
+    per_radian = -half / TWO_PI
+    lit, cube = phases.phasor[rows], electronics.reference
+    turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
+    leakage_slope = per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
+
+    covariance = np.diag((per_radian * phases.u_phase[rows]) ** 2) + per_radian**2 * electronics.covariance
+    path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance
+    same = np.array(targets)[:, None] == np.array(targets)
+    covariance += same * np.outer(path, path)
+
+    group = Distances(
+        name=name,
+        observed=observed,
+        covariance=covariance,
+        origin=origin,
+        target=target,
+        scale=n,
+        offset=-n * (glass + obliquity + d0)
+        - distance * (air.slopes @ x[air_columns])
+        + n * np.sum(normal_slopes * x[normal_columns], axis=1),
+        nuisance=np.concatenate(
+            [
+                np.full((m, 1), layout.at[f"zero {name}"]),
+                np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
+                np.broadcast_to(air_columns, (m, len(air_columns))),
+                normal_columns,
+            ],
+            axis=1,
+        ),
+        coefficient=np.concatenate(
+            [-n[:, None], leakage_slope, distance[:, None] * air.slopes, -n[:, None] * normal_slopes], axis=1
+        ),
+    )
+    parts = ShotParts(
+        name, electronics, targets, phase, cycles, margin, air.refractivity, incidence, glass, obliquity, leakage_slope
+    )
+    return group, parts
+
+
+def _obliquity(
+    network: Network, targets: Sequence[str], towards: np.ndarray, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Incidence and dPc at the estimated normals, and the derivatives of dPc by each normal's two tilts.
+
+    A shot on anything but a prism gets the first parameter's column with a zero derivative.
+    """
+    m = len(targets)
+    ratio = network.campaign.site.ranging.bk7_to_air_group_index_ratio
+    incidence, correction, slopes = np.zeros(m), np.zeros(m), np.zeros((m, 2))
+    columns = np.zeros((m, 2), dtype=int)
+    for k, target in enumerate(targets):
+        place = network.places[target]
+        if place.normal is None:
+            continue
+        columns[k] = network.layout.columns(f"normal {place.group}", 2)
+        normal, across = _tilted(place.normal, x[columns[k]])
+        incidence[k] = np.arccos(np.clip(normal @ towards[k], -1.0, 1.0))
+        # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
+        cosine = np.cos(min(incidence[k], 0.5 * np.pi))
+        correction[k] = obliquity_correction(place.height, ratio, cosine)
+        if incidence[k] > 1e-6:  # at normal incidence the correction is flat
+            by_angle = obliquity_slope(place.height, ratio, cosine)
+            slopes[k] = -by_angle * (across @ towards[k]) / np.sin(incidence[k])
+    return incidence, correction, columns, slopes
+
+
+def _tilted(normal: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The normal tilted by two small angles (rad) along two directions of the face, and those directions (2, 3)."""
+    across = np.linalg.svd(normal[None])[2][1:]
+    return unit(normal + tilt @ across), across

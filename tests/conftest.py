@@ -1,0 +1,23 @@
+"""What tests of every room share: the example night, read and reduced once."""
+
+from pathlib import Path
+
+import pytest
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
+
+
+@pytest.fixture(scope="session")
+def night_01():
+    """The campaign that ships with catseye."""
+    from catseye.records.campaign import read_campaign
+
+    return read_campaign(EXAMPLE)
+
+
+@pytest.fixture(scope="session")
+def reduced_night_01(night_01):
+    """Its reduction with default settings."""
+    from catseye.reduction.epoch import reduce_epoch
+
+    return reduce_epoch(night_01)
