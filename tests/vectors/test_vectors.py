@@ -1,4 +1,4 @@
-"""The printed numbers in vectors/signal.toml, each to its own tolerance."""
+"""The printed numbers in geometry.toml, optics.toml and signal.toml, each to its own tolerance."""
 
 import importlib
 import tomllib
@@ -8,14 +8,26 @@ import numpy as np
 import pytest
 
 from catseye.constants import SPEED_OF_LIGHT
+from catseye.optics import prism
+from catseye.optics.glass import group_index
 
 UNITS = {"_mm": 1e-3, "_um": 1e-6, "_inch": 0.0254, "_deg": np.pi / 180, "_arcsec": np.pi / 648000}
 KEEP = ("wavelength_um",)  # an argument's own unit, not ours to convert
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "signal.toml").read_text())["vector"]
-DERIVED = {
+DERIVED = {  # one line beyond a public function
+    "group_wavelength": lambda frequency, wavelength_um: SPEED_OF_LIGHT / (group_index(wavelength_um) * frequency),
+    "half_group_wavelength": lambda frequency, wavelength_um: (
+        SPEED_OF_LIGHT / (2 * group_index(wavelength_um) * frequency)
+    ),
+    "index_ratio": lambda wavelength_um, air: group_index(wavelength_um) / air,
+    "oblique_prism": lambda height, n, incidence: prism.obliquity_correction(height, n, np.cos(incidence)),
     "half_wavelength": lambda frequency, index: SPEED_OF_LIGHT / (2 * frequency * index),
     "wavelength": lambda frequency, index: SPEED_OF_LIGHT / (frequency * index),
 }
+VECTORS = [
+    pytest.param(vector, id=f"{room}: {vector['name']}")
+    for room in ("geometry", "optics", "signal")
+    for vector in tomllib.loads((Path(__file__).parent / f"{room}.toml").read_text(encoding="utf-8"))["vector"]
+]
 
 
 def si(name, value):
@@ -33,9 +45,11 @@ def formula(name):
     return getattr(importlib.import_module(f"catseye.{module}"), function)
 
 
-@pytest.mark.parametrize("vector", VECTORS, ids=[v["name"] for v in VECTORS])
+@pytest.mark.parametrize("vector", VECTORS)
 def test_printed_number_is_reproduced(vector):
     answer = formula(vector["function"])(**dict(si(k, v) for k, v in vector["inputs"].items()))
+    if "points_mm" in vector:
+        answer = answer.points(np.multiply(vector["points_mm"], 1e-3))
     key = next(k for k in vector if k.startswith("expected"))
     unit = si(key, 1.0)[1]
     np.testing.assert_allclose(np.asarray(answer) / unit, vector[key], rtol=0, atol=vector["tolerance"])

@@ -1,0 +1,43 @@
+"""Every citation has its entry in the bibliography, every entry is cited."""
+
+import re
+from pathlib import Path
+
+from catseye.bibliography import SOURCES
+
+SOURCE_TREE = Path(__file__).parents[2] / "src" / "catseye"
+KEY = re.compile(r"\[([A-Z]{3,}\d{2})\]")
+BARE = re.compile(r"\b([A-Z]{3,}\d{2})\b")
+
+
+def cited() -> dict[str, set[str]]:
+    """Keys in brackets by where they stand; in this project's source, the bibliography itself left out."""
+    found: dict[str, set[str]] = {}
+    for path in sorted(SOURCE_TREE.rglob("*.py")):
+        if path.name != "bibliography.py":
+            for key in KEY.findall(path.read_text(encoding="utf-8")):
+                found.setdefault(key, set()).add(path.relative_to(SOURCE_TREE).as_posix())
+    return found
+
+
+def test_every_citation_has_an_entry():
+    missing = {key: sorted(where) for key, where in cited().items() if key not in SOURCES}
+    assert not missing
+
+
+def test_every_entry_is_cited():
+    between = set(BARE.findall((SOURCE_TREE / "bibliography.py").read_text(encoding="utf-8")))
+    bare = set()
+    for path in SOURCE_TREE.rglob("*.py"):
+        if path.name != "bibliography.py":
+            bare |= set(BARE.findall(path.read_text(encoding="utf-8")))
+    assert sorted(SOURCES) == sorted(k for k in SOURCES if k in cited() or k in bare)
+    assert set(SOURCES) <= between
+
+
+def test_entries_say_what_they_are():
+    for key, source in SOURCES.items():
+        assert KEY.fullmatch(f"[{key}]"), key
+        assert len(source.title) > 20, key
+        assert source.locator, key
+        assert source.used, key
