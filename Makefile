@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.catseye-installed
 
-.PHONY: help setup check test test-all demo bench clean
+.PHONY: help setup check test test-all demo bench release clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -17,8 +17,8 @@ $(STAMP): pyproject.toml
 setup: $(STAMP)  ## make .venv and install catseye in it
 
 check: setup  ## style, types, layers
-	$(BIN)/ruff check src tests bench
-	$(BIN)/ruff format --check src tests bench
+	$(BIN)/ruff check src tests bench studies
+	$(BIN)/ruff format --check src tests bench studies
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
@@ -34,5 +34,8 @@ demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a re
 bench: setup  ## benchmarks, as ratios in one run
 	$(BIN)/python bench/bench_reduce.py
 
+release: setup  ## a wheel in dist/
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+
 clean:  ## remove .venv and everything that can be made again
-	rm -rf .venv demo-night-01 .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv dist demo-night-01 .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -112,4 +112,19 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1256/qj.04.94",
         used="eq. 10: vapour pressure of supercooled water, as a yardstick below 0 °C",
     ),
+    "BAARDA68": Source(
+        title="W. Baarda, A testing procedure for use in geodetic networks, 1968",
+        locator="Netherlands Geodetic Commission, Publications on Geodesy, New Series 2 (5), Delft",
+        used="data snooping: the w test, and the smallest error found at the level 0.1 % with power 80 %",
+    ),
+    "FOERSTNER16": Source(
+        title="W. Förstner and B. P. Wrobel, Photogrammetric Computer Vision, Springer, 2016",
+        locator="doi:10.1007/978-3-319-11550-4",
+        used="chapter 4: Gauss-Markov model, evaluation of the result, robust estimation and outlier detection",
+    ),
+    "HUBER09": Source(
+        title="P. J. Huber and E. M. Ronchetti, Robust Statistics, second edition, Wiley, 2009",
+        locator="doi:10.1002/9780470434697",
+        used="iterated reweighting by the size of the residual",
+    ),
 }
