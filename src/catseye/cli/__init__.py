@@ -1,0 +1,1 @@
+"""The command line: it calls, it never computes."""

@@ -1,0 +1,19 @@
+"""The entry point: signals first, then the commands; every failure becomes one line and a status."""
+
+import os
+import signal
+import sys
+
+
+def run() -> None:
+    """`catseye`: exits with 0 done, 1 could not, 2 wrong usage, 130 on Ctrl-C, 143 when terminated."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # nothing to undo yet; what knows how to is imported next
+        signal.signal(number, lambda caught, frame: os._exit(128 + caught))
+    from catseye.gateways.interruption import ignore_signals, leave_on_signals
+
+    leave_on_signals()
+    from catseye.cli.terminal import finish
+
+    status = finish()
+    ignore_signals()
+    sys.exit(status)

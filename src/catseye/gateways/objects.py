@@ -1,0 +1,209 @@
+"""Results as plain objects for JSON: SI units unless a key says otherwise, null for what is not a number."""
+
+import json
+import math
+import platform
+from dataclasses import asdict
+from datetime import datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catseye import __version__
+from catseye.gateways.output import FORMAT
+
+if TYPE_CHECKING:
+    from catseye.atmosphere.air import Air
+    from catseye.records.campaign import Campaign
+    from catseye.reduction.epoch import Reduction
+
+PACKAGES = ("numpy", "scipy", "pydantic", "matplotlib", "threadpoolctl", "typer")
+CERTIFICATE = ("serial", "measured_on", "valid_until", "by", "report")
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types; NaN and infinity become null.
+
+    >>> plain({"a": np.float64(1.5), "b": [float("nan")]})
+    {'a': 1.5, 'b': [None]}
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int) else str(value)
+
+
+def json_line(value: Any) -> str:
+    """One JSON text on one line, for programs."""
+    return json.dumps(plain(value), allow_nan=False)
+
+
+def json_page(value: dict[str, Any]) -> str:
+    """One JSON text with a line for each entry, two levels deep: readable in an editor and by line tools."""
+    lines = []
+    for key, item in plain(value).items():
+        start = f"  {json.dumps(key)}: "
+        if isinstance(item, dict) and item:
+            inner = ",\n".join(f"    {json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in item.items())
+            lines.append(f"{start}{{\n{inner}\n  }}")
+        elif isinstance(item, list) and item and isinstance(item[0], list):
+            inner = ",\n".join(f"    {json.dumps(row, allow_nan=False)}" for row in item)
+            lines.append(f"{start}[\n{inner}\n  ]")
+        else:
+            lines.append(start + json.dumps(item, allow_nan=False))
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def air_object(air: "Air", wavelength_um: float, u: tuple[float, float, float]) -> dict[str, Any]:
+    """The index of air as `catseye air --json` gives it.
+
+    u   standard uncertainties of temperature (°C), pressure (hPa) and relative humidity (%); zeros leave the formula's
+    """
+    parts = [float(slope) * each for slope, each in zip(air.sensitivity, u, strict=True)]
+    return {
+        "model": air.model,
+        "wavelength_um": wavelength_um,
+        "group_index": air.group_index,
+        "phase_index": air.phase_index,
+        "vapour_pressure_hpa": air.vapour_pressure_hpa,
+        "dew_point_c": air.dew_point_c,
+        "group_wavelength": air.group_wavelength,
+        "sensitivity": air.sensitivity._asdict(),
+        "standard_uncertainty": math.hypot(air.standard_uncertainty, *parts),
+    }
+
+
+def reduction_object(reduction: "Reduction") -> dict[str, Any]:
+    """A reduction as `catseye reduce --json` gives it."""
+    coordinates, surface = reduction.coordinates, reduction.surface
+    points = {}
+    for row, name in enumerate(coordinates.points):
+        x, y, z = coordinates.x[row]
+        at = slice(3 * row, 3 * row + 3)
+        covariance = coordinates.covariance[at, at]
+        points[name] = {"x": x, "y": y, "z": z, "covariance": covariance, "shots": coordinates.shots[row]}
+    total, used, rejected = len(reduction.status), reduction.status.count("used"), len(reduction.rejected)
+    return {
+        "campaign": reduction.campaign.site.campaign.name,
+        "frame": "ground",
+        "status": coordinates.status,
+        "notes": reduction.notes,
+        "shots": {"total": total, "used": used, "reference": total - used - rejected, "rejected": rejected},
+        "points": points,
+        "variance_factor": coordinates.variance_factor,
+        "degrees_of_freedom": coordinates.degrees_of_freedom,
+        "rejected": reduction.rejected,
+        "refractivity_ppm": coordinates.refractivity_ppm,
+        "pose": surface.pose() if surface is not None else None,
+        "surface": surface_object(reduction),
+        "ranger_zeros": {name: {"zero": zero, "u_zero": u} for name, (zero, u) in coordinates.zeros.items()},
+        "air": estimated_air(reduction),
+    }
+
+
+def estimated_air(reduction: "Reduction") -> dict[str, Any]:
+    """What the ranges said about the thermometers and the profile; units in the keys."""
+    *stations, profile = reduction.coordinates.air.items()
+    (name, (value, u)) = profile
+    key = "gradient_c_per_m" if name == "gradient" else "bend_c"
+    return {
+        "model": reduction.settings.air_model,
+        "thermometers": {station: {"offset_c": offset, "u_offset_c": us} for station, (offset, us) in stations},
+        key: value,
+        f"u_{key}": u,
+    }
+
+
+def surface_object(reduction: "Reduction") -> dict[str, Any] | None:
+    surface = reduction.surface
+    if surface is None:
+        return None
+    return {
+        "prisms": len(surface.names),
+        "rms": surface.rms,
+        "focal_length": surface.focal_length,
+        "deviations": {
+            name: {"deviation": deviation, "u_deviation": u}
+            for name, deviation, u in zip(surface.names, surface.fit.deviation, surface.u_deviation, strict=True)
+        },
+    }
+
+
+def coordinates_object(reduction: "Reduction") -> dict[str, Any]:
+    """The `--json` object and the full covariance, m², rows and columns in the order stated."""
+    coordinates = reduction.coordinates
+    return {
+        "format": FORMAT,
+        **reduction_object(reduction),
+        "covariance_order": [f"{name} {axis}" for name in coordinates.points for axis in "xyz"],
+        "covariance": coordinates.covariance,
+    }
+
+
+def pose_object(reduction: "Reduction") -> dict[str, Any]:
+    """The antenna's pose and the paraboloid behind it; nulls and the reason where the dish was not seen."""
+    surface, posture = reduction.surface, reduction.campaign.site.campaign
+    nominal = {"azimuth_deg": posture.azimuth_deg, "elevation_deg": posture.elevation_deg}
+    common = {"format": FORMAT, "campaign": posture.name, "nominal_posture": nominal}
+    if surface is None:
+        reason = next((note for note in reduction.notes if note.startswith("no paraboloid")), "no dish prisms")
+        return {**common, "pose": None, "reason": reason, "paraboloid": None}
+    return {
+        **common,
+        **surface.pose(),
+        "paraboloid": {
+            "fit": "least squares of the normal deviations, unweighted, focal length held",
+            "focal_length": surface.focal_length,
+            "prisms": len(surface.names),
+            "rms": surface.rms,
+            "ground_from_paraboloid_rotation": surface.fit.frame.rotation,
+            "ground_from_paraboloid_translation": surface.fit.frame.translation,
+        },
+    }
+
+
+def provenance_object(reduction: "Reduction", when: datetime, outputs: dict[str, str]) -> dict[str, Any]:
+    """What went in, what came out, by which programs, under which assumptions, when.
+
+    outputs   SHA-256 of each file written, by its name
+    """
+    campaign = reduction.campaign
+    return {
+        "format": FORMAT,
+        "made_by": "catseye reduce",
+        "when_utc": when.isoformat(timespec="seconds"),
+        "campaign": {
+            "name": campaign.site.campaign.name,
+            "directory": campaign.directory.resolve().name,
+            "start_mjd_utc": campaign.site.campaign.start_mjd_utc,
+            "shots": len(campaign.shots),
+        },
+        "versions": versions(),
+        "settings": asdict(reduction.settings),
+        "inputs_sha256": campaign.hashes,
+        "certificates": certificates(campaign),
+        "outputs": outputs,
+    }
+
+
+def versions() -> dict[str, str]:
+    machine = f"{platform.system()} {platform.machine()}"
+    installed = {name: version(name) for name in PACKAGES}
+    return {"catseye": __version__, "python": platform.python_version(), **installed, "platform": machine}
+
+
+def certificates(campaign: "Campaign") -> dict[str, Any]:
+    """Who vouches for each calibration; null where the file does not say."""
+    records: dict[str, Any] = {"site.toml": campaign.site}
+    records |= {f"mirrors/{name}.toml": mirror for name, mirror in campaign.mirrors.items()}
+    records |= {f"monuments/{name}.toml": monument for name, monument in campaign.monuments.items()}
+    records |= {f"triplets/{name}.toml": triplet for name, triplet in campaign.triplets.items()}
+    return {file: {key: getattr(record, key) for key in CERTIFICATE} for file, record in records.items()}

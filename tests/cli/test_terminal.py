@@ -1,0 +1,61 @@
+"""Progress is for terminals, complaints are one line."""
+
+import io
+
+import pytest
+
+from catseye.cli.terminal import ProgressLine, attempt, complain, wrapped
+from catseye.errors import InputError
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress_is_one_line_that_is_wiped_at_the_end(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr("sys.stderr", stream)
+    progress = ProgressLine(quiet=False)
+    progress("samples to phases", 5, 10)
+    progress("adjustment", 0, 6)
+    progress.clear()
+    assert "samples to phases 5/10" in stream.getvalue()
+    assert "adjustment 0/6" in stream.getvalue()
+    assert "\n" not in stream.getvalue()
+    assert stream.getvalue().endswith("\r\x1b[K")
+
+
+@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
+def test_progress_is_silent_elsewhere_or_when_asked(monkeypatch, stream, quiet):
+    monkeypatch.setattr("sys.stderr", stream)
+    progress = ProgressLine(quiet=quiet)
+    progress("adjustment", 0, 6)
+    progress.clear()
+    assert stream.getvalue() == ""
+
+
+def test_a_complaint_is_one_printable_line(capsys):
+    complain("a\nb\x1b[0m\tc")
+    assert capsys.readouterr().err == "catseye: a b [0m c\n"
+
+
+def test_each_outcome_has_its_status(capsys):
+    def leave(status):
+        raise SystemExit(status)
+
+    def fail(problem):
+        raise problem
+
+    assert attempt(lambda: None) == 0
+    assert attempt(lambda: leave(2)) == 2
+    assert attempt(lambda: fail(InputError("site.toml: bad"))) == 1
+    assert attempt(lambda: fail(PermissionError(13, "Permission denied", "x.csv"))) == 1
+    assert capsys.readouterr().err == "catseye: site.toml: bad\ncatseye: x.csv: Permission denied\n"
+
+
+def test_a_passage_hangs_under_its_title():
+    lines = wrapped("The air", "word " * 60).splitlines()
+    assert lines[0].startswith("The air       word")
+    assert all(line.startswith(" " * 14 + "word") for line in lines[1:])
+    assert max(map(len, lines)) <= 100

@@ -1,0 +1,220 @@
+"""The command line keeps its contract: statuses, streams, keys, and an example in every help."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from catseye import __version__
+from catseye.atmosphere.air import MODELS
+from catseye.cli import commands
+from catseye.cli.commands import app
+
+ROOT = Path(__file__).parents[2]
+NIGHT = ROOT / "examples" / "night-01"
+WEATHER = ["--temperature-c", "20", "--pressure-hpa", "933", "--humidity-percent", "50"]
+COMMANDS = sorted(typer.main.get_command(app).commands)
+
+
+def catseye(*arguments, cwd=None, **streams):
+    """The program as a user starts it: its entry point in a process of its own."""
+    code = "from catseye.cli.main import run; run()"
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], check=False, text=True, cwd=cwd, timeout=60, **streams
+    )
+
+
+@pytest.fixture(scope="session")
+def reduced(tmp_path_factory):
+    """One whole `reduce --json --out`, the first on its machine: matplotlib builds its font cache and would say so."""
+    out, fresh = tmp_path_factory.mktemp("reduced") / "out", tmp_path_factory.mktemp("home")
+    place = {**os.environ, "HOME": str(fresh), "MPLCONFIGDIR": str(fresh)}
+    return catseye("reduce", NIGHT, "--out", out, "--json", env=place), out
+
+
+def test_reduce_gives_one_object_on_stdout_and_nothing_on_stderr(reduced):
+    done, out = reduced
+    assert (done.returncode, done.stderr) == (0, "")
+    found = json.loads(done.stdout, parse_constant=pytest.fail)
+    keys = {
+        "points",
+        "variance_factor",
+        "degrees_of_freedom",
+        "rejected",
+        "refractivity_ppm",
+        "pose",
+        "status",
+        "notes",
+    }
+    assert set(found) >= keys | {"ranger_zeros", "air"}
+    saved = json.loads((out / "coordinates.json").read_text())
+    assert {key: saved[key] for key in found} == found
+
+
+def test_reduce_writes_every_file_and_leaves_no_neighbour(reduced):
+    _, out = reduced
+    files = "coordinates.csv coordinates.json pose.json provenance.json ranges.csv report.html surface.csv"
+    assert sorted(path.name for path in out.iterdir()) == files.split()
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+
+
+def test_reduce_replaces_its_own_output_and_tells_people(reduced):
+    _, out = reduced
+    done = catseye("reduce", NIGHT, "--out", out, "--air-model", "ciddor_hill1999")
+    assert (done.returncode, done.stderr) == (0, "")
+    for word in ("The shots", "The feed arm", "The dish", "The air", "variance factor", "report.html"):
+        assert word.lower() in done.stdout.lower()
+    assert "\x1b" not in done.stdout
+    assert json.loads((out / "provenance.json").read_text())["settings"]["air_model"] == "ciddor_hill1999"
+
+
+def test_demo_reports_and_ends_with_the_path(tmp_path):
+    done = catseye("demo", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    report = tmp_path / done.stdout.strip().splitlines()[-1].removeprefix("Report: ")
+    assert report == tmp_path / "demo-night-01" / "report.html"
+    assert report.is_file()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["bogus"],
+        ["--bogus"],
+        ["air"],
+        ["air", *WEATHER, "--bogus"],
+        ["air", *WEATHER, "--co2-ppm", "much"],
+        ["air", *WEATHER, "--model", "bogus"],
+        ["air", *WEATHER, "--u-pressure-hpa", "-1"],
+        ["air", *WEATHER, "--u-pressure-hpa", "nan"],
+        ["reduce"],
+        ["reduce", str(NIGHT)],
+        ["reduce", str(NIGHT), "--out", "x", "--air-model", "bogus"],
+        ["demo", "a", "b"],
+    ],
+)
+def test_wrong_usage_is_2(arguments, tmp_path):
+    done = catseye(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "Usage" in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["reduce", "missing", "--out", "x"], "missing"),
+        (["reduce", "missing", "--json"], "missing"),
+        (["reduce", str(ROOT / "pyproject.toml"), "--json"], "is not a directory"),
+        (["reduce", str(ROOT / "tests"), "--json"], "site.toml"),
+        (["reduce", str(NIGHT), "--out", "no/out"], "no is not a directory"),
+        (["reduce", str(NIGHT), "--out", "/proc/out"], "/proc/out"),
+        (["air", *WEATHER, "--temperature-c", "300"], "temperature 300 C is outside"),
+        (["air", *WEATHER, "--temperature-c", "nan"], "not a number"),
+        (["air", *WEATHER, "--wavelength-um", "-1"], "wavelength -1 um is outside"),
+    ],
+)
+def test_what_cannot_be_done_is_1_in_one_line(arguments, said, tmp_path):
+    done = catseye(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("catseye: ")
+    assert done.stderr.count("\n") == 1
+    assert said in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_name_with_a_line_break_still_makes_one_line():
+    done = catseye("reduce", "no\nsuch\x1b[31m\nplace", "--json")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "\x1b" not in done.stderr
+
+
+def test_a_full_disk_under_stdout_is_1_in_one_line():
+    with Path("/dev/full").open("w") as full:
+        done = catseye("air", *WEATHER, "--json", stdout=full)
+    assert (done.returncode, done.stderr) == (1, "catseye: standard output: No space left on device\n")
+
+
+def test_a_reader_who_leaves_early_is_no_failure():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = catseye("air", *WEATHER, stdout=writing)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_terminal_that_knows_ascii_only_is_no_failure():
+    done = catseye("air", *WEATHER, env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_fault_of_ours_is_one_line_too():
+    code = (
+        "import catseye.cli.commands as c\n"
+        "def broken(): raise ZeroDivisionError('a\\nb')\n"
+        "c.main = broken\n"
+        "from catseye.cli.main import run; run()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert re.fullmatch(r"catseye: internal error, .*ZeroDivisionError: a b \(.*:\d+\)\n", done.stderr)
+
+
+def test_air_gives_the_keys_of_the_contract():
+    found = json.loads(CliRunner().invoke(app, ["air", *WEATHER, "--json"]).stdout)
+    keys = {"group_index", "phase_index", "vapour_pressure_hpa", "dew_point_c", "group_wavelength", "sensitivity"}
+    assert set(found) == keys | {"standard_uncertainty", "model", "wavelength_um"}
+    assert set(found["sensitivity"]) == {"temperature_c", "pressure_hpa", "humidity_percent"}
+
+
+def test_air_agrees_with_the_notes_worked_example():
+    """[PARKER04] section 1.4 prints 1.000 253 24 and a modulation of 0.199 811 04 m."""
+    found = json.loads(CliRunner().invoke(app, ["air", *WEATHER, "--json", "--model", "rueger1990"]).stdout)
+    assert found["group_index"] == pytest.approx(1.00025324, abs=1e-8)
+    assert found["group_wavelength"] == pytest.approx(0.19981104, abs=1e-8)
+
+
+def test_perfectly_dry_air_has_no_dew_point():
+    dry = [*WEATHER, "--humidity-percent", "0"]
+    assert json.loads(CliRunner().invoke(app, ["air", *dry, "--json"]).stdout)["dew_point_c"] is None
+    assert "dew point none" in CliRunner().invoke(app, ["air", *dry]).stdout
+
+
+def test_the_version_is_said():
+    assert CliRunner().invoke(app, ["--version"]).stdout == f"catseye {__version__}\n"
+
+
+def test_help_names_every_air_model():
+    assert commands.MODELS.split("|") == list(MODELS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_has_an_example_that_parses(command, tmp_path, monkeypatch):
+    text = CliRunner().invoke(app, [command, "--help"]).stdout
+    example = shlex.split(re.search(r"Example: catseye (.+)", text)[1])
+    assert example[0] == command
+    parser = typer.main.get_command(app).commands[command]
+    with parser.make_context(command, example[1:]) as context:
+        assert context.params
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["air", *WEATHER]])
+def test_quick_answers_spare_the_heavy_imports(arguments):
+    code = (
+        "import atexit, sys\n"
+        "heavy = {'scipy', 'matplotlib', 'catseye.records'}\n"
+        "atexit.register(lambda: print(sorted(heavy & set(sys.modules)), file=sys.stderr))\n"
+        "from catseye.cli.main import run; run()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
+    assert done.stderr.strip() == "[]"

@@ -1,0 +1,153 @@
+"""Ctrl-C and termination at any moment: the right status, soon, no traceback, nothing left behind."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from catseye.gateways.output import FORMAT
+
+NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+RUN = "from catseye.cli.main import run; run()"
+STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+SOON = 5.0  # s, the contract's
+TERM_BIT = 1 << (signal.SIGTERM - 1)  # Python leaves SIGTERM alone, so that catching it shows that we are in charge
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc to know what is caught")
+
+
+def start(out, *, stderr=subprocess.PIPE, mplconfig=None):
+    place = {**os.environ, **({"MPLCONFIGDIR": str(mplconfig)} if mplconfig else {})}
+    return subprocess.Popen(
+        [sys.executable, "-c", RUN, "reduce", str(NIGHT), "--out", str(out)],
+        stdout=subprocess.DEVNULL,
+        stderr=stderr,
+        env=place,
+    )
+
+
+def wait_until_in_charge(process):
+    """Until the program has taken the signals over, its first act."""
+    status = Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        caught = next(line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) & TERM_BIT:
+            return
+        os.sched_yield()
+
+
+def interrupt(process, number):
+    """The status, and what the program still said."""
+    process.send_signal(number)
+    since = time.monotonic()
+    _, said = process.communicate(timeout=4 * SOON)
+    assert time.monotonic() - since < SOON
+    return process.returncode, said
+
+
+def assert_clean(out, status, number):
+    names = [path.name for path in out.parent.iterdir()]
+    assert (status, names) in [(STATUS[number], []), (0, ["out"])]
+
+
+@pytest.mark.parametrize(
+    ("moment", "number"),
+    [
+        *((moment, signal.SIGINT) for moment in (0.0, 0.03, 0.1, 0.4, 2.0)),
+        (0.0, signal.SIGTERM),
+        (0.5, signal.SIGTERM),
+    ],
+)
+def test_at_some_moment_after_the_start(tmp_path, moment, number):
+    out = tmp_path / "out"
+    process = start(out)
+    wait_until_in_charge(process)
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(timeout=moment)
+    status, said = interrupt(process, number)
+    assert said == b""
+    assert_clean(out, status, number)
+
+
+@pytest.mark.parametrize("step", ["samples to phases", "adjustment", "writing ranges.csv"])
+def test_at_every_step_of_the_work(tmp_path, step):
+    """The progress line on a terminal tells the step."""
+    out = tmp_path / "out"
+    ours, theirs = pty.openpty()
+    process = start(out, stderr=theirs)
+    os.close(theirs)
+    seen = read_until(ours, step.encode())
+    assert step.encode() in seen
+    status, _ = interrupt(process, signal.SIGINT)
+    said = seen + read_until(ours, b"Traceback")
+    os.close(ours)
+    assert b"Traceback" not in said
+    assert status == 130
+    assert_clean(out, status, signal.SIGINT)
+
+
+def read_until(stream, wanted):
+    seen = b""
+    with suppress(OSError):  # how a terminal says that nobody is at its other end
+        while wanted not in seen and (more := os.read(stream, 4096)):
+            seen += more
+    return seen
+
+
+def test_an_earlier_output_survives(tmp_path):
+    """In a fresh home, where matplotlib writes its font cache under a lock while the report is made."""
+    out, mplconfig = tmp_path / "work" / "out", tmp_path / "mpl"
+    out.mkdir(parents=True)
+    provenance = {"format": FORMAT, "outputs": {"ranges.csv": ""}}
+    (out / "provenance.json").write_text(json.dumps(provenance))
+    (out / "ranges.csv").write_text("shot\n1\n")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    ours, theirs = pty.openpty()
+    process = start(out, stderr=theirs, mplconfig=mplconfig)
+    os.close(theirs)
+    read_until(ours, b"writing report.html")
+    status, _ = interrupt(process, signal.SIGINT)
+    os.close(ours)
+    assert status == 130
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+    assert not list(mplconfig.rglob("*lock*"))
+
+
+def test_steps_that_belong_together_are_not_cut_in_two(tmp_path):
+    """The signal arrives inside; the second step is still done, then what was unfinished is undone."""
+    code = (
+        "import os, signal, sys\n"
+        "from pathlib import Path\n"
+        "from catseye.gateways.interruption import deferred, leave_on_signals, undone_when_interrupted\n"
+        "leave_on_signals()\n"
+        "with undone_when_interrupted(Path(sys.argv[1], 'undone').touch):\n"
+        "    with deferred():\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        Path(sys.argv[1], 'second').touch()\n"
+        "    Path(sys.argv[1], 'third').touch()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False, capture_output=True)
+    assert (done.returncode, done.stderr) == (130, b"")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["second", "undone"]
+
+
+def test_they_cannot_hold_it_up_for_ever():
+    code = (
+        "import os, signal\n"
+        "from catseye.gateways import interruption\n"
+        "interruption.LONGEST_DEFERRAL = 0.05\n"
+        "interruption.leave_on_signals()\n"
+        "with interruption.deferred():\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    while True: pass\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, timeout=SOON)
+    assert (done.returncode, done.stderr) == (143, b"")

@@ -1,0 +1,24 @@
+from pathlib import Path
+
+import pytest
+
+from catseye.gateways.output import whole_directory
+from catseye.gateways.reduction_files import write_reduction
+from catseye.records import read_campaign
+from catseye.reduction.epoch import reduce_epoch
+
+NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+
+
+@pytest.fixture(scope="session")
+def reduction():
+    return reduce_epoch(read_campaign(NIGHT))
+
+
+@pytest.fixture(scope="session")
+def written(reduction, tmp_path_factory):
+    """A directory with everything that a reduction writes."""
+    out = tmp_path_factory.mktemp("written") / "out"
+    with whole_directory(out, NIGHT) as directory:
+        write_reduction(reduction, directory)
+    return out
