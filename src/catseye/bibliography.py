@@ -43,7 +43,7 @@ SOURCES: dict[str, Source] = {
         used="eqs. 3.8-3.10, 3.14, 3.17, B.1, figure 10",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
-            "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: use the nearest integer",
+            "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
             "D.3 gives n_air at 20.5 C, the value belongs to 20.0 C; D.4 prints -0.985e-6, -0.895887e-6 is right",
         ),
     ),

@@ -1,15 +1,15 @@
 """Least squares: Gauss-Newton over groups of (correlated) observations, with the statistics that make it checkable.
 
-Systematic effects are parameters with priors, and a prior is an observation like any other ([FOERSTNER16] 4.4). The
-solver is scale-free: it converges on the size of a step in its own standard deviations, and judges rank on the normal
-matrix scaled to a unit diagonal.
+Systematic effects are parameters with priors, and a prior is an observation like any other ([FOERSTNER16] chapter 4).
+The solver is scale-free: it converges on the size of a step in its own standard deviations, and judges rank on the
+normal matrix scaled to a unit diagonal.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import cho_solve, lapack, solve_triangular
 
 from catseye.errors import EstimationError
 from catseye.estimation.observations import Observations
@@ -18,8 +18,10 @@ CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
 check the starting coordinates"
 RANK_DEFICIENT = "rank deficient: {names} not held by any observation; add one, or give a prior"
+UNDEFINED = "undefined at the present values: {names} has no finite value or derivative there; \
+two points may coincide, or an observation is not a number"
 
-NONCENTRALITY = 4.13  # test at 0.1 % with power 80 %, [BAARDA68] table: smallest shift that is found four times in five
+NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
 STEP_IN_SIGMAS = 1e-4  # a step below this no longer moves any answer
 ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not count as uphill
 WORST_CONDITION = 1e-14  # of the scaled normal matrix: beyond it double precision holds no digit
@@ -57,7 +59,7 @@ class Solution:
     """The answer of an adjustment.
 
     x            (n,) parameters
-    covariance   (n, n); rows and columns of held parameters are zero
+    covariance   (n, n); rows and columns of held parameters are zero, those of free ones nan where there is no answer
     status       "converged", or one line that says what to do
     iterations   Gauss-Newton steps taken
     fits         one a group, in the order given
@@ -81,7 +83,7 @@ class Solution:
         Over all groups the degrees of freedom are observations minus free parameters; over some they are the sum of
         their redundancy numbers.
 
-        Source: [FOERSTNER16] eq. 4.90 and 4.114.
+        Source: [FOERSTNER16] chapter 4, estimated variance factor and redundancy numbers.
         """
         chosen = [f for f in self.fits if names is None or f.name in names]
         degrees = float(sum(np.sum(f.redundancy[f.active]) for f in chosen))
@@ -165,11 +167,11 @@ def adjust(
     extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
     names           (n,) what the parameters are called, for the status
     iterations      cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
-    tests           False leaves the fits at residual and sigma, for steps on the way to an answer
+    tests           False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
 
     Returns a Solution whose status says what happened; raises EstimationError only for a covariance that is none.
 
-    Source: [FOERSTNER16] section 4.2 (estimation), [BAARDA68] (w test, detectable errors; here with correlations).
+    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model), [BAARDA68] (w test, detectable errors; here correlated).
     """
     x = np.array(x0, dtype=float)
     moving = np.arange(len(x)) if free is None else np.flatnonzero(free)
@@ -179,15 +181,21 @@ def adjust(
     while taken < iterations:
         taken += 1
         normal, right, cost = _normal_equations(blocks, x)
-        inverse, floating = _invert(normal[np.ix_(moving, moving)])
-        if floating is not None:
+        if not (np.isfinite(cost) and np.isfinite(normal).all()):
+            covariance[np.ix_(moving, moving)] = np.nan
+            status = UNDEFINED.format(names=", ".join(_undefined(blocks, x)))
+            break
+        factor, scale, floating = _factorise(normal[np.ix_(moving, moving)])
+        if floating:
             called = [names[int(moving[i])] if names is not None else f"parameter {moving[i]}" for i in floating]
+            covariance[np.ix_(moving, moving)] = np.nan  # zero would claim to know what nothing holds
             status = RANK_DEFICIENT.format(names=", ".join(called[:4]) + (" ..." if len(called) > 4 else ""))
             break
-        covariance[np.ix_(moving, moving)] = inverse
         step = np.zeros(len(x))
-        step[moving] = inverse @ right[moving]
+        step[moving] = scale * cho_solve((factor, True), scale * right[moving], check_finite=False)
         size = max(float(right @ step), 0.0) ** 0.5
+        if tests and (size < STEP_IN_SIGMAS or taken == iterations):
+            covariance[np.ix_(moving, moving)] = _inverse(factor, scale)
         if size < STEP_IN_SIGMAS:
             status = CONVERGED
             break
@@ -198,24 +206,40 @@ def adjust(
     return Solution(x, covariance, status, taken, tuple(_fit(block, x, covariance, tests) for block in blocks))
 
 
-def _invert(normal: np.ndarray) -> tuple[np.ndarray, Sequence[int] | None]:
-    """The inverse of a normal matrix, and None; or the indices of the parameters that float, the worst first.
+def _undefined(blocks: Sequence[_Block], x: np.ndarray) -> list[str]:
+    """Names of the groups that have no finite value or derivative, each once."""
+    bad = [b.group.name for b in blocks for v in b.group.predict(x) if not np.isfinite(v[b.rows]).all()]
+    bad += [b.group.name for b in blocks if not np.isfinite(b.group.observed[b.rows]).all()]
+    return list(dict.fromkeys(bad)) or ["the sum of squares"]
 
-    Judged on the matrix scaled to a unit diagonal, so that metres, radians, volts and degrees weigh alike.
+
+def _factorise(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Cholesky factor of a normal matrix scaled to a unit diagonal, the scale, and which parameters float, worst first.
+
+    Scaled, so that metres, radians, volts and degrees weigh alike; with something floating the factor is of no use.
     """
     diagonal = np.diag(normal)
     if np.any(diagonal <= 0.0):
-        return normal, np.flatnonzero(diagonal <= 0.0).tolist()
+        return normal, diagonal, np.flatnonzero(diagonal <= 0.0).tolist()
     scale = 1.0 / np.sqrt(diagonal)
     scaled = normal * scale[:, None] * scale
+    if not len(scale):  # everything held: only the tests are wanted
+        return scaled, scale, []
     factor, failed = lapack.dpotrf(scaled, lower=1)
     condition = 0.0 if failed else lapack.dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
     if condition < WORST_CONDITION:
         values, vectors = np.linalg.eigh(scaled)
         part = np.sum(vectors[:, values < max(len(scaled) * 1e-13, values[0] * 10)] ** 2, axis=1)
-        return normal, [int(i) for i in np.argsort(-part) if part[i] > 1e-3]
+        return scaled, scale, [int(i) for i in np.argsort(-part) if part[i] > 1e-3 * part.max()]
+    return factor, scale, []
+
+
+def _inverse(factor: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """The inverse of the normal matrix from its factor."""
+    if not len(scale):
+        return factor
     inverse = np.tril(lapack.dpotri(factor, lower=1)[0])
-    return (inverse + np.tril(inverse, -1).T) * scale[:, None] * scale, None
+    return (inverse + np.tril(inverse, -1).T) * scale[:, None] * scale
 
 
 def _fit(block: _Block, x: np.ndarray, covariance: np.ndarray, tests: bool) -> Fit:
@@ -254,7 +278,8 @@ def _fit(block: _Block, x: np.ndarray, covariance: np.ndarray, tests: bool) -> F
         weight = weight.T @ weight
         weighted, pv, own = weight @ seen, weight @ residual[rows], np.diag(weight)
     else:
-        weighted, pv, own = seen / variance[rows, None], residual[rows] / variance[rows], 1.0 / variance[rows]
+        own = 1.0 / block.factor**2
+        weighted, pv = seen * own[:, None], residual[rows] * own
     spread = weighted @ q
     visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
     redundancy[rows] = 1.0 - np.sum(spread * seen, axis=1)

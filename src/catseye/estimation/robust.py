@@ -1,23 +1,21 @@
 """Which observations are wrong: a robust start, the smallest conflict of each point, then removal by test."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
 
-from catseye.estimation.adjustment import CONVERGED, Solution, adjust
+from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
 from catseye.estimation.observations import Observations
 
 UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
-MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
-LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
+UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"
 DECISIVE = 9.0  # difference of sums of squares between two explanations, below which neither is believed
 GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
-UNCHECKED = 0.05  # redundancy below which nothing else speaks for or against an observation
+UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
 MOST_RETURNS = 2  # of one observation; so the rounds end
-SLACK = 2.0  # on sigma in the search, because everything but the point itself is held there
 
 
 def adjust_robustly(
@@ -50,9 +48,12 @@ def adjust_robustly(
     innocent ones; so every point in conflict is searched for the smallest set whose absence makes the rest agree.
     At last Baarda's test with correlations, over everything: out with the worst, back in with those that pass.
 
-    Source: [BAARDA68]; [FOERSTNER16] section 4.7; the search is the minimal-conflict form of data snooping.
+    Source: [BAARDA68] (data snooping); [FOERSTNER16] chapter 4 (robust estimation and outlier detection); [HUBER09]
+    (reweighting). The search for the smallest conflict is ours.
     """
+    careful = None  # what to try instead, should a selection leave too little to hold every parameter
     if active is None:
+        careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
         solution, active = _robust_start(x0, groups, removable, points, free, names)
         x = solution.x
     else:
@@ -60,24 +61,40 @@ def adjust_robustly(
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
     for _ in range(rounds):
         solution = adjust(x, groups, free=free, active=active, names=names)
-        if solution.status != CONVERGED:
-            return solution
+        if not np.isfinite(solution.covariance).all():
+            if careful is None:
+                return solution
+            active, careful = careful, None
+            continue
         x = solution.x
         tests = [
-            np.where(may & (f.redundancy > UNCHECKED), np.abs(f.standardised), 0.0)
+            np.where(may & _checked(f), np.abs(f.standardised), 0.0)
             for f, may in zip(solution.fits, removable, strict=True)
         ]
         worst = max(float(t[a].max(initial=0.0)) for t, a in zip(tests, active, strict=True))
         if worst > critical:
             limit = max(critical, 0.8 * worst)
+            careful = [a.copy() for a in active]
+            group = int(np.argmax([float(t[a].max(initial=0.0)) for t, a in zip(tests, active, strict=True)]))
+            careful[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
             active = [a & (t < limit) for t, a in zip(tests, active, strict=True)]
             continue
         back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
         if not any(b.any() for b in back):
             return _without_undecided(solution, groups, removable, points, free, names)
+        careful = None
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
     return replace(solution, status=UNDECIDED.format(rounds=rounds))
+
+
+def _checked(fit: Fit) -> np.ndarray:
+    """Which observations the others check: an error of some sigmas would be found; of the inactive, all.
+
+    Without correlations this is redundancy > UNCHECKED. With them a redundancy number may be zero or negative although
+    a neighbour that shares its errors checks the observation well.
+    """
+    return ~fit.active | (fit.detectable_error < NONCENTRALITY / UNCHECKED**0.5 * fit.sigma)
 
 
 def _without_undecided(
@@ -90,12 +107,14 @@ def _without_undecided(
 ) -> Solution:
     """The solution without observations that might be the wrong ones just as well as those rejected.
 
-    Of two that contradict each other alone at a point, the test cannot say which is wrong: both go.
+    Of two that contradict each other alone at a point, the test cannot say which is wrong: both go. Nothing comes back
+    here, because what comes back is not tested again. If the rest does not hold every parameter, the status says so.
     """
     active = [f.active.copy() for f in solution.fits]
     jacobians = [g.predict(solution.x)[1] for g in groups]
-    for columns in points:
-        local = _at_point(columns, groups, jacobians, removable, solution, slack=1.0)
+    rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
+    for columns in touched(points, groups, jacobians, rejected):
+        local = at_point(columns, groups, jacobians, removable, solution, slack=1.0)
         out = tuple(index for index, (i, k) in enumerate(local.rows) if not active[i][k])
         grave = max((abs(solution.fits[i].standardised[k]) for i, k in (local.rows[q] for q in out)), default=0.0)
         if grave < GRAVE or len(out) > MOST_AT_ONE_POINT or len(local.rows) > LARGEST_SEARCH:
@@ -104,10 +123,13 @@ def _without_undecided(
         limit = min(costs.values()) + DECISIVE
         doubtful = {index for other, cost in costs.items() if cost < limit for index in other}
         for index, (i, k) in enumerate(local.rows):
-            active[i][k] = index not in doubtful
+            active[i][k] &= index not in doubtful
     if all(np.array_equal(a, f.active) for a, f in zip(active, solution.fits, strict=True)):
         return solution
-    return adjust(solution.x, groups, free=free, active=active, names=names)
+    final = adjust(solution.x, groups, free=free, active=active, names=names)
+    if not np.isfinite(final.covariance).all():
+        return replace(final, status=UNHELD.format(status=final.status))
+    return final
 
 
 def _robust_start(
@@ -120,6 +142,8 @@ def _robust_start(
 ) -> tuple[Solution, list[np.ndarray]]:
     extra = [np.zeros(len(g.observed)) for g in groups]
     solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
+    if not np.isfinite(solution.covariance).all():
+        return solution, [np.ones(len(g.observed), dtype=bool) for g in groups]
     for _ in range(8):
         for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
             extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
@@ -128,89 +152,10 @@ def _robust_start(
         ~may | (np.abs(fit.residual) < 10.0 * fit.sigma) for fit, may in zip(solution.fits, removable, strict=True)
     ]
     jacobians = [g.predict(solution.x)[1] for g in groups]
-    for columns in points:
-        local = _at_point(columns, groups, jacobians, removable, solution, SLACK)
-        if not 2 <= len(local.rows) <= LARGEST_SEARCH or np.max(np.abs(local.residual)) * SLACK < 3.0:
-            continue
-        wrong = local.smallest_conflict()
+    large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
+    for columns in touched(points, groups, jacobians, large):
+        local, wrong = search(columns, groups, jacobians, removable, solution)
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong
     return solution, active
-
-
-@dataclass(frozen=True, eq=False)
-class LocalConflict:
-    """The observations that meet in one point, everything else held: which of them cannot all be right?
-
-    rows       (group, row) of each observation that may be wrong
-    residual   (k,) over sigma
-    slopes     (k, 3) derivatives by the point's coordinates, over sigma
-    prior      (q,) residuals over sigma of what is known of the point besides, and is not in doubt
-    prior_slopes   (q, 3)
-
-    >>> slopes = np.vstack([np.eye(3), np.ones((1, 3)), [[1.0, -1.0, 0.0]], [[0.0, 1.0, -1.0]]])
-    >>> wrong = slopes @ np.array([5.0, -3.0, 2.0]) + np.array([0, 0, 30.0, 0, 0, 0])
-    >>> LocalConflict([(0, k) for k in range(6)], wrong, slopes, np.zeros(0), np.zeros((0, 3))).smallest_conflict()
-    (2,)
-    """
-
-    rows: list[tuple[int, int]]
-    residual: np.ndarray
-    slopes: np.ndarray
-    prior: np.ndarray
-    prior_slopes: np.ndarray
-
-    def cost(self, out: Sequence[int]) -> float:
-        """Sum of squares at the best place for the point when some observations are left out."""
-        keep = np.ones(len(self.rows), dtype=bool)
-        keep[list(out)] = False
-        v = np.concatenate([self.residual[keep], self.prior])
-        a = np.concatenate([self.slopes[keep], self.prior_slopes])
-        return float(np.sum((v - a @ np.linalg.lstsq(a, v, rcond=None)[0]) ** 2))
-
-    def smallest_conflict(self) -> tuple[int, ...] | None:
-        """The fewest observations whose absence lets the rest agree, or None where two are not enough.
-
-        The rest agrees when its sum of squares stays below the chi-square quantile at 99.9 %; of several sets of one
-        size the one with the best rest is taken.
-        """
-        k = len(self.rows)
-        for size in range(min(MOST_AT_ONE_POINT, k - 1) + 1):
-            degrees = k - size + len(self.prior) - 3
-            if degrees < 1:
-                return None
-            sets = {out: self.cost(out) for out in combinations(range(k), size)}
-            best = min(sets, key=sets.__getitem__)
-            if sets[best] < chi2.ppf(0.999, degrees):
-                return best
-        return None
-
-
-def _at_point(
-    columns: np.ndarray,
-    groups: Sequence[Observations],
-    jacobians: Sequence[np.ndarray],
-    removable: Sequence[np.ndarray],
-    solution: Solution,
-    slack: float,
-) -> LocalConflict:
-    """What meets in a point: removable observations that depend on it, and others that depend on it alone."""
-    rows: list[tuple[int, int]] = []
-    parts: dict[bool, list[tuple[float, np.ndarray]]] = {True: [], False: []}
-    for i, (group, jacobian, may, fit) in enumerate(zip(groups, jacobians, removable, solution.fits, strict=True)):
-        at = np.searchsorted(group.columns, columns)
-        if at.max() >= len(group.columns) or np.any(group.columns[at] != columns):
-            continue
-        touching = np.any(jacobian[:, at] != 0.0, axis=1)
-        alone = touching & (np.count_nonzero(jacobian, axis=1) == np.count_nonzero(jacobian[:, at], axis=1))
-        for k in np.flatnonzero(touching & (may | alone)):
-            sigma = fit.sigma[k] * (slack if may[k] else 1.0)
-            parts[bool(may[k])].append((fit.residual[k] / sigma, jacobian[k, at] / sigma))
-            if may[k]:
-                rows.append((i, int(k)))
-    (residual, slopes), (prior, prior_slopes) = (
-        (np.array([v for v, _ in parts[may]]), np.array([a for _, a in parts[may]]).reshape(-1, 3))
-        for may in (True, False)
-    )
-    return LocalConflict(rows, residual, slopes, prior, prior_slopes)

@@ -45,7 +45,7 @@ class Distances:
         return self._layout[0]
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, k) at the parameters x.
+        """Values (m,) and Jacobian (m, k) at the parameters x; nan where two points coincide.
 
         >>> one = np.ones(1)
         >>> d = Distances("d", one, np.eye(1), np.array([0]), np.array([3]), one, 0 * one,
@@ -58,7 +58,8 @@ class Distances:
         xyz = np.arange(3)
         along = x[self.target[:, None] + xyz] - x[self.origin[:, None] + xyz]
         distance = np.linalg.norm(along, axis=1)
-        slope = self.scale[:, None] * along / distance[:, None]
+        with np.errstate(invalid="ignore"):  # points that coincide have no direction: nan, which the solver reports
+            slope = self.scale[:, None] * along / distance[:, None]
         values = self.scale * distance + self.offset + np.sum(self.coefficient * x[self.nuisance], axis=1)
         jacobian = np.zeros((m, len(columns)))
         row = np.arange(m)[:, None]
