@@ -127,4 +127,9 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1002/9780470434697",
         used="iterated reweighting by the size of the residual",
     ),
+    "JCGM100": Source(
+        title="JCGM, Evaluation of measurement data: guide to the expression of uncertainty in measurement, 2008",
+        locator="JCGM 100:2008",
+        used="eq. 10: combined standard uncertainty of uncorrelated inputs",
+    ),
 }

@@ -1,10 +1,10 @@
 """What can go wrong, as a tree. Each error's text is one line: what, where, the value, the limit, what to do.
 
-    CatseyeError
-    ├── InputError        a file, table or record that cannot be used
-    ├── ValidityError     a value outside the range where a formula holds
-    ├── FrameError        transforms or points whose frames do not join
-    └── EstimationError   an adjustment that gave no answer, raised only when the answer is required
+CatseyeError
+├── InputError        a file, table or record that cannot be used
+├── ValidityError     a value outside the range where a formula holds
+├── FrameError        transforms or points whose frames do not join
+└── EstimationError   an adjustment that gave no answer, raised only when the answer is required
 """
 
 

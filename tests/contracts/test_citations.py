@@ -6,8 +6,8 @@ from pathlib import Path
 from catseye.bibliography import SOURCES
 
 SOURCE_TREE = Path(__file__).parents[2] / "src" / "catseye"
-KEY = re.compile(r"\[([A-Z]{3,}\d{2})\]")
-BARE = re.compile(r"\b([A-Z]{3,}\d{2})\b")
+KEY = re.compile(r"\[([A-Z]{3,}\d{2,3})\]")
+BARE = re.compile(r"\b([A-Z]{3,}\d{2,3})\b")
 
 
 def cited() -> dict[str, set[str]]:

@@ -67,7 +67,6 @@ def air_object(air: "Air", wavelength_um: float, u: tuple[float, float, float]) 
 
     u   standard uncertainties of temperature (°C), pressure (hPa) and relative humidity (%); zeros leave the formula's
     """
-    parts = [float(slope) * each for slope, each in zip(air.sensitivity, u, strict=True)]
     return {
         "model": air.model,
         "wavelength_um": wavelength_um,
@@ -77,7 +76,7 @@ def air_object(air: "Air", wavelength_um: float, u: tuple[float, float, float]) 
         "dew_point_c": air.dew_point_c,
         "group_wavelength": air.group_wavelength,
         "sensitivity": air.sensitivity._asdict(),
-        "standard_uncertainty": math.hypot(air.standard_uncertainty, *parts),
+        "standard_uncertainty": air.combined_uncertainty(*u),
     }
 
 
