@@ -111,13 +111,20 @@ def _without_undecided(
     here, because what comes back is not tested again. If the rest does not hold every parameter, the status says so.
     """
     active = [f.active.copy() for f in solution.fits]
+    checked = [_checked(f) for f in solution.fits]
     jacobians = [g.predict(solution.x)[1] for g in groups]
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     for columns in touched(points, groups, jacobians, rejected):
         local = at_point(columns, groups, jacobians, removable, solution, slack=1.0)
         out = tuple(index for index, (i, k) in enumerate(local.rows) if not active[i][k])
         grave = max((abs(solution.fits[i].standardised[k]) for i, k in (local.rows[q] for q in out)), default=0.0)
-        if grave < GRAVE or len(out) > MOST_AT_ONE_POINT or len(local.rows) > LARGEST_SEARCH:
+        if grave < GRAVE:
+            continue
+        if (
+            len(out) > MOST_AT_ONE_POINT or len(local.rows) > LARGEST_SEARCH
+        ):  # too many to search: trust what is checked
+            for i, k in local.rows:
+                active[i][k] &= checked[i][k]
             continue
         costs = {other: local.cost(other) for other in combinations(range(len(local.rows)), len(out))}
         limit = min(costs.values()) + DECISIVE

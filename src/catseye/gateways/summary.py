@@ -13,8 +13,11 @@ from catseye.reduction.epoch import Reduction
 MEANING = {
     "blocked": "nothing came back",
     "reflected": "light from elsewhere in the return",
+    "undecided": "shots that contradict each other, and nothing says which is wrong",
     "clipped": "the converter was overdriven",
-    "reference": "something else in the beam of the internal cube",
+    "dead": "converter or cable",
+    "noise unknown": "too few samples to tell their noise",
+    "bad reference": "something else in the beam of the internal cube",
     "no reference": "the drift of the electronics is unknown",
 }
 

@@ -130,8 +130,10 @@ class AirField:
 def _local_line(when: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Values (n, c) at times `when`, smoothed at times t (m,): weighted straight lines, a constant where one sample is.
 
-    The half-width grows where samples are far, so that the nearest always counts.
+    The half-width grows where samples are far, so that the nearest always counts. Before the first sample and after
+    the last the value is the one there: no jump at the ends, and no trend carried on.
     """
+    t = np.clip(t, when.min(), when.max())
     gap = np.min(np.abs(t[:, None] - when), axis=1)
     width = np.maximum(SMOOTHING, gap)
     distance = when - t[:, None]
@@ -139,6 +141,6 @@ def _local_line(when: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarr
     s0, s1, s2 = weight.sum(axis=1), (weight * distance).sum(axis=1), (weight * distance**2).sum(axis=1)
     spread = s2 * s0 - s1**2
     line = (weight * (s2[:, None] - s1[:, None] * distance)) / np.where(spread > 0.0, spread, 1.0)[:, None]
-    outside = (t < when.min()) | (t > when.max()) | (spread <= 1e-9 * (s0 * width) ** 2)
-    smooth = np.where(outside[:, None], weight / s0[:, None], line)
+    lonely = spread <= 1e-9 * (s0 * width) ** 2
+    smooth = np.where(lonely[:, None], weight / s0[:, None], line)
     return smooth @ values

@@ -6,19 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.errors import InputError
+from catseye.errors import EstimationError, InputError
 from catseye.estimation.adjustment import Fit, Solution
 from catseye.estimation.observations import Observations
-from catseye.estimation.robust import adjust_robustly
+from catseye.estimation.robust import UNCHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
-from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, THERMOMETERS, Network, build_network
+from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
 from catseye.reduction.settings import Settings
 from catseye.reduction.shots import ShotParts, shot_group
 
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
-SETTLED = 1e-6  # m, no coordinate moves further in the last pass
+SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
+SETTLED_U = 0.01  # or than this share of its standard uncertainty
 STEEP = 0.03  # °C/m between the stations, beyond which the thermometers are doubted
 
 
@@ -108,7 +109,7 @@ class Coordinates:
 
     def block(self, names: Sequence[str]) -> np.ndarray:
         """Covariance (3k, 3k) of some points, in the order given."""
-        columns = (3 * np.array([self.index(n) for n in names])[:, None] + np.arange(3)).ravel()
+        columns = (3 * np.array([self.index(n) for n in names], dtype=int)[:, None] + np.arange(3)).ravel()
         return self.covariance[np.ix_(columns, columns)]
 
 
@@ -134,13 +135,16 @@ def adjust_coordinates(
     x = np.array(layout.start)
     free = np.array(layout.free)
     points = [layout.columns(name) for name in network.places if name in layout.at]
+    coordinates = np.concatenate(points)
     active, solution = None, None
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", turn, PASSES)
         shots = [shot_group(network, name, x) for name in network.rangers]
         groups: list[Observations] = [group for group, _ in shots] + network.priors
-        removable = [np.full(len(g.observed), i < len(shots) or g.name == THERMOMETERS) for i, g in enumerate(groups)]
+        removable = [
+            np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
+        ]
         before = x
         solution = adjust_robustly(
             x,
@@ -153,17 +157,19 @@ def adjust_coordinates(
             critical=settings.critical,
         )
         x, active = solution.x, [f.active for f in solution.fits]
-        if turn and np.max(np.abs((x - before)[_coordinate_columns(network)])) < SETTLED:
+        moved = np.abs(x - before)[coordinates]
+        u = np.sqrt(np.diag(solution.covariance)[coordinates])
+        if turn and np.all(moved < np.maximum(SETTLED, SETTLED_U * u)):
             break
+    else:
+        raise EstimationError(
+            f"not settled: cycles, air and incidence still move {layout.names[coordinates[np.argmax(moved)]]} by "
+            f"{moved.max() / MILLIMETRE:.3f} mm after {PASSES} passes; check its typed position"
+        )
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
     return _coordinates(network, solution.require_converged(), [parts for _, parts in shots])
-
-
-def _coordinate_columns(network: Network) -> np.ndarray:
-    names = [n for n in network.places if n in network.layout.at]
-    return np.concatenate([network.layout.columns(n) for n in names])
 
 
 def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -> Coordinates:
@@ -200,7 +206,7 @@ def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -
         degrees_of_freedom=degrees,
         status=solution.status,
         fits=solution.fits,
-        notes=tuple(_notes(network, solution, air)),
+        notes=(*_notes(network, solution, air, count), *_unchecked(ranges)),
     )
 
 
@@ -244,8 +250,25 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
     )
 
 
-def _notes(network: Network, solution: Solution, air: dict[str, tuple[float, float]]) -> list[str]:
-    """What the adjustment noticed about the records, one line each."""
+def _unchecked(ranges: RangeShots) -> list[str]:
+    """Targets that lost shots and hang on one that no other checks: such a one may be the wrong one."""
+    notes = []
+    target = np.array(ranges.target)
+    for name in sorted(set(ranges.target)):
+        mine = target == name
+        lost, alone = mine & ~ranges.used, mine & ranges.used & (ranges.redundancy < UNCHECKED)
+        if lost.any() and alone.any():
+            notes.append(
+                f"{name}: {lost.sum()} of its {mine.sum()} shots contradict the rest and nothing checks {alone.sum()} "
+                "of those left: it may be further off than its uncertainty says; range it again"
+            )
+    return notes
+
+
+def _notes(
+    network: Network, solution: Solution, air: dict[str, tuple[float, float]], count: dict[str, int]
+) -> list[str]:
+    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
     notes = []
     for fit in solution.fits:
         if fit.name == THERMOMETERS:
@@ -253,13 +276,20 @@ def _notes(network: Network, solution: Solution, air: dict[str, tuple[float, flo
                 value, u = air[name]
                 if not active:
                     notes.append(f"{name}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+        if fit.name == ZEROS:
+            for name, active, off, u in zip(network.rangers, fit.active, fit.residual, fit.sigma, strict=True):
+                if not active:
+                    notes.append(
+                        f"{name}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
+                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(name).zp}"
+                    )
     steepest = network.field.steepest(np.array([air[n][0] for n in network.field.names[:-1]]))
     if abs(steepest) > STEEP:
         notes.append(
             f"the stations' thermometers differ by {steepest:+.3f} °C a metre of height: a strong inversion, "
             "or one lies where no benchmark path passes"
         )
-    typed = [n for n, p in sorted(network.places.items()) if p.typed]
+    typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
     unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
     usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom

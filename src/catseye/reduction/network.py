@@ -20,6 +20,7 @@ FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's s
 AIR = "the air"  # no point can have this name: it has a blank
 APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
+ZEROS = "ranger zeros"
 
 
 @dataclass
@@ -173,7 +174,7 @@ def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
     quadratures = [c for n in rangers for c in layout.columns(f"leakage {n}", 2)]
     u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
     return [
-        _independent("ranger zeros", zeros, np.zeros(len(zeros)), u_zero),
+        _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
         _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
     ]
 

@@ -76,7 +76,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
     """Phase and amplitude of every shot, leakage removed, with the reason where a shot shows no light.
 
     A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
-    leakage included; clipped when a sample stands at the converter's end.
+    leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
+    changed, for a return; clipped when a sample stands at the converter's end.
     """
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
@@ -113,9 +114,19 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
         limit = settings.smallest_return * u_dark[k]
         if clipped[k]:
             reason.append(f"clipped: {clipped[k]} samples at the converter's end ({largest[k]:.2f} V)")
-        elif not amplitude[k] >= limit:
+        elif not np.isfinite(limit):
+            reason.append(
+                f"noise unknown: {shots.cycles[k]} cycles of {shots.samples_per_cycle[k]} samples show no scatter "
+                "(expected at least 2 cycles, or 8 samples)"
+            )
+        elif amplitude[k] < limit:
             reason.append(
                 f"blocked: return {amplitude[k]:.4f} V, below the limit of {limit:.4f} V (usual {usual[k]:.2f} V)"
+            )
+        elif abs(raw[k]) < limit:
+            reason.append(
+                f"dead: the samples hold {abs(raw[k]):.4f} V, not even the leakage of "
+                f"{mirrors[k].leakage_amplitude_volt:.4f} V: converter or cable"
             )
         else:
             reason.append("")
@@ -180,20 +191,34 @@ def _wrong_references(
     for k in references:
         if len(references) > 2 and abs(phases.amplitude[k] / usual - 1.0) > REFERENCE_AMPLITUDE:
             wrong[int(k)] = (
-                f"reference: return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: "
+                f"bad reference: return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: "
                 "something else is in the beam"
             )
     while True:
         left = np.array([k for k in references if k not in wrong], dtype=int)
         if len(left) < 3:
             return wrong
-        phase = np.unwrap(np.angle(phases.phasor[left]))
-        difference, u = reference_surprise(seconds[left], phase, variance[left], random_walk=walk)
-        allowed = SURPRISE * u + np.where((np.arange(len(left)) % (len(left) - 1)) == 0, WARM_UP, BEND)
-        worst = int(np.argmax(np.abs(difference) / allowed))
-        if abs(difference[worst]) <= allowed[worst]:
+        difference, allowed = _surprises(seconds, phases, variance, left, walk)
+        suspects = np.flatnonzero(np.abs(difference) > allowed)
+        if not len(suspects):
             return wrong
+        # A wrong reference makes its neighbours look wrong too: it is the one without which the others agree best.
+        rest = []
+        for suspect in suspects:
+            d, a = _surprises(seconds, phases, variance, np.delete(left, suspect), walk)
+            rest.append(float(np.max(np.abs(d) / a)))
+        worst = int(suspects[int(np.argmin(rest))])
         wrong[int(left[worst])] = (
-            f"reference: phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
+            f"bad reference: phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
             f"(allowed {allowed[worst]:.4f})"
         )
+
+
+def _surprises(
+    seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """How far each of two or more references (in order of time) is off what the others predict, and may be; rad."""
+    phase = np.unwrap(np.angle(phases.phasor[references]))
+    difference, u = reference_surprise(seconds[references], phase, variance[references], random_walk=walk)
+    at_an_end = np.isin(np.arange(len(references)), (0, len(references) - 1))
+    return difference, SURPRISE * u + np.where(at_an_end, WARM_UP, BEND)

@@ -1,0 +1,62 @@
+"""End to end on written campaigns: simulate, write, read, reduce."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from catseye.records.campaign import read_campaign
+from catseye.reduction.epoch import reduce_epoch
+from catseye.simulator import Faults, simulate_night
+
+SEED = 4711
+CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, wrong_position_mm=0.0)
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory):
+    """Function night -> campaign, by way of its files."""
+    root, count = tmp_path_factory.mktemp("stories"), itertools.count()
+    return lambda night: read_campaign(night.write(root / f"night-{next(count)}"))
+
+
+@pytest.fixture(scope="session")
+def night():
+    """A night with all the usual faults."""
+    return simulate_night(SEED)
+
+
+@pytest.fixture(scope="session")
+def campaign(written, night):
+    return written(night)
+
+
+@pytest.fixture(scope="session")
+def whole(campaign):
+    """Its reduction."""
+    return reduce_epoch(campaign)
+
+
+@pytest.fixture(scope="session")
+def clear_night():
+    """The same site in a night in which nothing was in the way."""
+    return simulate_night(SEED, faults=CLEAR)
+
+
+@pytest.fixture(scope="session")
+def clear(written, clear_night):
+    """Its campaign and reduction."""
+    found = written(clear_night)
+    return found, reduce_epoch(found)
+
+
+@pytest.fixture(scope="session")
+def errors():
+    """Function (coordinates, truth, names) -> found minus true, (k, 3) m."""
+    return lambda c, truth, names: np.array([c.x[c.index(n)] - truth.points[n] for n in names])
+
+
+@pytest.fixture(scope="session")
+def u():
+    """Function (coordinates, name) -> (3,) standard uncertainties, m."""
+    return lambda c, name: np.sqrt(np.diag(c.block([name])))
