@@ -182,7 +182,12 @@ def test_the_variance_factor_of_each_of_many_nights_is_near_one(many):
     assert factors.mean() == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_point_that_hangs_on_an_unchecked_foreign_return_is_named(tmp_path):
-    """Found among 124 nights: three good shots lose against one foreign one, and the covariance does not know it."""
-    reduction = reduce_epoch(read_campaign(any_night(2307).write(tmp_path / "night")))
-    assert any(n.startswith("DP043: ") and "nothing checks" in n for n in reduction.notes)
+def test_a_point_where_good_shots_lose_against_a_foreign_one_claims_little(tmp_path):
+    """Found among 124 nights: three of five go, the two that stay check each other no more; so they go too."""
+    night = any_night(2307)
+    coordinates = reduce_epoch(read_campaign(night.write(tmp_path / "night"))).coordinates
+    row = coordinates.index("DP043")
+    error = coordinates.x[row] - night.truth.points["DP043"]
+    u = np.sqrt(np.diag(coordinates.block(["DP043"])))
+    assert np.all(np.abs(error) < 4.0 * u)
+    assert u.max() > 1e-3

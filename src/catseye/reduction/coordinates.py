@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.adjustment import Fit, Solution
+from catseye.estimation.adjustment import Fit, Solution, adjust
 from catseye.estimation.observations import Observations
 from catseye.estimation.robust import UNCHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
@@ -18,6 +18,7 @@ from catseye.reduction.settings import Settings
 from catseye.reduction.shots import ShotParts, shot_group
 
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
+TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
 SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
 SETTLED_U = 0.01  # or than this share of its standard uncertainty
 STEEP = 0.03  # °C/m between the stations, beyond which the thermometers are doubted
@@ -123,7 +124,7 @@ def adjust_coordinates(
     """Coordinates of everything that was ranged to or from, with full covariance.
 
     Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
-    until they no longer change. Wrong shots are found in the first pass and tested again in each.
+    until they no longer change. Wrong shots are searched for in the first pass and tested again in the second.
 
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
@@ -146,16 +147,19 @@ def adjust_coordinates(
             np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
         ]
         before = x
-        solution = adjust_robustly(
-            x,
-            groups,
-            removable,
-            points=points,
-            free=free,
-            active=active,
-            names=layout.names,
-            critical=settings.critical,
-        )
+        if turn < TESTED:
+            solution = adjust_robustly(
+                x,
+                groups,
+                removable,
+                points=points,
+                free=free,
+                active=active,
+                names=layout.names,
+                critical=settings.critical,
+            )
+        else:
+            solution = adjust(x, groups, free=free, active=active, names=layout.names)
         x, active = solution.x, [f.active for f in solution.fits]
         moved = np.abs(x - before)[coordinates]
         u = np.sqrt(np.diag(solution.covariance)[coordinates])
