@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.campaign import Campaign
 from catseye.reduction.settings import Settings
 
 SMOOTHING = 300.0  # s, Gaussian half-width in time: noise of a reading every 30 s falls to a sixth
-PRESSURE_LAPSE = 0.11  # hPa/m, [PARKER04] section 1.4.2
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # along the path; a smooth profile needs three
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,25 +85,29 @@ class AirField:
         by 0.11 hPa a metre ([PARKER04] section 1.4.2), relative humidity independent of height.
         """
         state = self.smoothed(mjd_utc)
-        z = a[:, 2:] + (b[:, 2:] - a[:, 2:]) * (0.5 + 0.5 * NODES)
-        share, extra = self._shares(z)
-        offsets, last = parameters[:-1], parameters[-1]
-        temperature = np.einsum("mks,ms->mk", share, state[:, :, 0] - offsets) + extra * last
         middle = self.heights.mean()
-        pressure = state[:, :, 1].mean(axis=1)[:, None] - PRESSURE_LAPSE * (z - middle)
-        humidity = np.broadcast_to(state[:, :, 2].mean(axis=1)[:, None], z.shape)
-        weights = 0.5 * WEIGHTS
+        temperatures = state[:, :, 0] - parameters[:-1]
+        pressure, humidity = state[:, None, :, 1].mean(axis=2), state[:, None, :, 2].mean(axis=2)
 
-        def index(t: np.ndarray) -> np.ndarray:
-            return group_refractivity(t, pressure, humidity, wavelength_um=self.wavelength_um, model=self.model)
+        def profile(z: np.ndarray) -> np.ndarray:
+            """Refractivity at heights (m, k), and its derivatives by each parameter: (1 + q, m, k)."""
+            share, last = self._shares(z)
+            temperature = np.einsum("mks,ms->mk", share, temperatures) + parameters[-1] * last
+            index, above, below = (
+                group_refractivity(
+                    temperature + step,
+                    pressure_at(pressure, middle, z),
+                    humidity,
+                    wavelength_um=self.wavelength_um,
+                    model=self.model,
+                )
+                for step in (0.0, 0.5, -0.5)
+            )
+            per_c = above - below
+            return np.concatenate([index[None], -per_c * np.moveaxis(share, -1, 0), (per_c * last)[None]])
 
-        slope = index(temperature + 0.5) - index(temperature - 0.5)
-        return PathAir(
-            index(temperature) @ weights,
-            np.concatenate(
-                [-np.einsum("mk,mks,k->ms", slope, share, weights), (slope * extra) @ weights[:, None]], axis=1
-            ),
-        )
+        mean = mean_over_height(profile, a[:, 2], b[:, 2])
+        return PathAir(mean[0], mean[1:].T)
 
     def steepest(self, offsets: np.ndarray) -> float:
         """Mean temperature gradient from lowest to highest station, °C/m, offsets removed; 0 at one height."""
