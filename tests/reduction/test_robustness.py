@@ -264,3 +264,12 @@ def test_half_the_night_at_the_converters_end_is_not_used(night_01):
     reduction = reduce_epoch(dataclasses.replace(night_01, frames=frames))
     honest(reduction)
     assert {reduction.status[k] for k in range(100, 400)} == {"clipped"}
+
+
+def test_a_monument_60_mm_wrong_is_named_as_the_ranger_that_lost_its_shots(night_01, reduced_night_01):
+    wrong = night_01.monuments["ZY105"].model_copy(update={"x_mm": night_01.monuments["ZY105"].x_mm + 60.0})
+    campaign = dataclasses.replace(night_01, monuments={**night_01.monuments, "ZY105": wrong})
+    reduction = reduce_epoch(campaign)
+    assert any(note.startswith("ZY105: 8 of its 8 shots do not fit") for note in reduction.notes)
+    names = [n for n in reduction.coordinates.points if not n.startswith("ZY105")]
+    agrees(honest(reduction), reduced_night_01.coordinates, [n for n in names if n.startswith(("TR", "DP0"))])

@@ -22,7 +22,7 @@ UNDEFINED = "undefined at the present values: {names} has no finite value or der
 two points may coincide, or an observation is not a number"
 
 NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
-STEP_IN_SIGMAS = 1e-4  # a step below this no longer moves any answer
+STEP_IN_SIGMAS = 1e-3  # of all parameters together: a step below this no longer moves any answer
 ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not count as uphill
 WORST_CONDITION = 1e-14  # of the scaled normal matrix: beyond it double precision holds no digit
 
@@ -155,7 +155,7 @@ def adjust(
     active: Sequence[np.ndarray] | None = None,
     extra_variance: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
-    iterations: int = 20,
+    iterations: int = 50,
     tests: bool = True,
 ) -> Solution:
     """The parameters that fit groups of observations best, with full covariance and a fit per observation.

@@ -160,7 +160,7 @@ def adjust_coordinates(
             )
         else:
             solution = adjust(x, groups, free=free, active=active, names=layout.names)
-        x, active = solution.x, [f.active for f in solution.fits]
+        x, active = solution.require_converged().x, [f.active for f in solution.fits]
         moved = np.abs(x - before)[coordinates]
         u = np.sqrt(np.diag(solution.covariance)[coordinates])
         if turn and np.all(moved < np.maximum(SETTLED, SETTLED_U * u)):
@@ -173,7 +173,7 @@ def adjust_coordinates(
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
-    return _coordinates(network, solution.require_converged(), [parts for _, parts in shots])
+    return _coordinates(network, solution, [parts for _, parts in shots])
 
 
 def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -> Coordinates:
@@ -210,7 +210,7 @@ def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -
         degrees_of_freedom=degrees,
         status=solution.status,
         fits=solution.fits,
-        notes=(*_notes(network, solution, air, count), *_unchecked(ranges)),
+        notes=(*_notes(network, solution, air, count), *_losses(ranges)),
     )
 
 
@@ -254,8 +254,8 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
     )
 
 
-def _unchecked(ranges: RangeShots) -> list[str]:
-    """Targets that lost shots and hang on one that no other checks: such a one may be the wrong one."""
+def _losses(ranges: RangeShots) -> list[str]:
+    """Targets that lost shots and hang on one that no other checks; rangers that lost most of theirs."""
     notes = []
     target = np.array(ranges.target)
     for name in sorted(set(ranges.target)):
@@ -265,6 +265,14 @@ def _unchecked(ranges: RangeShots) -> list[str]:
             notes.append(
                 f"{name}: {lost.sum()} of its {mine.sum()} shots contradict the rest and nothing checks {alone.sum()} "
                 "of those left: it may be further off than its uncertainty says; range it again"
+            )
+    ranger = np.array(ranges.ranger)
+    for name in sorted(set(ranges.ranger)):
+        mine = ranger == name
+        if mine.sum() > 2 and (mine & ~ranges.used).sum() > mine.sum() / 2:
+            notes.append(
+                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: rather its survey, its "
+                "mirror sheet or its samples than light from elsewhere"
             )
     return notes
 
