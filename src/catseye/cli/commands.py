@@ -83,7 +83,7 @@ def reduce(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Reduce a campaign's samples to coordinates, pose and surface, with tables and a report."""
+    """A campaign's samples to coordinates, pose, surface and report."""
     if out is None and not json:
         raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
     reduction = _reduced(campaign, out, air_model, quiet)
@@ -106,7 +106,7 @@ def demo(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Reduce the bundled night of measurements, and explain what comes out."""
+    """The bundled night of measurements, reduced and explained."""
     from catseye.gateways.example import example_campaign
 
     reduction = _reduced(example_campaign(), directory, Settings.air_model, quiet)
@@ -140,7 +140,7 @@ def air(
     ] = 0.0,
     json: Json = False,
 ) -> None:
-    """Index of refraction of air, its sensitivity to the weather, and how well it is known."""
+    """Index of air, its sensitivities and its uncertainty."""
     from catseye.atmosphere.air import air as air_of
     from catseye.gateways.objects import air_object, json_line
 
