@@ -26,7 +26,7 @@ test: check  ## check, then the tests
 	$(BIN)/python -m pytest
 
 test-all: check  ## the same with the long scatter and fault runs
-	$(BIN)/python -m pytest -m 'slow or not slow'
+	$(BIN)/python -m pytest -m 'slow or not slow' --hypothesis-profile=explore
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01

@@ -3,6 +3,11 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("seeded", derandomize=True, deadline=None)  # the same examples on every machine
+settings.register_profile("explore", deadline=None, max_examples=300)  # for `make test-all`
+settings.load_profile("seeded")
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
 

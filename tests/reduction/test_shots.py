@@ -8,6 +8,7 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.optics.prism import obliquity_correction
 from catseye.reduction.network import AIR
+from catseye.reduction.ranges import follow_electronics, measure_phases
 from catseye.reduction.shots import _obliquity, _tilted, shot_group
 
 F = 1.5e9
@@ -148,3 +149,26 @@ def test_shots_of_one_path_share_the_fluctuation_of_the_air_and_of_two_paths_do_
     same = np.array(parts.target)[:, None] == np.array(parts.target)
     assert (same.sum(axis=1) > 1).any()
     np.testing.assert_allclose(share, np.where(same, np.outer(distance, distance) * (0.15e-6) ** 2, 0.0), atol=1e-18)
+
+
+@pytest.mark.parametrize("name", ["ZY103", "ZY116"])
+@pytest.mark.parametrize("more", [1e-4, 1e-4j])
+def test_a_sheet_with_other_leakage_changes_the_ranges_as_the_derivative_says(night_01, network_01, name, more):
+    """References and targets turn both; what the sheet takes away too much is leakage of the other sign left over."""
+    mirror = night_01.mirror_of(name)
+    leakage = mirror.leakage_amplitude_volt * np.exp(1j * mirror.leakage_phase_rad) + more
+    sheet = mirror.model_copy(
+        update={"leakage_amplitude_volt": float(abs(leakage)), "leakage_phase_rad": float(np.angle(leakage))}
+    )
+    other = dataclasses.replace(night_01, mirrors={**night_01.mirrors, mirror.zp: sheet})
+    phases = measure_phases(other, network_01.settings)
+    electronics, _ = follow_electronics(other, phases)
+    assert np.array_equal(electronics[name].shots, network_01.electronics[name].shots)
+    x = np.array(network_01.layout.start)
+    group, parts = shot_group(network_01, name, x)
+    changed, _ = shot_group(dataclasses.replace(network_01, phases=phases, electronics=electronics), name, x)
+    half = 0.5 * SPEED_OF_LIGHT / night_01.site.ranging.modulation_hz
+    difference = (changed.observed - group.observed + half / 2) % half - half / 2  # cycles apart
+    expected = -parts.leakage_slope @ [np.real(more), np.imag(more)]
+    assert np.max(np.abs(expected)) > 0.3e-6
+    np.testing.assert_allclose(difference, expected, atol=0.05 * np.max(np.abs(expected)))
