@@ -35,7 +35,7 @@ class RangeShots:
     cycles, margin    whole half wavelengths and how far the coarse length was from another number
     refractivity      n_g - 1 along the path
     incidence         rad, on a prism's face; 0 for others
-    glass, obliquity  Pc and dPc, metres
+    glass, obliquity  Pc (with what was estimated of it) and dPc, metres
     zero, leakage     estimated corrections of the ranger's zero and of the rest of its leakage, to the range
     range_            distance scan point to target as this shot gives it, all corrections applied
     u_range           its standard uncertainty: noise, electronics and path; systematic parameters not counted
@@ -217,7 +217,7 @@ def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -
 def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> RangeShots:
     x, layout = solution.x, network.layout
     fits = solution.fits[: len(parts)]
-    zero, leakage, range_, u_range, residual, detectable = [], [], [], [], [], []
+    zero, leakage, glass, range_, u_range, residual, detectable = [], [], [], [], [], [], []
     for part, fit in zip(parts, fits, strict=True):
         n = 1.0 + part.refractivity
         own_zero = np.full(len(n), x[layout.at[f"zero {part.name}"]])
@@ -225,6 +225,8 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         to = np.array([x[layout.columns(t)] for t in part.target])
         zero.append(own_zero)
         leakage.append(-(part.leakage_slope @ x[layout.columns(f"leakage {part.name}", 2)]) / n)
+        rest = [x[layout.at[f"glass {t}"]] if f"glass {t}" in layout.at else 0.0 for t in part.target]
+        glass.append(part.glass + np.array(rest))
         residual.append(fit.residual / n)
         range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
         u_range.append(fit.sigma / n)
@@ -240,7 +242,7 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         margin=join([p.margin for p in parts]),
         refractivity=join([p.refractivity for p in parts]),
         incidence=join([p.incidence for p in parts]),
-        glass=join([p.glass for p in parts]),
+        glass=join(glass),
         obliquity=join([p.obliquity for p in parts]),
         zero=join(zero),
         leakage=join(leakage),

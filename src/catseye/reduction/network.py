@@ -71,7 +71,8 @@ def build_network(
     """The unknowns and priors of a campaign.
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
-    points, each firing ranger's zero and rest of leakage, the air's offsets, two tilts of every prism face.
+    points, each firing ranger's zero and rest of leakage, the air's offsets, two tilts of every prism face, and the
+    rest of every glass constant.
     """
     places = places_of(campaign)
     fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
@@ -93,6 +94,9 @@ def build_network(
     layout.add(AIR, air.names, np.zeros(len(air.names)))
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
         layout.add(f"normal {group}", ["1", "2"], [0.0, 0.0])
+    for name in sorted(fired):
+        if seen[name].u_constant > 0.0:
+            layout.add(f"glass {name}", [""], [0.0])
     priors = _priors(campaign, settings, seen, layout, air)
     return Network(campaign, settings, phases, electronics, seen, layout, air, priors)
 
@@ -120,6 +124,7 @@ def _priors(
         _independent(THERMOMETERS, at[:-1], np.zeros(count - 1), air.sigmas[:-1]),
         _independent("air profile", at[-1:], [0.0], air.sigmas[-1:]),
         *_directions(campaign, settings, layout),
+        *_glass(seen, layout),
     ]
     typed = [n for n, p in sorted(seen.items()) if p.typed]
     if typed:
@@ -188,6 +193,15 @@ def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[
     columns = [c for n in normals for c in layout.columns(n, 2)]
     u = np.repeat(np.where(triplets, settings.u_plate_normal, settings.u_normal), 2)
     return [_independent("normals", columns, np.zeros(len(columns)), u)]
+
+
+def _glass(seen: dict[str, Place], layout: Layout) -> list[Observations]:
+    """The rests of the glass constants, each common to every shot on its target."""
+    names = [name for name in sorted(seen) if f"glass {name}" in layout.at]
+    if not names:
+        return []
+    columns = [layout.at[f"glass {name}"] for name in names]
+    return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
 
 
 def _positive(u: float, where: str) -> float:

@@ -21,6 +21,7 @@ class Place:
     normal     (3,) of a prism's entry face, ground frame, or None
     height     m, of a prism
     constant   m, range constant Pc of its glass; 0 for hollow cubes
+    u_constant m, its standard uncertainty from that of the glass's dimensions, shared by all shots on it
     group      what its normal's error is shared with: its own name, or its triplet's; "" for none
     typed      its start is an approximate position that somebody typed
     """
@@ -31,6 +32,7 @@ class Place:
     normal: np.ndarray | None = None
     height: float = 0.0
     constant: float = 0.0
+    u_constant: float = 0.0
     group: str = ""
     typed: bool = True
 
@@ -50,8 +52,10 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
     """Everything that can be ranged to, by name, at its approximate position in the ground frame.
 
     Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
-    [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side.
+    [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side. The
+    constants' uncertainties are the derivatives of 3.8 (n u_height at a fixed reference point) and 3.14.
     """
+    n = campaign.site.ranging.bk7_to_air_group_index_ratio
     to_ground = {"reflector": nominal_frame(campaign), "ground": Transform("ground", "ground", np.eye(3), np.zeros(3))}
     places: dict[str, Place] = {}
     for name, monument in campaign.monuments.items():
@@ -80,6 +84,7 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
                 unit(frame.directions(target.normal)),
                 target.height_mm * MILLIMETRE,
                 target.pc_mm * MILLIMETRE,
+                n * (target.u_height_mm or 0.0) * MILLIMETRE,
                 target.name,
             )
         else:
@@ -98,10 +103,15 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
                 normal,
                 prism.height_mm * MILLIMETRE,
                 prism.pc_mm * MILLIMETRE,
+                n * prism.u_height_mm * MILLIMETRE,
                 triplet.triplet,
             )
         places[triplet.ball.target] = Place(
-            triplet.ball.target, "ball", ball, constant=triplet.ball.pc_b_mm * MILLIMETRE
+            triplet.ball.target,
+            "ball",
+            ball,
+            constant=triplet.ball.pc_b_mm * MILLIMETRE,
+            u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
         )
     return places
 

@@ -51,6 +51,8 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
     n = 1.0 + air.refractivity
     d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
     glass = np.array([places[t].constant for t in targets])
+    has_rest = np.array([f"glass {t}" in layout.at for t in targets])
+    rest_columns = np.array([layout.at.get(f"glass {t}", 0) for t in targets])  # column 0 with derivative 0: none
     incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, towards, x)
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
@@ -86,11 +88,19 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
                 np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
                 np.broadcast_to(air_columns, (m, len(air_columns))),
                 normal_columns,
+                rest_columns[:, None],
             ],
             axis=1,
         ),
         coefficient=np.concatenate(
-            [-n[:, None], leakage_slope, distance[:, None] * air.slopes, -n[:, None] * normal_slopes], axis=1
+            [
+                -n[:, None],
+                leakage_slope,
+                distance[:, None] * air.slopes,
+                -n[:, None] * normal_slopes,
+                (-n * has_rest)[:, None],
+            ],
+            axis=1,
         ),
     )
     parts = ShotParts(
