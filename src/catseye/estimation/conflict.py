@@ -82,13 +82,14 @@ def search(
     jacobians: Sequence[np.ndarray],
     removable: Sequence[np.ndarray],
     solution: Solution,
+    advice: Sequence[Observations] = (),
 ) -> tuple[LocalConflict, tuple[int, ...] | None]:
     """The smallest conflict at a point; where there is none, searched again about the place of the best explanation.
 
     A wrong range of half a metre carries its point so far that slopes taken there explain nothing to 25 um.
     """
     for _ in range(SEARCHES):
-        local = at_point(columns, groups, jacobians, removable, solution, SLACK)
+        local = at_point(columns, groups, jacobians, removable, solution, advice, slack=SLACK)
         if not 2 <= len(local.rows) <= LARGEST_SEARCH:
             return local, None
         wrong = local.smallest_conflict()
@@ -108,28 +109,42 @@ def at_point(
     jacobians: Sequence[np.ndarray],
     removable: Sequence[np.ndarray],
     solution: Solution,
+    advice: Sequence[Observations] = (),
+    *,
     slack: float,
 ) -> LocalConflict:
-    """What meets in a point: removable observations that depend on it, and others that depend on it alone."""
+    """What meets in a point: removable observations that depend on it; others, and advice, that depend on it alone."""
     rows: list[tuple[int, int]] = []
-    parts: dict[bool, list[tuple[float, np.ndarray]]] = {True: [], False: []}
+    doubted: list[tuple[float, np.ndarray]] = []
+    prior: list[tuple[float, np.ndarray]] = []
     for i, (group, jacobian, may, fit) in enumerate(zip(groups, jacobians, removable, solution.fits, strict=True)):
-        here = group.columns[:, None] == columns  # in any order, and perhaps not all three
-        if not here.any():
-            continue
-        slope = jacobian @ here
-        touching = np.any(slope != 0.0, axis=1)
-        alone = touching & ~np.any(jacobian[:, ~here.any(axis=1)] != 0.0, axis=1)
-        for k in np.flatnonzero(touching & (may | alone)):
-            sigma = fit.sigma[k] * (slack if may[k] else 1.0)
-            parts[bool(may[k])].append((fit.residual[k] / sigma, slope[k] / sigma))
-            if may[k]:
-                rows.append((i, int(k)))
-    (residual, slopes), (prior, prior_slopes) = (
-        (np.array([v for v, _ in parts[may]]), np.array([a for _, a in parts[may]]).reshape(-1, 3))
-        for may in (True, False)
+        slope, touching, alone = _slopes(columns, group, jacobian)
+        for k in np.flatnonzero(touching & may):
+            sigma = slack * fit.sigma[k]
+            doubted.append((fit.residual[k] / sigma, slope[k] / sigma))
+            rows.append((i, int(k)))
+        prior += [(fit.residual[k] / fit.sigma[k], slope[k] / fit.sigma[k]) for k in np.flatnonzero(alone & ~may)]
+    for group in advice:
+        if np.isin(columns, group.columns).any():
+            values, jacobian = group.predict(solution.x)
+            slope, _, alone = _slopes(columns, group, jacobian)
+            sigma = np.sqrt(np.diag(group.covariance) if group.covariance.ndim == 2 else group.covariance)
+            residual = group.observed - values
+            prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
+    (residual, slopes), (prior_residual, prior_slopes) = (
+        (np.array([v for v, _ in part]), np.array([a for _, a in part]).reshape(-1, 3)) for part in (doubted, prior)
     )
-    return LocalConflict(rows, residual, slopes, prior, prior_slopes)
+    return LocalConflict(rows, residual, slopes, prior_residual, prior_slopes)
+
+
+def _slopes(
+    columns: np.ndarray, group: Observations, jacobian: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives (m, 3) of a group by a point, which rows depend on it, and which on nothing else."""
+    here = group.columns[:, None] == columns  # in any order, and perhaps not all three
+    slope = jacobian @ here
+    touching = np.any(slope != 0.0, axis=1)
+    return slope, touching, touching & ~np.any(jacobian[:, ~here.any(axis=1)] != 0.0, axis=1)
 
 
 def touched(

@@ -24,6 +24,7 @@ def adjust_robustly(
     removable: Sequence[np.ndarray],
     *,
     points: Sequence[np.ndarray] = (),
+    advice: Sequence[Observations] = (),
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
@@ -36,6 +37,8 @@ def adjust_robustly(
     groups      observations, as for `adjust`
     removable   one (m,) bool array a group: True for observations that may be wrong and may be left out
     points      columns of each point, (3,) an array: where a few observations meet, the smallest conflict is sought
+    advice      what is known of single points besides; it helps to tell which observation is wrong, and takes no
+                part in the answer
     free        (n,) bool, as for `adjust`
     active      one (m,) bool array a group: start from this selection instead of searching for one
     names       (n,) what the parameters are called
@@ -54,10 +57,14 @@ def adjust_robustly(
     careful = None  # what to try instead, should a selection leave too little to hold every parameter
     if active is None:
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
-        solution, active = _robust_start(x0, groups, removable, points, free, names)
-        x = solution.x
+        solution = _reweighted(x0, groups, removable, free, names)
+        large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
+        active = [~may | (np.abs(f.residual) < 10.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
     else:
-        x = x0
+        solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), tests=False)
+        large = [may & ~a for may, a in zip(removable, active, strict=True)] if advice else []
+    active = _searched(solution, groups, removable, points, advice, large, active)
+    x = solution.x
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
     for _ in range(rounds):
         solution = adjust(x, groups, free=free, active=active, names=names)
@@ -81,7 +88,7 @@ def adjust_robustly(
             continue
         back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
         if not any(b.any() for b in back):
-            return _without_undecided(solution, groups, removable, points, free, names)
+            return _without_undecided(solution, groups, removable, points, advice, free, names)
         careful = None
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
@@ -102,6 +109,7 @@ def _without_undecided(
     groups: Sequence[Observations],
     removable: Sequence[np.ndarray],
     points: Sequence[np.ndarray],
+    advice: Sequence[Observations],
     free: np.ndarray | None,
     names: Sequence[str] | None,
 ) -> Solution:
@@ -115,20 +123,24 @@ def _without_undecided(
     jacobians = [g.predict(solution.x)[1] for g in groups]
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     for columns in touched(points, groups, jacobians, rejected):
-        local = at_point(columns, groups, jacobians, removable, solution, slack=1.0)
-        out = tuple(index for index, (i, k) in enumerate(local.rows) if not active[i][k])
-        grave = max((abs(solution.fits[i].standardised[k]) for i, k in (local.rows[q] for q in out)), default=0.0)
-        if grave < GRAVE:
+        local = at_point(columns, groups, jacobians, removable, solution, advice, slack=1.0)
+        out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
+        grave = [
+            index
+            for index in out
+            if abs(solution.fits[local.rows[index][0]].standardised[local.rows[index][1]]) > GRAVE
+        ]
+        if not grave or len(local.rows) > LARGEST_SEARCH:
             continue
-        if (
-            len(out) > MOST_AT_ONE_POINT or len(local.rows) > LARGEST_SEARCH
-        ):  # too many to search: trust what is checked
+        if len(grave) > MOST_AT_ONE_POINT:  # too many to search: trust what is checked
             for i, k in local.rows:
                 active[i][k] &= checked[i][k]
             continue
-        costs = {other: local.cost(other) for other in combinations(range(len(local.rows)), len(out))}
+        slight = [index for index in out if index not in grave]
+        others = [index for index in range(len(local.rows)) if index not in slight]
+        costs = {choice: local.cost([*choice, *slight]) for choice in combinations(others, len(grave))}
         limit = min(costs.values()) + DECISIVE
-        doubtful = {index for other, cost in costs.items() if cost < limit for index in other}
+        doubtful = {index for choice, cost in costs.items() if cost < limit for index in choice}
         for index, (i, k) in enumerate(local.rows):
             active[i][k] &= index not in doubtful
     if all(np.array_equal(a, f.active) for a, f in zip(active, solution.fits, strict=True)):
@@ -139,30 +151,42 @@ def _without_undecided(
     return final
 
 
-def _robust_start(
+def _reweighted(
     x0: np.ndarray,
     groups: Sequence[Observations],
     removable: Sequence[np.ndarray],
-    points: Sequence[np.ndarray],
     free: np.ndarray | None,
     names: Sequence[str] | None,
-) -> tuple[Solution, list[np.ndarray]]:
+) -> Solution:
+    """A fit in which every observation that may be wrong weighs by its own residual."""
     extra = [np.zeros(len(g.observed)) for g in groups]
     solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
-    if not np.isfinite(solution.covariance).all():
-        return solution, [np.ones(len(g.observed), dtype=bool) for g in groups]
     for _ in range(8):
+        if not np.isfinite(solution.covariance).all():
+            break
         for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
             extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
         solution = adjust(solution.x, groups, free=free, extra_variance=extra, names=names, iterations=1, tests=False)
-    active = [
-        ~may | (np.abs(fit.residual) < 10.0 * fit.sigma) for fit, may in zip(solution.fits, removable, strict=True)
-    ]
+    return solution
+
+
+def _searched(
+    solution: Solution,
+    groups: Sequence[Observations],
+    removable: Sequence[np.ndarray],
+    points: Sequence[np.ndarray],
+    advice: Sequence[Observations],
+    suspects: Sequence[np.ndarray],
+    active: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """The selection, with the smallest conflict left out at each point that a suspect depends on."""
+    active = [a.copy() for a in active]
+    if not np.isfinite(solution.covariance).all():
+        return [np.ones(len(g.observed), dtype=bool) for g in groups]
     jacobians = [g.predict(solution.x)[1] for g in groups]
-    large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
-    for columns in touched(points, groups, jacobians, large):
-        local, wrong = search(columns, groups, jacobians, removable, solution)
+    for columns in touched(points, groups, jacobians, suspects) if suspects else ():
+        local, wrong = search(columns, groups, jacobians, removable, solution, advice)
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong
-    return solution, active
+    return active

@@ -8,9 +8,10 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.adjustment import Fit, Solution, adjust
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.robust import UNCHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
+from catseye.reduction.dish import dish_advice
 from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
@@ -124,7 +125,8 @@ def adjust_coordinates(
     """Coordinates of everything that was ranged to or from, with full covariance.
 
     Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
-    until they no longer change. Wrong shots are searched for in the first pass and tested again in the second.
+    until they no longer change. Wrong shots are searched for in the first pass, and in the second once more with what
+    the dish then says of its own prisms; later passes keep the choice.
 
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
@@ -138,6 +140,7 @@ def adjust_coordinates(
     points = [layout.columns(name) for name in network.places if name in layout.at]
     coordinates = np.concatenate(points)
     active, solution = None, None
+    advice: list[Linear] = []
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", turn, PASSES)
@@ -153,6 +156,7 @@ def adjust_coordinates(
                 groups,
                 removable,
                 points=points,
+                advice=advice,
                 free=free,
                 active=active,
                 names=layout.names,
@@ -161,6 +165,8 @@ def adjust_coordinates(
         else:
             solution = adjust(x, groups, free=free, active=active, names=layout.names)
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
+        if not turn:
+            advice = dish_advice(network, x, solution.covariance)
         moved = np.abs(x - before)[coordinates]
         u = np.sqrt(np.diag(solution.covariance)[coordinates])
         if turn and np.all(moved < np.maximum(SETTLED, SETTLED_U * u)):

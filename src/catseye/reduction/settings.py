@@ -18,6 +18,8 @@ class Settings:
     u_gradient_c_per_m      °C/m, where there is one station height only and no gradient was measured
     u_normal                rad, each direction, of the normal of a single prism
     u_plate_normal          rad, each direction, of the plate and the axis of a triplet
+    u_surface               m, along the normal, of a dish prism off the best paraboloid: some tenths of a millimetre;
+                            it only helps to judge shots that contradict each other
     u_position              m, each coordinate, of a typed approximate position: some 15 mm in space
     """
 
@@ -29,4 +31,5 @@ class Settings:
     u_gradient_c_per_m: float = 0.02
     u_normal: float = 0.1 * DEGREE
     u_plate_normal: float = 0.3 * DEGREE
+    u_surface: float = 0.001
     u_position: float = 0.010

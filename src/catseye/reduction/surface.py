@@ -10,6 +10,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.records.campaign import Campaign
 from catseye.reduction.coordinates import Coordinates
+from catseye.reduction.dish import dish_prisms
 from catseye.reduction.places import nominal_frame
 
 FEWEST_CHECKS = 3  # used shots at a prism before it may shape the dish
@@ -63,16 +64,11 @@ def fit_surface(campaign: Campaign, coordinates: Coordinates) -> tuple[Surface |
     """The dish from its prisms (single prisms of the reflector frame), and why there is none, "" where there is.
 
     A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.
-
-    Source: README of the campaign layout: reference points lie on z = (x^2 + y^2)/4f when the surface is ideal.
     """
     names = tuple(
         name
-        for name in coordinates.points
-        if name in campaign.targets
-        and campaign.targets[name].type == "prism"
-        and campaign.targets[name].frame == "reflector"
-        and coordinates.shots[coordinates.index(name)] >= FEWEST_CHECKS
+        for name in dish_prisms(campaign)
+        if name in coordinates.points and coordinates.shots[coordinates.index(name)] >= FEWEST_CHECKS
     )
     nominal = nominal_frame(campaign)
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
