@@ -47,15 +47,18 @@ class Field:
             self.prior = [Linear("typed", self.x0[columns][order], np.full(len(columns), prior**2), columns[order],
                                  np.eye(len(columns)))]  # fmt: skip
 
-    def adjusted(self, **options):
-        k = len(self.observed)
-        m = len(self.to)
+    def groups(self):
+        k, m = len(self.observed), len(self.to)
         shots = [
             distances(f"S{s}", o, np.full(m, SIGMA**2), np.full(m, 3 * s), 3 * (k + self.to))
             for s, o in enumerate(self.observed)
         ]
+        return [*shots, *self.prior]
+
+    def adjusted(self, **options):
+        k, m = len(self.observed), len(self.to)
         removable = [np.ones(m, dtype=bool)] * k + [np.zeros(len(p.observed), dtype=bool) for p in self.prior]
-        return adjust_robustly(self.x0, [*shots, *self.prior], removable, points=self.points, free=self.free, **options)
+        return adjust_robustly(self.x0, self.groups(), removable, points=self.points, free=self.free, **options)
 
     def left_out(self, solution):
         return {(s, int(k)) for s, f in enumerate(solution.fits) for k in np.flatnonzero(~f.active)}
@@ -158,6 +161,30 @@ def test_four_ranges_of_which_one_is_wrong_end_without_an_answer_not_with_a_wron
     status = field.adjusted(names=[f"P{i // 3} {'xyz'[i % 3]}" for i in range(18)]).status
     assert status.startswith("observations at one point contradict each other")
     assert "P5" in status
+
+
+def test_advice_decides_between_four_ranges_and_takes_no_part_in_the_answer():
+    field = Field(4, targets=2, stations=STATIONS[[0, 1, 3, 5]])
+    field.observed[2][1] += 0.02
+    there = field.true[15:18] + np.array([0.8e-3, -0.5e-3, 0.3e-3])  # where somebody saw the point, to a millimetre
+    advice = [Linear("seen", there, np.full(3, 1e-6), np.arange(15, 18), np.eye(3))]
+    solution = field.adjusted(advice=advice).require_converged()
+    assert field.left_out(solution) == {(2, 1)}
+    good = [np.array([True, s != 2]) for s in range(4)]
+    without = adjust(field.x0, [*field.groups()], free=field.free, active=good).require_converged()
+    np.testing.assert_allclose(solution.x, without.x, atol=1e-9)
+    np.testing.assert_allclose(solution.covariance, without.covariance, rtol=1e-6, atol=1e-20)
+
+
+@pytest.mark.parametrize("error", [0.003, -0.02])
+def test_a_slight_error_beside_a_grave_one_makes_no_innocent_shot_undecided(error):
+    """Of six ranges one is foreign and one is off by chance; which other might be the second does not matter."""
+    field = Field(17)
+    field.observed[0][3] += error
+    field.observed[4][3] += 7 * SIGMA
+    solution = field.adjusted().require_converged()
+    assert (0, 3) in field.left_out(solution)
+    assert len(field.left_out(solution)) <= 2
 
 
 def test_nothing_comes_back_that_was_rejected_at_another_point():

@@ -49,7 +49,8 @@ def adjust_robustly(
     Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
     sigmas from dragging others along. Where few observations meet in a point such a fit can share the blame between
     innocent ones; so every point in conflict is searched for the smallest set whose absence makes the rest agree.
-    At last Baarda's test with correlations, over everything: out with the worst, back in with those that pass.
+    At last Baarda's test with correlations, over everything: out with the worst, one by one, and back in with those
+    that pass.
 
     Source: [BAARDA68] (data snooping); [FOERSTNER16] chapter 4 (robust estimation and outlier detection); [HUBER09]
     (reweighting). The search for the smallest conflict is ours.
@@ -73,23 +74,21 @@ def adjust_robustly(
                 return solution
             active, careful = careful, None
             continue
-        x = solution.x
+        x, careful = solution.x, None
         tests = [
             np.where(may & _checked(f), np.abs(f.standardised), 0.0)
             for f, may in zip(solution.fits, removable, strict=True)
         ]
-        worst = max(float(t[a].max(initial=0.0)) for t, a in zip(tests, active, strict=True))
-        if worst > critical:
-            limit = max(critical, 0.8 * worst)
-            careful = [a.copy() for a in active]
-            group = int(np.argmax([float(t[a].max(initial=0.0)) for t, a in zip(tests, active, strict=True)]))
-            careful[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
-            active = [a & (t < limit) for t, a in zip(tests, active, strict=True)]
+        worst, group = max(
+            (float(t[a].max(initial=0.0)), i) for i, (t, a) in enumerate(zip(tests, active, strict=True))
+        )
+        if worst > critical:  # one at a time: neighbours at a point with few checks look wrong together
+            active = [a.copy() for a in active]
+            active[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
             continue
         back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
         if not any(b.any() for b in back):
             return _without_undecided(solution, groups, removable, points, advice, free, names)
-        careful = None
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
     return replace(solution, status=UNDECIDED.format(rounds=rounds))
@@ -136,9 +135,8 @@ def _without_undecided(
             for i, k in local.rows:
                 active[i][k] &= checked[i][k]
             continue
-        slight = [index for index in out if index not in grave]
-        others = [index for index in range(len(local.rows)) if index not in slight]
-        costs = {choice: local.cost([*choice, *slight]) for choice in combinations(others, len(grave))}
+        # The slight ones count here: which of them is out hardly matters, and without them nothing would be checked.
+        costs = {choice: local.cost(choice) for choice in combinations(range(len(local.rows)), len(grave))}
         limit = min(costs.values()) + DECISIVE
         doubtful = {index for choice, cost in costs.items() if cost < limit for index in choice}
         for index, (i, k) in enumerate(local.rows):
