@@ -4,7 +4,6 @@ import math
 
 SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact (SI)
 ZERO_CELSIUS_K = 273.15  # K at 0 °C, exact
-MMHG_HPA = 1.333_224  # hPa in a conventional millimetre of mercury, [PARKER04] eq. 1.20
 SECONDS_PER_DAY = 86_400.0
 
 TWO_PI = 2.0 * math.pi

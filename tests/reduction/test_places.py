@@ -1,9 +1,11 @@
 """Approximate places from the records: scan points, triplets, frames."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from catseye.reduction.places import nominal_frame, places_of
+from catseye.reduction.places import nominal_frame, places_of, sheet_notes
 
 
 def readme_ground(campaign, reflector_mm):
@@ -84,3 +86,10 @@ def test_a_target_of_the_ground_frame_stays_where_it_was_typed(night_01):
     assert ground
     for t in ground:
         np.testing.assert_allclose(places[t.name].start, np.array(t.position_mm) * 1e-3, atol=1e-12)
+
+
+def test_a_mistyped_glass_constant_is_named_because_no_residual_shows_it(night_01):
+    assert sheet_notes(night_01) == []
+    mistyped = night_01.targets["DP007"].model_copy(update={"pc_mm": night_01.targets["DP007"].pc_mm - 1.0})
+    notes = sheet_notes(dataclasses.replace(night_01, targets={**night_01.targets, "DP007": mistyped}))
+    assert [n.partition(":")[0] for n in notes] == ["DP007"]

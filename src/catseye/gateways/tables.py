@@ -8,6 +8,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.reduction.epoch import Reduction
+from catseye.signal.cycles import unwrapped_length
 
 RANGES = [
     "shot",
@@ -68,7 +69,7 @@ def ranges_csv(reduction: Reduction) -> str:
     """
     campaign, phases, ranges = reduction.campaign, reduction.phases, reduction.coordinates.ranges
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
-    vacuum = (ranges.cycles - ranges.phase / TWO_PI) * half
+    vacuum = unwrapped_length(ranges.cycles, ranges.phase, half)
     air = vacuum * (1.0 / (1.0 + ranges.refractivity) - 1.0)
     row_of = {int(shot): row for row, shot in enumerate(ranges.shot)}
     shots = campaign.shots

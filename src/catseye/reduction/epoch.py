@@ -6,6 +6,7 @@ from threadpoolctl import threadpool_limits
 
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.coordinates import Coordinates, adjust_coordinates
+from catseye.reduction.places import sheet_notes
 from catseye.reduction.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases
 from catseye.reduction.settings import Settings
 from catseye.reduction.surface import Surface, fit_surface
@@ -55,7 +56,12 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
         reasons[k].partition(":")[0] if k in reasons else "reference" if target == REFERENCE else "used"
         for k, target in enumerate(campaign.shots.target)
     )
-    notes = [*coordinates.notes, *_weak_rangers(campaign, phases), *([missing] if missing else [])]
+    notes = [
+        *coordinates.notes,
+        *sheet_notes(campaign),
+        *_weak_rangers(campaign, phases),
+        *([missing] if missing else []),
+    ]
     return Reduction(
         campaign,
         settings,

@@ -8,7 +8,10 @@ from catseye.constants import MILLIMETRE
 from catseye.geometry.antenna import ground_from_reflector
 from catseye.geometry.frame import Transform
 from catseye.geometry.mount import gamma, scan_point
+from catseye.optics import cats_eye, prism
 from catseye.records.campaign import Campaign
+
+MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +98,15 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
         normal, axis = unit(frame.directions(triplet.normal)), unit(frame.directions(triplet.axis))
         middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
         half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
-        for prism, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
-            places[prism.target] = Place(
-                prism.target,
+        for side, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
+            places[side.target] = Place(
+                side.target,
                 "prism",
                 where,
                 normal,
-                prism.height_mm * MILLIMETRE,
-                prism.pc_mm * MILLIMETRE,
-                n * prism.u_height_mm * MILLIMETRE,
+                side.height_mm * MILLIMETRE,
+                side.pc_mm * MILLIMETRE,
+                n * side.u_height_mm * MILLIMETRE,
                 triplet.triplet,
             )
         places[triplet.ball.target] = Place(
@@ -114,6 +117,32 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
             u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
         )
     return places
+
+
+def sheet_notes(campaign: Campaign) -> list[str]:
+    """Glass constants that do not follow from the dimensions beside them, one line each.
+
+    Every shot on a target shares its constant, so that no residual shows a typing error in it.
+
+    Source: [GOLDMAN00] eqs. 3.9, 3.10 and 3.14 with the site's index ratio.
+    """
+    n = campaign.site.ranging.bk7_to_air_group_index_ratio
+    glasses: list[tuple[str, str, float, float]] = []
+    for target in campaign.targets.values():
+        if target.height_mm is not None and target.pc_mm is not None:
+            glasses.append((target.name, "pc_mm", target.pc_mm, float(prism.range_constant(target.height_mm, n))))
+    for triplet in campaign.triplets.values():
+        ball = triplet.ball
+        glasses.append(
+            (ball.target, "pc_b_mm", ball.pc_b_mm, float(cats_eye.range_constant(ball.r1_mm, ball.r2_mm, n)))
+        )
+        for side in (triplet.left_prism, triplet.right_prism):
+            glasses.append((side.target, "pc_mm", side.pc_mm, float(prism.range_constant(side.height_mm, n))))
+    return [
+        f"{name}: {key} = {typed} does not follow from its dimensions, which give {right:.4f}: one of them is mistyped"
+        for name, key, typed, right in glasses
+        if abs(typed - right) > MISTYPED_MM
+    ]
 
 
 def unit(v: np.ndarray) -> np.ndarray:

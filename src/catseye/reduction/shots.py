@@ -11,7 +11,7 @@ from catseye.optics.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.network import AIR, Network
 from catseye.reduction.places import unit
 from catseye.reduction.ranges import Electronics
-from catseye.signal.cycles import fraction, whole_cycles
+from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
     phase = fraction(phases.phase[rows], electronics.phase)
     coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]])
     cycles, margin = whole_cycles(coarse, phase, half)
-    observed = (cycles - phase / TWO_PI) * half
+    observed = unwrapped_length(cycles, phase, half)
 
     # Leakage left over, complex dL: a phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
     per_radian = -half / TWO_PI
