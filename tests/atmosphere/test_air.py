@@ -99,3 +99,11 @@ def test_the_collected_answer_agrees_with_the_single_functions(model):
     assert answer.sensitivity._asdict().keys() == GOOD.keys()
     with pytest.raises(dataclasses.FrozenInstanceError):
         answer.model = "other"
+
+
+def test_inputs_add_their_share_to_the_uncertainty_whatever_their_sign():
+    """At 20 °C, 933 hPa, 50 %: -0.8921 ppm/K, 0.2720 ppm/hPa, -0.008253 ppm/%, as facts of the model tested above."""
+    state = air(20.0, 933.0, 50.0)
+    by_hand = np.sqrt(0.05**2 + (0.8921 * 0.3) ** 2 + (0.2720 * 0.5) ** 2 + (0.008253 * 10.0) ** 2)
+    assert state.combined_uncertainty(0.3, 0.5, 10.0) * 1e6 == pytest.approx(by_hand, rel=1e-4)
+    assert state.combined_uncertainty(0.0, 0.0, 0.0) == pytest.approx(5e-8)

@@ -161,3 +161,14 @@ def test_a_path_has_one_air_from_either_end(night_01):
     there, back = field.along(when, a, b, np.zeros(3)), field.along(when, b, a, np.zeros(3))
     np.testing.assert_allclose(there.refractivity, back.refractivity, rtol=1e-14)
     np.testing.assert_allclose(there.slopes, back.slopes, rtol=1e-12, atol=1e-20)
+
+
+def test_a_bend_of_one_degree_is_one_degree_warmer_half_way_and_nothing_at_the_stations(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 60.0], lambda s, i: 10.0 + 2.0 * i)
+    field = AirField.of(campaign, Settings(air_model="rueger1990"))
+    level = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 25.0], [0.0, 0.0, 50.0]])
+    far = level + np.array([100.0, 0.0, 0.0])
+    bent = field.along(at(start, 30.0, 30.0, 30.0), level, far, np.array([0.0, 0.0, 1.0]))
+    warmth, pressure = np.array([10.0, 12.0, 12.0]), 900.0 - 0.11 * (level[:, 2] - 25.0)  # half-way 11 on the line
+    expected = group_refractivity(warmth, pressure, 50.0, wavelength_um=0.78, model="rueger1990")
+    np.testing.assert_allclose(bent.refractivity, expected, rtol=0, atol=1e-12)

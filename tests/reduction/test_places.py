@@ -93,3 +93,25 @@ def test_a_mistyped_glass_constant_is_named_because_no_residual_shows_it(night_0
     mistyped = night_01.targets["DP007"].model_copy(update={"pc_mm": night_01.targets["DP007"].pc_mm - 1.0})
     notes = sheet_notes(dataclasses.replace(night_01, targets={**night_01.targets, "DP007": mistyped}))
     assert [n.partition(":")[0] for n in notes] == ["DP007"]
+
+
+def test_constants_are_as_uncertain_as_their_dimensions(night_01):
+    """Every dimension moved by its standard uncertainty, by the closed forms 3.8 and 3.14 written out here."""
+    n, places = night_01.site.ranging.bk7_to_air_group_index_ratio, places_of(night_01)
+    unit = night_01.triplets["TR01"]
+    ball, prism = unit.ball, unit.left_prism
+
+    def ball_mm(r1, r2):
+        return -(n * (r1 + r2) - r1)
+
+    u = ball.u_r_mm
+    by_r1 = ball_mm(ball.r1_mm + u, ball.r2_mm) - ball_mm(ball.r1_mm, ball.r2_mm)
+    by_r2 = ball_mm(ball.r1_mm, ball.r2_mm + u) - ball_mm(ball.r1_mm, ball.r2_mm)
+    assert places[ball.target].u_constant == pytest.approx(np.hypot(by_r1, by_r2) * 1e-3, rel=1e-6)
+
+    def prism_mm(height):  # optical path to the corner, less the air down to a reference point that stays
+        return -(n * height - prism.hrp_mm)
+
+    by_height = prism_mm(prism.height_mm + prism.u_height_mm) - prism_mm(prism.height_mm)
+    assert places[prism.target].u_constant == pytest.approx(abs(by_height) * 1e-3, rel=1e-6)
+    assert places["ZEG41040L"].u_constant == 0.0

@@ -172,3 +172,21 @@ def test_a_sheet_with_other_leakage_changes_the_ranges_as_the_derivative_says(ni
     expected = -parts.leakage_slope @ [np.real(more), np.imag(more)]
     assert np.max(np.abs(expected)) > 0.3e-6
     np.testing.assert_allclose(difference, expected, atol=0.05 * np.max(np.abs(expected)))
+
+
+def test_the_rest_of_a_glass_constant_acts_as_a_change_of_the_constant(network_01, state):
+    """A parameter of 5 um on a prism and a sheet that says 5 um more predict the same ranges, and shorter ones."""
+    rest = 5e-6
+    target = next(t for t in shot_group(network_01, "ZY113", state)[1].target if f"glass {t}" in network_01.layout.at)
+    mine = np.array([t == target for t in shot_group(network_01, "ZY113", state)[1].target])
+    moved = state.copy()
+    moved[network_01.layout.at[f"glass {target}"]] += rest
+    place = network_01.places[target]
+    places = {**network_01.places, target: dataclasses.replace(place, constant=place.constant + rest)}
+    plain = shot_group(network_01, "ZY113", state)[0]
+    by_sheet = shot_group(dataclasses.replace(network_01, places=places), "ZY113", state)[0].predict(state)[0]
+    by_parameter = plain.predict(moved)[0]
+    np.testing.assert_allclose(by_parameter, by_sheet, rtol=0, atol=1e-12)
+    # eq. 5.19: a constant nearer to zero is less glass, less optical path
+    np.testing.assert_allclose((by_parameter - plain.predict(state)[0])[mine], -rest, rtol=1e-3)
+    assert np.array_equal(by_parameter[~mine], plain.predict(state)[0][~mine])

@@ -15,6 +15,7 @@ UNHELD = "observations at one point contradict each other, and without them it i
 DECISIVE = 9.0  # difference of sums of squares between two explanations, below which neither is believed
 GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
 UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
+CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -100,7 +101,7 @@ def _checked(fit: Fit) -> np.ndarray:
     Without correlations this is redundancy > UNCHECKED. With them a redundancy number may be zero or negative although
     a neighbour that shares its errors checks the observation well.
     """
-    return ~fit.active | (fit.detectable_error < NONCENTRALITY / UNCHECKED**0.5 * fit.sigma)
+    return ~fit.active | (fit.detectable_error < CHECKED * fit.sigma)
 
 
 def _without_undecided(

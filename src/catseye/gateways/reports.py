@@ -252,7 +252,11 @@ def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
 def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
     *stations, (profile, (value, u)) = reduction.coordinates.air.items()
     rows = [(f"{name}: thermometer reads too high by", f"{v:+.3f} °C", f"{s:.3f} °C") for name, (v, s) in stations]
-    label, unit = ("gradient with height", "°C/m") if profile == "gradient" else ("bend half-way up the profile", "°C")
+    label, unit = (
+        ("gradient with height", "°C/m")
+        if profile == "gradient"
+        else ("half-way between the stations warmer than on their line by", "°C")
+    )
     rows.append((label, f"{value:+.4f} {unit}", f"{u:.4f} {unit}"))
     return section(
         "air",

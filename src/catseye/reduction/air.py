@@ -19,7 +19,8 @@ class PathAir:
     """Group refractivity averaged along m paths, and its derivatives by the q parameters of the air.
 
     refractivity   (m,) n_g - 1
-    slopes         (m, q) per °C of a thermometer's offset (it reads too high), per °C of bend, or per °C/m of gradient
+    slopes         (m, q) per °C of a thermometer's offset (it reads too high), per °C of bend (warmer
+                   half-way between the stations than on their line), or per °C/m of gradient
     """
 
     refractivity: np.ndarray
@@ -127,7 +128,7 @@ class AirField:
         line = np.linalg.pinv(design)
         share = line[0] + (z - middle)[..., None] * line[1]
         low, high = self.heights.min(), self.heights.max()
-        return share, 4.0 * (z - low) * (z - high) / span**2
+        return share, 4.0 * (z - low) * (high - z) / span**2
 
 
 def _local_line(when: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.settings import Settings
+from catseye.signal.cycles import fraction
 from catseye.signal.drift import drift_at, reference_surprise
 from catseye.signal.leakage import subtract_leakage
 from catseye.signal.phase import detect
@@ -47,7 +48,7 @@ class Phases:
     @property
     def phase(self) -> np.ndarray:
         """rad in [0, 2 pi)."""
-        return np.mod(np.angle(self.phasor), 2 * np.pi)
+        return fraction(np.angle(self.phasor), 0.0)
 
     @property
     def u_phase(self) -> np.ndarray:

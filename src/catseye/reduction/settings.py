@@ -14,7 +14,7 @@ class Settings:
     critical                |w| above which a shot is rejected; 3.5 rejects one good shot in 2000
     smallest_return         amplitude over its own standard uncertainty below which a shot counts as blocked
     u_thermometer_c         °C, offset of a station thermometer that was not compared with a standard
-    u_profile_c             °C, bend of the temperature profile half-way between the stations' heights against a line
+    u_profile_c             °C, bend: how much warmer than on their line it is half-way between the stations' heights
     u_gradient_c_per_m      °C/m, where there is one station height only and no gradient was measured
     u_normal                rad, each direction, of the normal of a single prism
     u_plate_normal          rad, each direction, of the plate and the axis of a triplet
