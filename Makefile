@@ -17,8 +17,8 @@ $(STAMP): pyproject.toml constraints.txt
 setup: $(STAMP)  ## make .venv and install catseye in it
 
 check: setup  ## style, types, layers
-	$(BIN)/ruff check src tests bench studies
-	$(BIN)/ruff format --check src tests bench studies
+	$(BIN)/ruff check src tests benchmarks studies
+	$(BIN)/ruff format --check src tests benchmarks studies
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
@@ -32,7 +32,7 @@ demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a re
 	$(BIN)/catseye demo demo-night-01
 
 bench: setup  ## benchmarks, as ratios in one run
-	$(BIN)/python bench/bench_reduce.py
+	$(BIN)/python benchmarks/bench_reduce.py
 
 release: setup  ## a wheel in dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .

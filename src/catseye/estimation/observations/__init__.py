@@ -18,8 +18,10 @@ class Observations(Protocol):
 
     name         what the group is, for reports
     observed     (m,) values
-    covariance   (m, m) of the observed values, or (m,) variances where they are independent
-    columns      (k,) indices of the parameters that the group depends on
+    covariance   of the observed values: (m,) variances of independent ones; (m, m); or (b, r, r), b blocks of r rows
+                 that follow each other, b r = m
+    columns      indices of the parameters that the group depends on: (k,) shared by all rows, without repeats; or
+                 (m, w), each row its own, where repeats add up and -1 stands for none
     """
 
     @property
@@ -32,5 +34,5 @@ class Observations(Protocol):
     def columns(self) -> np.ndarray: ...
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, k) over `columns` at the parameters x."""
+        """Values (m,) and Jacobian, (m, k) or (m, w) as `columns` is, at the parameters x."""
         ...

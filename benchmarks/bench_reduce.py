@@ -1,6 +1,6 @@
 """What the main job costs, beside what a user would pick instead; ratios of one run, medians of rounds.
 
-python bench/bench_reduce.py
+python benchmarks/bench_reduce.py
 """
 
 import statistics
