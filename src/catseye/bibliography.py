@@ -132,4 +132,19 @@ SOURCES: dict[str, Source] = {
         locator="JCGM 100:2008",
         used="eq. 10: combined standard uncertainty of uncorrelated inputs",
     ),
+    "BAARDA73": Source(
+        title="W. Baarda, S-transformations and criterion matrices, Netherlands Geodetic Commission, 1973",
+        locator="Publications on Geodesy, New Series 5 (1), Delft, second edition 1981",
+        used="the transformation of coordinates and covariance from one datum to another",
+    ),
+    "DAVIS05": Source(
+        title="T. A. Davis, Algorithm 849: a concise sparse Cholesky factorization package, ACM TOMS 31, 2005",
+        locator="doi:10.1145/1114268.1114277",
+        used="the symbolic and the numeric factorisation L D L', row by row",
+    ),
+    "TAKAHASHI73": Source(
+        title="K. Takahashi, J. Fagan, M. Chen, Formation of a sparse bus impedance matrix, 1973",
+        locator="8th PICA Conference Proceedings, Minneapolis, pages 63-69",
+        used="the recurrence for the entries of an inverse on the pattern of its factor",
+    ),
 }

@@ -9,6 +9,7 @@ from scipy.special import chdtri
 
 from catseye.estimation.adjustment import Solution, adjust
 from catseye.estimation.observations import Observations
+from catseye.estimation.rows import variances
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
@@ -128,7 +129,7 @@ def at_point(
         if np.isin(columns, group.columns).any():
             values, jacobian = group.predict(solution.x)
             slope, _, alone = _slopes(columns, group, jacobian)
-            sigma = np.sqrt(np.diag(group.covariance) if group.covariance.ndim == 2 else group.covariance)
+            sigma = np.sqrt(variances(group))
             residual = group.observed - values
             prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
     (residual, slopes), (prior_residual, prior_slopes) = (
@@ -141,10 +142,13 @@ def _slopes(
     columns: np.ndarray, group: Observations, jacobian: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives (m, 3) of a group by a point, which rows depend on it, and which on nothing else."""
-    here = group.columns[:, None] == columns  # in any order, and perhaps not all three
-    slope = jacobian @ here
+    here = group.columns[..., None] == columns  # in any order, and perhaps not all three
+    if here.ndim == 2:
+        slope, others = jacobian @ here, jacobian[:, ~here.any(axis=1)]
+    else:
+        slope, others = np.einsum("mw,mwa->ma", jacobian, here), np.where(here.any(axis=2), 0.0, jacobian)
     touching = np.any(slope != 0.0, axis=1)
-    return slope, touching, touching & ~np.any(jacobian[:, ~here.any(axis=1)] != 0.0, axis=1)
+    return slope, touching, touching & ~np.any(others != 0.0, axis=1)
 
 
 def touched(
@@ -157,6 +161,12 @@ def touched(
     columns = {
         int(c)
         for group, jacobian, rows in zip(groups, jacobians, chosen, strict=True)
-        for c in group.columns[np.any(jacobian[rows] != 0.0, axis=0)]
+        for c in _columns_of(group, jacobian, rows)
     }
     return [p for p in points if columns.intersection(p.tolist())]
+
+
+def _columns_of(group: Observations, jacobian: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Columns that some rows of a group depend on."""
+    used = jacobian[rows] != 0.0
+    return group.columns[np.any(used, axis=0)] if group.columns.ndim == 1 else group.columns[rows][used]

@@ -70,7 +70,7 @@ def adjust_robustly(
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
     for _ in range(rounds):
         solution = adjust(x, groups, free=free, active=active, names=names)
-        if not np.isfinite(solution.covariance).all():
+        if not solution.solved:
             if careful is None:
                 return solution
             active, careful = careful, None
@@ -145,7 +145,7 @@ def _without_undecided(
     if all(np.array_equal(a, f.active) for a, f in zip(active, solution.fits, strict=True)):
         return solution
     final = adjust(solution.x, groups, free=free, active=active, names=names)
-    if not np.isfinite(final.covariance).all():
+    if not final.solved:
         return replace(final, status=UNHELD.format(status=final.status))
     return final
 
@@ -161,7 +161,7 @@ def _reweighted(
     extra = [np.zeros(len(g.observed)) for g in groups]
     solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
     for _ in range(8):
-        if not np.isfinite(solution.covariance).all():
+        if not solution.solved:
             break
         for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
             extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
@@ -180,7 +180,7 @@ def _searched(
 ) -> list[np.ndarray]:
     """The selection, with the smallest conflict left out at each point that a suspect depends on."""
     active = [a.copy() for a in active]
-    if not np.isfinite(solution.covariance).all():
+    if not solution.solved:
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     jacobians = [g.predict(solution.x)[1] for g in groups]
     for columns in touched(points, groups, jacobians, suspects) if suspects else ():

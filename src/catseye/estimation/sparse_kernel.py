@@ -1,0 +1,141 @@
+"""Sparse L D L' and the entries of the inverse on its pattern, compiled. Imported only when a large problem needs it.
+
+All arrays are of the permuted upper triangle in compressed columns (ap, ai, ax), as [DAVIS05] has them; the plain form
+that these are tested against is numpy's dense inverse.
+"""
+
+import numpy as np
+from numba import njit
+
+SMALLEST_PIVOT = 1e-14  # of a matrix of unit diagonal: what falls below is raised to it, so that null vectors appear
+
+
+@njit(cache=True, error_model="numpy")
+def symbolic(n, ap, ai):
+    """Elimination tree (n,) and column pointers (n + 1,) of L. Source: [DAVIS05] ldl_symbolic."""
+    parent, flag, count = np.full(n, -1), np.full(n, -1), np.zeros(n, np.int64)
+    for k in range(n):
+        flag[k] = k
+        for p in range(ap[k], ap[k + 1]):
+            i = ai[p]
+            while i < k and flag[i] != k:
+                if parent[i] == -1:
+                    parent[i] = k
+                count[i] += 1
+                flag[i] = k
+                i = parent[i]
+    pointers = np.zeros(n + 1, np.int64)
+    for k in range(n):
+        pointers[k + 1] = pointers[k] + count[k]
+    return parent, pointers
+
+
+@njit(cache=True, error_model="numpy")
+def numeric(n, ap, ai, ax, parent, lp):
+    """L (rows and values, unit diagonal left out), D (n,) and if a pivot was raised. [DAVIS05] ldl_numeric."""
+    li, lx, d = np.empty(lp[n], np.int64), np.empty(lp[n]), np.empty(n)
+    y, pattern, flag, filled = np.zeros(n), np.empty(n, np.int64), np.full(n, -1), np.zeros(n, np.int64)
+    raised = False
+    for k in range(n):
+        top, flag[k] = n, k
+        for p in range(ap[k], ap[k + 1]):
+            i = ai[p]
+            y[i] += ax[p]
+            length = 0
+            while flag[i] != k:
+                pattern[length] = i
+                length += 1
+                flag[i] = k
+                i = parent[i]
+            while length > 0:
+                top -= 1
+                length -= 1
+                pattern[top] = pattern[length]
+        d[k] = y[k]
+        y[k] = 0.0
+        for q in range(top, n):
+            i = pattern[q]
+            yi, y[i] = y[i], 0.0
+            end = lp[i] + filled[i]
+            for p in range(lp[i], end):
+                y[li[p]] -= lx[p] * yi
+            lki = yi / d[i]
+            d[k] -= lki * yi
+            li[end], lx[end] = k, lki
+            filled[i] += 1
+        if not d[k] > SMALLEST_PIVOT:
+            d[k], raised = SMALLEST_PIVOT, True
+    return li, lx, d, raised
+
+
+@njit(cache=True, error_model="numpy")
+def solve(lp, li, lx, d, b):
+    """b (n, k) becomes (L D L')^-1 b."""
+    n, k = b.shape
+    for j in range(n):
+        for p in range(lp[j], lp[j + 1]):
+            for c in range(k):
+                b[li[p], c] -= lx[p] * b[j, c]
+    for j in range(n - 1, -1, -1):
+        for c in range(k):
+            b[j, c] /= d[j]
+        for p in range(lp[j], lp[j + 1]):
+            for c in range(k):
+                b[j, c] -= lx[p] * b[li[p], c]
+
+
+@njit(cache=True, error_model="numpy")
+def selected_inverse(lp, li, lx, d):
+    """The inverse on the pattern of L: values as `lx` is laid out, and the diagonal. Source: [TAKAHASHI73]."""
+    n = len(d)
+    z, diagonal = np.zeros(len(lx)), np.zeros(n)
+    own, total, mark = np.zeros(n), np.zeros(n), np.full(n, -1)
+    for j in range(n - 1, -1, -1):
+        for p in range(lp[j], lp[j + 1]):
+            mark[li[p]], own[li[p]], total[li[p]] = j, lx[p], 0.0
+        for p in range(lp[j], lp[j + 1]):
+            k = li[p]
+            total[k] += diagonal[k] * own[k]
+            for q in range(lp[k], lp[k + 1]):
+                i = li[q]
+                if mark[i] == j:
+                    total[i] += z[q] * own[k]
+                    total[k] += z[q] * own[i]
+        diagonal[j] = 1.0 / d[j]
+        for p in range(lp[j], lp[j + 1]):
+            z[p] = -total[li[p]]
+            diagonal[j] -= lx[p] * z[p]
+    return z, diagonal
+
+
+@njit(cache=True, error_model="numpy")
+def entry(lp, li, z, diagonal, i, j):
+    """One entry of the selected inverse; nan off the pattern."""
+    if i == j:
+        return diagonal[i]
+    row, column = max(i, j), min(i, j)
+    low, high = lp[column], lp[column + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if li[middle] < row:
+            low = middle + 1
+        else:
+            high = middle
+    if low < lp[column + 1] and li[low] == row:
+        return z[low]
+    return np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def forms(lp, li, z, diagonal, columns, a, b):
+    """sum over i, j of a_i Q_ij b_j for each row of columns, a, b (m, w); -1 among the columns is skipped."""
+    m, w = columns.shape
+    result = np.zeros(m)
+    for row in range(m):
+        for p in range(w):
+            if columns[row, p] < 0 or a[row, p] == 0.0:
+                continue
+            for q in range(w):
+                if columns[row, q] >= 0 and b[row, q] != 0.0:
+                    result[row] += a[row, p] * b[row, q] * entry(lp, li, z, diagonal, columns[row, p], columns[row, q])
+    return result
