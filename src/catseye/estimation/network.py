@@ -7,10 +7,13 @@ The parameters of the whole network are one vector: point i at 3 i, 3 i + 1, 3 i
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from catseye.errors import EstimationError
 from catseye.estimation.adjustment import Fit
+from catseye.estimation.covariance import Covariance
 from catseye.estimation.observations import Observations
 
 
@@ -88,6 +91,7 @@ class NetworkSolution:
     degrees_of_freedom   observations less parameters plus the datum's conditions
     datum                in words, how the free directions are held
     approximate          names of the points whose approximate coordinates were found, not given
+    q                    covariance of the whole parameter vector, for what is not above
     """
 
     network: Network
@@ -102,7 +106,22 @@ class NetworkSolution:
     degrees_of_freedom: float
     datum: str
     approximate: tuple[str, ...] = ()
+    q: Covariance = field(kw_only=True)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Row of each point by its name."""
+        return {name: i for i, name in enumerate(self.network.points.names)}
 
     def block(self, names: Sequence[str]) -> np.ndarray:
         """Joint covariance (3k, 3k) of some points, m^2, in the order given; raises EstimationError for a stranger."""
-        raise NotImplementedError
+        strange = [name for name in names if name not in self.index]
+        if strange:
+            raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+        first = 3 * np.array([self.index[name] for name in names], dtype=int)
+        return self.q.within((first[:, None] + np.arange(3)).ravel())
+
+
+def points_of(group: Observations) -> tuple[np.ndarray, ...]:
+    """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
+    return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))

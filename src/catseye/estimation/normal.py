@@ -212,7 +212,7 @@ def _ordering(normal, moving: np.ndarray, size: int) -> tuple[np.ndarray, np.nda
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
-    pattern = csc_array(normal)
+    pattern = csc_array(normal, copy=True)  # splu sorts indices in place
     pattern.data = np.where(pattern.indices == np.repeat(np.arange(len(moving)), np.diff(pattern.indptr)), 1.0, 1e-6)
     order = np.argsort(
         splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c

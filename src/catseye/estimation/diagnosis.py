@@ -1,0 +1,147 @@
+"""What is wrong with a network, in one line that names it: pieces, points that float, observations that contradict."""
+
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.special import chdtrc
+
+from catseye.estimation.adjustment import Solution
+from catseye.estimation.network import Network, NetworkSolution, points_of
+
+PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
+or hold each"
+FLOATS = "rank deficient: {points} floats; {advice}"
+CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
+{degrees:.0f} degrees of freedom, worst {worst}{guess}"
+LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
+GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
+EXCHANGE = 0.2  # of its distance to another point's given place, within which a point is taken to be there
+
+
+def unconnected(network: Network) -> str | None:
+    """The status of a network in pieces; None where it is in one, or each piece is held by itself."""
+    count = len(network.points.names)
+    pairs = []
+    for group in network.groups:
+        ends = points_of(group)
+        block = getattr(group, "together", None)  # kinds that tie all their points, such as a rigid body
+        if block is not None:
+            at = np.unique(np.concatenate(ends))
+            at = at[at >= 0]
+            pairs += [np.stack([at[:-1], at[1:]])] if len(at) > 1 else []
+        for a, b in combinations(ends, 2):
+            both = (a >= 0) & (b >= 0)
+            pairs.append(np.stack([a[both], b[both]]))
+    joined = np.concatenate([np.zeros((2, 0), dtype=int), *pairs], axis=1)
+    graph = coo_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    if number < 2:
+        return None
+    members = [[network.points.names[i] for i in np.flatnonzero(label == k)] for k in range(number)]
+    members.sort(key=len)
+    words = [", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "") for names in members]
+    text = " | ".join(words[:4]) + (" | ..." if number > 4 else "")
+    return PIECES.format(count=number, pieces=text)
+
+
+def floating_text(network: Network, solution: Solution) -> str:
+    """The status of a solution with directions that nothing holds: which points float, why, and what would hold them."""
+    names, count = network.points.names, len(network.points.names)
+    directions = solution.floating
+    part = np.sum(directions**2, axis=0)
+    own = part[: 3 * count].reshape(-1, 3).sum(axis=1)
+    worst = [int(i) for i in np.argsort(-own, kind="stable") if own[i] > 1e-2 * max(part.max(), 1e-300)]
+    others = [p.name for k, p in enumerate(network.parameters) if part[3 * count + k] > 1e-2 * part.max()]
+    if not worst:
+        return FLOATS.format(points=", ".join(others[:4]), advice="observe it, hold it, or give it a prior")
+    seen = _observations_at(network, worst[:4])
+    words = [
+        f"{names[i]} ({number} observations)" if number != 1 else f"{names[i]} (1 observation)"
+        for i, number in zip(worst[:4], seen, strict=True)
+    ]
+    text = ", ".join(words) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
+    if others:
+        text += f", with {', '.join(others[:3])},"
+    return FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
+
+
+def _observations_at(network: Network, points: list[int]) -> list[int]:
+    return [
+        sum(int(np.any([end == i for end in points_of(g)], axis=0).sum()) for g in network.groups if points_of(g))
+        for i in points
+    ]
+
+
+def _advice(network: Network, solution: Solution, point: int) -> str:
+    """The range to another point, or the coordinate, that would hold a floating point best."""
+    count = len(network.points.names)
+    x = solution.x[: 3 * count].reshape(-1, 3)
+    raw = solution.floating[:, : 3 * count].reshape(-1, count, 3)
+    direction = raw[np.argmax(np.sum(raw[:, point] ** 2, axis=1))]
+    size = float(np.linalg.norm(direction[point])) or 1.0
+    line = x - x[point]
+    distance = np.linalg.norm(line, axis=1)
+    with np.errstate(invalid="ignore"):
+        gain = np.abs(np.sum(line * (direction - direction[point]), axis=1)) / distance / size
+    gain = np.where(np.isfinite(gain), gain, 0.0)
+    best = int(np.argmax(gain))
+    axis = int(np.argmax(np.abs(direction[point])))
+    towards = direction[point] / size
+    text = f"it can move along ({towards[0]:+.2f}, {towards[1]:+.2f}, {towards[2]:+.2f})"
+    if gain[best] > 0.1:
+        return f"{text}: a range to {network.points.names[best]} would hold it, or its {network.axis_names[axis]}"
+    return f"{text}: no range within the network would hold it, its {network.axis_names[axis]} or a height would"
+
+
+def contradiction(solution: NetworkSolution) -> str | None:
+    """The status of a solution whose observations contradict each other grossly; None where they do not.
+
+    Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
+    wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are the suspects' business.
+    """
+    factor, degrees = solution.variance_factor, solution.degrees_of_freedom
+    if not degrees > 0.5:
+        return None
+    tests = [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
+    largest = [float(t.max(initial=0.0)) for t in tests]
+    if not (chdtrc(degrees, factor * degrees) < LIKELY and (factor > GROSS_FACTOR or max(largest) > GROSS_TEST)):
+        return None
+    group = int(np.argmax(largest))
+    row = int(np.argmax(tests[group]))
+    fit, network = solution.fits[group], solution.network
+    unit = getattr(network.groups[group], "unit", "m")
+    shown = f"{fit.residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
+    worst = f"{label(network, group, row)} (residual {shown})"
+    return CONTRADICTS.format(factor=factor, degrees=degrees, worst=worst, guess=_exchanged(solution))
+
+
+def label(network: Network, group: int, row: int) -> str:
+    """What an observation is called: its kind, its points, and its place in the file."""
+    kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
+    ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
+    where = network.places[group][row] if network.places and network.places[group] else ""
+    return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")
+
+
+def _exchanged(solution: NetworkSolution) -> str:
+    """A guess, in words, that two points were exchanged: adjusted at each other's given place, or the worst fitting."""
+    given, names = solution.network.points.xyz, solution.network.points.names
+    moved = np.linalg.norm(solution.x - given, axis=1)
+    usual = float(np.nanmedian(moved))
+    far = [int(i) for i in np.argsort(-np.nan_to_num(moved))[:40] if moved[i] > 10.0 * usual]
+    for i, j in combinations(far, 2):
+        apart = np.linalg.norm(given[i] - given[j])
+        if max(np.linalg.norm(solution.x[i] - given[j]), np.linalg.norm(solution.x[j] - given[i])) < EXCHANGE * apart:
+            return f"; {names[i]} and {names[j]} lie at each other's given places: exchanged?"
+    total, number = np.zeros(len(names)), np.zeros(len(names))
+    for group, fit in zip(solution.network.groups, solution.fits, strict=True):
+        for end in points_of(group):
+            used = (end >= 0) & fit.active
+            total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, len(names))
+            number += np.bincount(end[used], minlength=len(names))
+    share = total / np.maximum(number, 1.0)
+    order = np.argsort(-share)
+    stands = [names[i] for i in order[:2] if share[i] > 4.0 * np.median(share[number > 0])]
+    return f"; most of it at {' and '.join(stands)}" if stands else ""
