@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from catseye.estimation.adjustment import adjust
+from catseye.estimation.rows import full_jacobian
 from catseye.records.campaign import read_campaign
 from catseye.reduction.coordinates import adjust_coordinates
 from catseye.reduction.epoch import reduce_epoch
@@ -89,8 +90,7 @@ def adjustment() -> None:
         x[free] = y
         rows = []
         for group, factor in zip(groups, factors, strict=True):
-            full = np.zeros((len(group.observed), len(x0)))
-            full[:, group.columns] = -group.predict(x)[1]
+            full = -full_jacobian(group, x)
             rows.append(np.linalg.solve(factor, full) if factor.ndim == 2 else full / factor[:, None])
         return np.concatenate(rows)[:, free]
 

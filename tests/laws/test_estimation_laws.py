@@ -43,8 +43,10 @@ def straight(seed):
     """The network's slopes held where they are: what is exact only without curvature can be tested as exact."""
     x0, (ranges, survey) = network(seed)
     values, slopes = ranges.predict(x0)
-    reduced = ranges.observed - values + slopes @ x0[ranges.columns]
-    return x0, [Linear("ranges", reduced, ranges.covariance, ranges.columns, slopes), survey]
+    matrix = np.zeros((len(values), len(x0)))
+    np.put_along_axis(matrix, ranges.columns, slopes, axis=1)
+    reduced = ranges.observed - values + matrix @ x0
+    return x0, [Linear("ranges", reduced, ranges.covariance, np.arange(len(x0)), matrix), survey]
 
 
 def sigmas(solution):

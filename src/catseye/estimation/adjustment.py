@@ -232,14 +232,8 @@ def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
     residual = group.observed - values
     variance = variances(group)
     v = np.where(on, residual, 0.0)
-    fit = Fit(
-        group.name,
-        on,
-        residual,
-        np.sqrt(variance),
-        *(np.zeros(m) for _ in range(4)),
-        float(np.sum(rows.whiten(v) ** 2)),
-    )
+    empty = [np.zeros(m) for _ in range(4)]
+    fit = Fit(group.name, on, residual, np.sqrt(variance), *empty, pvv=float(np.sum(rows.whiten(v) ** 2)))  # type: ignore[arg-type, call-arg]
     if not tests:
         return fit
     wide = rows.spread(jacobian)

@@ -54,11 +54,19 @@ class Floating:
         kinds = self.kinds if which is None else self.kinds @ which
         if not kinds.size:
             return "nothing"
-        rank = kinds.shape[1]
-        whole = np.linalg.svd(kinds, full_matrices=False)[0][:, :rank]
-        share = np.sum(whole**2, axis=1)
-        named = [MOTIONS[i] for i in np.argsort(-share, kind="stable")[:rank]]
-        return ", ".join(sorted(named, key=MOTIONS.index))
+        _, singular, turned = np.linalg.svd(kinds[3:])
+        turning = int(np.sum(singular > 1e-6 * np.linalg.norm(kinds)))
+        names = [*_largest(kinds[:3] @ turned[turning:].T, 0), *_largest(kinds[3:] @ turned[:turning].T, 3)]
+        return ", ".join(names)
+
+
+def _largest(kinds: np.ndarray, first: int) -> list[str]:
+    """As many motions as kinds (k, d) has columns: those that have most part in the space they span."""
+    count = kinds.shape[1]
+    if not count:
+        return []
+    share = np.sum(np.linalg.svd(kinds, full_matrices=False)[0] ** 2, axis=1)
+    return [MOTIONS[first + i] for i in sorted(np.argsort(-share, kind="stable")[:count])]
 
 
 def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free: np.ndarray) -> Floating:
@@ -86,7 +94,7 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     basis = np.zeros((n, k + len(others)))
     basis[:coordinates, :k] = h @ allowed
     basis[others, k + np.arange(len(others))] = 1.0
-    weighted, triangle = np.linalg.qr(np.sqrt(norms)[:, None] * basis)
+    triangle = np.linalg.qr(np.sqrt(norms)[:, None] * basis, mode="r")
     back = np.linalg.inv(triangle)
     image = np.concatenate([np.einsum("mw,mwd->md", j, basis[at]) for _, at, j in linear]) @ back
     _, singular, turned = np.linalg.svd(np.linalg.qr(image, mode="r"), full_matrices=True)

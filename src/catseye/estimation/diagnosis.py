@@ -1,5 +1,7 @@
 """What is wrong with a network, in one line that names it: pieces, points that float, observations that contradict."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -17,7 +19,8 @@ CONTRADICTS = "converged, but the observations contradict each other: variance f
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
 LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
 GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
-EXCHANGE = 0.2  # of its distance to another point's given place, within which a point is taken to be there
+EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
+EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
 
 
 def unconnected(network: Network) -> str | None:
@@ -47,7 +50,7 @@ def unconnected(network: Network) -> str | None:
 
 
 def floating_text(network: Network, solution: Solution) -> str:
-    """The status of a solution with directions that nothing holds: which points float, why, and what would hold them."""
+    """The status of a solution in which something floats: which points, why, and what would hold them."""
     names, count = network.points.names, len(network.points.names)
     directions = solution.floating
     part = np.sum(directions**2, axis=0)
@@ -95,8 +98,11 @@ def _advice(network: Network, solution: Solution, point: int) -> str:
     return f"{text}: no range within the network would hold it, its {network.axis_names[axis]} or a height would"
 
 
-def contradiction(solution: NetworkSolution) -> str | None:
+def contradiction(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str | None:
     """The status of a solution whose observations contradict each other grossly; None where they do not.
+
+    solution   converged
+    solve      how to try the network with two points exchanged
 
     Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
     wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are the suspects' business.
@@ -114,7 +120,7 @@ def contradiction(solution: NetworkSolution) -> str | None:
     unit = getattr(network.groups[group], "unit", "m")
     shown = f"{fit.residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
     worst = f"{label(network, group, row)} (residual {shown})"
-    return CONTRADICTS.format(factor=factor, degrees=degrees, worst=worst, guess=_exchanged(solution))
+    return CONTRADICTS.format(factor=factor, degrees=degrees, worst=worst, guess=_guess(solution, solve))
 
 
 def label(network: Network, group: int, row: int) -> str:
@@ -125,23 +131,27 @@ def label(network: Network, group: int, row: int) -> str:
     return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")
 
 
-def _exchanged(solution: NetworkSolution) -> str:
-    """A guess, in words, that two points were exchanged: adjusted at each other's given place, or the worst fitting."""
-    given, names = solution.network.points.xyz, solution.network.points.names
-    moved = np.linalg.norm(solution.x - given, axis=1)
-    usual = float(np.nanmedian(moved))
-    far = [int(i) for i in np.argsort(-np.nan_to_num(moved))[:40] if moved[i] > 10.0 * usual]
-    for i, j in combinations(far, 2):
-        apart = np.linalg.norm(given[i] - given[j])
-        if max(np.linalg.norm(solution.x[i] - given[j]), np.linalg.norm(solution.x[j] - given[i])) < EXCHANGE * apart:
-            return f"; {names[i]} and {names[j]} lie at each other's given places: exchanged?"
+def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
+    """A guess, in words, at the cause: two points exchanged, or where most of the contradiction is."""
+    network, names = solution.network, solution.network.points.names
     total, number = np.zeros(len(names)), np.zeros(len(names))
-    for group, fit in zip(solution.network.groups, solution.fits, strict=True):
+    for group, fit in zip(network.groups, solution.fits, strict=True):
         for end in points_of(group):
             used = (end >= 0) & fit.active
             total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, len(names))
             number += np.bincount(end[used], minlength=len(names))
+    if solution.variance_factor > EXCHANGE_FROM:
+        likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
+        trials = []
+        for i, j in combinations(sorted(int(k) for k in likely), 2):
+            xyz, order = network.points.xyz.copy(), [j, i]
+            xyz[[i, j]] = xyz[order]
+            trial = solve(replace(network, points=replace(network.points, xyz=xyz)))
+            if trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
+                trials.append((float(np.nansum((trial.x - xyz) ** 2)), i, j, trial.variance_factor))
+        if trials:  # a symmetric network fits after other exchanges too, but far from the given coordinates
+            _, i, j, factor = min(trials)
+            return f"; with {names[i]} and {names[j]} exchanged it falls to {factor:.3g}"
     share = total / np.maximum(number, 1.0)
-    order = np.argsort(-share)
-    stands = [names[i] for i in order[:2] if share[i] > 4.0 * np.median(share[number > 0])]
+    stands = [names[i] for i in np.argsort(-share)[:2] if share[i] > 4.0 * np.median(share[number > 0])]
     return f"; most of it at {' and '.join(stands)}" if stands else ""

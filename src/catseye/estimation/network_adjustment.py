@@ -17,7 +17,7 @@ from catseye.estimation.datum import (
     transformed,
 )
 from catseye.estimation.diagnosis import contradiction, floating_text, unconnected
-from catseye.estimation.network import Network, NetworkSolution, Points
+from catseye.estimation.network import Network, NetworkSolution
 from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.rows import Rows
 
@@ -95,6 +95,14 @@ def adjust_network(
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
     sparse = None if engine is None else engine == "sparse"
     return problem.solve(active, inflation, iterations, tests, sparse)
+
+
+def _factor_alone(network: Network) -> NetworkSolution:
+    """A quick trial: coordinates and variance factor, no tests."""
+    trial = adjust_network(network, iterations=15, tests=False)
+    degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
+    cost = sum(f.pvv for f in trial.fits)
+    return replace(trial, variance_factor=cost / max(1.0, degrees))
 
 
 def _listed(reasons: dict[str, str], most: int = 4) -> str:
@@ -213,7 +221,7 @@ class _Problem:
             return self.unanswered(status, solution.x)
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         if answer.status == CONVERGED and tests:
-            answer = replace(answer, status=contradiction(answer) or CONVERGED)
+            answer = replace(answer, status=contradiction(answer, _factor_alone) or CONVERGED)
         return answer
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
@@ -226,7 +234,7 @@ class _Problem:
         return "; ".join(words) or "held by observations and priors"
 
     def answer(self, solution: Solution, q: Covariance, datum: str) -> NetworkSolution:
-        points, count = self.network.points, len(self.network.points.names)
+        count = len(self.network.points.names)
         own = solution.fits[: len(self.network.groups)]
         factor, degrees = solution.variance_factor()
         return NetworkSolution(

@@ -7,9 +7,11 @@ so that rounding (1e-16 |A|)^2 stays far below the limit.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_solve, lapack
+from scipy.sparse import csc_array, csr_array
 
 from catseye.estimation.covariance import Covariance, Dense, Sparse
 from catseye.estimation.rows import Rows
@@ -35,7 +37,7 @@ class NormalEquations:
     size: int
     sparse: bool
     _jacobians: list[np.ndarray] = field(default_factory=list)
-    _factor: tuple[np.ndarray, ...] = ()
+    _factor: tuple[Any, ...] = ()
     _scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
     _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _order: tuple[np.ndarray, ...] = ()
@@ -49,7 +51,8 @@ class NormalEquations:
 
     def step(self, x: np.ndarray) -> tuple[np.ndarray, float, float]:
         """The Gauss-Newton step (n,) from x, its size in standard deviations, and the cost at x (nan: undefined)."""
-        residuals, self._jacobians = zip(*(r.linear(x) for r in self.rows), strict=True) if self.rows else ((), ())
+        linear = [r.linear(x) for r in self.rows]
+        residuals, self._jacobians = [v for v, _ in linear], [j for _, j in linear]
         cost = float(sum(v @ v for v in residuals))
         if not (np.isfinite(cost) and all(np.isfinite(j).all() for j in self._jacobians)):
             return np.zeros(self.size), np.nan, np.nan
@@ -146,8 +149,6 @@ class NormalEquations:
                 self._set_floating(weak @ turned[:, none if none.any() else slice(1)])
 
     def _factorise_sparse(self) -> None:
-        from scipy.sparse import csc_array
-
         from catseye.estimation.sparse_kernel import numeric, solve, symbolic
 
         normal = csc_array((self.size, self.size))
@@ -195,10 +196,8 @@ class NormalEquations:
         self._floating[:, self.moving] = directions.T
 
 
-def _gram(r: Rows, j: np.ndarray, size: int):  # type: ignore[no-untyped-def]
+def _gram(r: Rows, j: np.ndarray, size: int) -> csr_array:
     """A' A (n, n), sparse, of rows with columns of their own."""
-    from scipy.sparse import csr_array
-
     at = r.row_columns()
     m = len(at)
     used = (at >= 0).ravel()
@@ -207,9 +206,8 @@ def _gram(r: Rows, j: np.ndarray, size: int):  # type: ignore[no-untyped-def]
     return a.T @ a
 
 
-def _ordering(normal, moving: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
+def _ordering(normal: csc_array, moving: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Minimum degree order of the moving parameters, and the place (n,) of every parameter in it (-1: held)."""
-    from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
     pattern = csc_array(normal, copy=True)  # splu sorts indices in place

@@ -26,6 +26,13 @@ def dense_jacobian(jacobian: np.ndarray, position: np.ndarray, width: int) -> np
     return np.bincount(flat, jacobian.ravel(), m * (width + 1)).reshape(m, width + 1)[:, :width]
 
 
+def full_jacobian(group: Observations, x: np.ndarray) -> np.ndarray:
+    """(m, n) derivatives of a group by all n parameters, whichever form its columns have."""
+    jacobian = group.predict(x)[1]
+    columns = np.broadcast_to(group.columns, jacobian.shape)
+    return dense_jacobian(jacobian, np.where(columns < 0, len(x), columns), len(x))
+
+
 def variances(group: Observations) -> np.ndarray:
     """(m,) variances of the observed values."""
     c = group.covariance

@@ -1,20 +1,25 @@
 """Observations that are linear in the parameters: priors, coordinates, vectors between points."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from catseye.estimation.observations.kind import Kind
 
-@dataclass(frozen=True)
-class Linear:
+
+@dataclass(frozen=True, eq=False)
+class Linear(Kind):
     """observed = matrix @ x[columns] + error.
 
     name         what the group is, for reports
     observed     (m,)
-    covariance   (m, m), positive definite; or (m,) variances of independent ones
+    covariance   of the observed values, see `Observations`
     columns      (k,) indices of parameters, without repeats
     matrix       (m, k)
     """
+
+    kind: ClassVar[str] = "linear"
 
     name: str
     observed: np.ndarray

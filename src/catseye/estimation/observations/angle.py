@@ -1,0 +1,59 @@
+"""Horizontal angles at a point, clockwise from a backsight to a foresight."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.sight import bearing, nearest_turn, sight, triples
+
+
+@dataclass(frozen=True, eq=False)
+class Angles(Kind):
+    """observed = azimuth of foresight - azimuth of backsight + error, both from the point `at`.
+
+    name             what the group is, for reports
+    observed         (m,) rad, clockwise seen from above, on any turn
+    covariance       of the observed values, see `Observations`
+    at               (m,) column of the x of the point where the instrument stands
+    backsight        (m,) the same of the point sighted first
+    foresight        (m,) the same of the point sighted second
+    backsight_shift  (m, 3) or (3,) m, added to backsight minus at, or None; only eccentricities matter
+    foresight_shift  the same for the foresight
+    """
+
+    kind: ClassVar[str] = "angle"
+    unit: ClassVar[str] = "rad"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    at: np.ndarray
+    backsight: np.ndarray
+    foresight: np.ndarray
+    backsight_shift: np.ndarray | None = None
+    foresight_shift: np.ndarray | None = None
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """(m, 9): at, backsight, foresight."""
+        return beside(self.name, len(self.observed), *map(triples, (self.at, self.backsight, self.foresight)))
+
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]:
+        """At, backsight, foresight."""
+        return self.at, self.backsight, self.foresight
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,), on the turn nearest to the observed, and Jacobian (m, 9); nan for a vertical sight.
+
+        >>> a = Angles("a", np.ones(1), np.ones(1), np.array([0]), np.array([3]), np.array([6]))
+        >>> a.predict(np.array([0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 2.0, 0.0, 0.0]))[0] == np.pi / 2
+        array([ True])
+        """
+        back, by_back = bearing(sight(x, self.at, self.backsight, self.backsight_shift))
+        fore, by_fore = bearing(sight(x, self.at, self.foresight, self.foresight_shift))
+        jacobian = np.concatenate([by_back - by_fore, -by_back, by_fore], axis=1)
+        return nearest_turn(fore - back, self.observed), jacobian

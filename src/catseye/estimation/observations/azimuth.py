@@ -1,0 +1,52 @@
+"""Azimuths: horizontal angles from +y, clockwise to +x."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.sight import bearing, both, nearest_turn, sight, triples
+
+
+@dataclass(frozen=True, eq=False)
+class Azimuths(Kind):
+    """observed = azimuth of target from origin + error.
+
+    name         what the group is, for reports
+    observed     (m,) rad, on any turn
+    covariance   of the observed values, see `Observations`
+    origin       (m,) column of the x of the point measured from
+    target       (m,) the same of the point measured to
+    shift        (m, 3) or (3,) m, added to target minus origin, or None; only eccentricities matter
+    """
+
+    kind: ClassVar[str] = "azimuth"
+    unit: ClassVar[str] = "rad"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    origin: np.ndarray
+    target: np.ndarray
+    shift: np.ndarray | None = None
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """(m, 6): origin, target."""
+        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target))
+
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]:
+        return self.origin, self.target
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,), on the turn nearest to the observed, and Jacobian (m, 6); nan for a vertical sight.
+
+        >>> a = Azimuths("a", np.full(1, 4.7), np.ones(1), np.array([0]), np.array([3]))
+        >>> a.predict(np.array([0.0, 0.0, 0.0, -7.0, 0.0, 1.0]))[0] == 1.5 * np.pi
+        array([ True])
+        """
+        azimuth, slope = bearing(sight(x, self.origin, self.target, self.shift))
+        return nearest_turn(azimuth, self.observed), both(slope)

@@ -1,0 +1,117 @@
+"""What the solver asks of a group of observations, and what every kind of ours carries beside it for reports."""
+
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from catseye.errors import EstimationError
+
+
+class Observations(Protocol):
+    """A group of m observations whose errors may be correlated with each other, but not with another group's.
+
+    name         what the group is, for reports
+    observed     (m,) values
+    covariance   of the observed values: (m,) variances of independent ones; (m, m); or (b, r, r), b blocks of r rows
+                 that follow each other, b r = m
+    columns      indices of the parameters that the group depends on: (k,) shared by all rows, without repeats; or
+                 (m, w), each row its own, where repeats add up and -1 stands for none
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def observed(self) -> np.ndarray: ...
+    @property
+    def covariance(self) -> np.ndarray: ...
+    @property
+    def columns(self) -> np.ndarray: ...
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian, (m, k) or (m, w) as `columns` is, at the parameters x."""
+        ...
+
+
+class Reported(Observations, Protocol):
+    """A group that can be named row by row: any kind of ours; see `Kind`."""
+
+    kind: ClassVar[str]
+    unit: ClassVar[str]
+
+    @property
+    def units(self) -> np.ndarray: ...
+    @property
+    def kinds(self) -> np.ndarray: ...
+    @property
+    def component(self) -> np.ndarray: ...
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]: ...
+
+
+class Kind:
+    """Base of the kinds: shapes are checked when a group is made, and a report can name each row.
+
+    kind   what one observation is
+    unit   "m" or "rad"; "" where rows differ, see `units`
+    """
+
+    kind: ClassVar[str] = ""
+    unit: ClassVar[str] = ""
+
+    def __post_init__(self: Observations) -> None:
+        m, covariance, columns = len(self.observed), self.covariance, self.columns
+        blocks = covariance.ndim == 3 and covariance.shape[1:] == (covariance.shape[-1],) * 2
+        if covariance.shape not in ((m,), (m, m)) and not (blocks and covariance.shape[0] * covariance.shape[1] == m):
+            raise EstimationError(
+                f"{self.name}: the covariance has shape {covariance.shape}, but there are {m} observations; "
+                f"expected ({m},), ({m}, {m}) or square blocks that fill {m} rows"
+            )
+        if columns.ndim == 2 and len(columns) != m:
+            raise EstimationError(f"{self.name}: {len(columns)} rows of columns for {m} observations; give one each")
+
+    @property
+    def units(self: Reported) -> np.ndarray:
+        """(m,) unit of each observed value."""
+        return np.full(len(self.observed), self.unit)
+
+    @property
+    def kinds(self: Reported) -> np.ndarray:
+        """(m,) kind of each row."""
+        return np.full(len(self.observed), self.kind)
+
+    @property
+    def component(self: Observations) -> np.ndarray:
+        """(m,) "x", "y" or "z" ("1" or "2" across a line) where a row is one component of a vector, else ""."""
+        return np.full(len(self.observed), "")
+
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]:
+        """(m,) columns of the points by role, in the order from, to, third; -1 for none."""
+        return ()
+
+
+def beside(name: str, m: int, *parts: np.ndarray) -> np.ndarray:
+    """Columns (m, w) from parts side by side, each (m, w_i) or (1, w_i) shared by all rows; else EstimationError.
+
+    >>> beside("a", 2, np.array([[0, 1]]), np.array([[5], [6]])).tolist()
+    [[0, 1, 5], [0, 1, 6]]
+    """
+    for part in parts:
+        if part.ndim != 2 or len(part) not in (1, m):
+            raise EstimationError(f"{name}: indices of shape {part.shape} for {m} rows; expected one row each")
+    return np.concatenate([np.broadcast_to(part, (m, part.shape[1])) for part in parts], axis=1)
+
+
+def optional(columns: np.ndarray | None, m: int, width: int = 1) -> np.ndarray:
+    """Columns (m, width), -1 where there are none.
+
+    columns   (m,) or (m, width), or None
+    """
+    if columns is None:
+        return np.full((m, width), -1)
+    return columns.reshape(-1, width)
+
+
+def value(x: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Parameters at columns of any shape; 0 where a column is -1."""
+    return np.where(columns < 0, 0.0, x[columns])

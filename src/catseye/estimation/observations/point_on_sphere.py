@@ -1,0 +1,58 @@
+"""Points on a sphere, or at known distances from it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.sight import both, length, sight, triples
+
+
+@dataclass(frozen=True, eq=False)
+class PointsOnSphere(Kind):
+    """observed = |P - C| - radius - x[radius_column] + error: the distance from the sphere, positive outside.
+
+    name            what the group is, for reports
+    observed        (m,) metres
+    covariance      of the observed values, see `Observations`
+    point           (m,) column of the point's x
+    centre          (m,) column of the x of the centre C, which is a point as any other
+    radius          (m,) or one, the known part of the radius, m
+    radius_column   (m,) column of the unknown part, m, -1 for none; or None
+    """
+
+    kind: ClassVar[str] = "point_on_sphere"
+    unit: ClassVar[str] = "m"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    point: np.ndarray
+    centre: np.ndarray
+    radius: np.ndarray | float = 0.0
+    radius_column: np.ndarray | None = None
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """(m, 7): centre, point, radius."""
+        m = len(self.observed)
+        return beside(self.name, m, triples(self.centre), triples(self.point), optional(self.radius_column, m))
+
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]:
+        """The point, the centre."""
+        return self.point, self.centre
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian (m, 7) at the parameters x; nan for a point at the centre.
+
+        >>> p = PointsOnSphere("p", np.zeros(1), np.ones(1), np.array([0]), np.array([3]), 4.5)
+        >>> p.predict(np.array([3.0, 4.0, 0.0, 0.0, 0.0, 0.0]))[0]
+        array([0.5])
+        """
+        radius = self.columns[:, 6]
+        size, unit = length(sight(x, self.centre, self.point, None))
+        jacobian = np.concatenate([both(unit), np.where(radius < 0, 0.0, -1.0)[:, None]], axis=1)
+        return size - self.radius - value(x, radius), jacobian

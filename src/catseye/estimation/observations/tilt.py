@@ -1,0 +1,69 @@
+"""Tilts: what the axes of an inclinometer fixed in a moving frame read."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.pose import require_rotation, turned_back
+from catseye.estimation.observations.unit_direction import require_direction
+
+
+@dataclass(frozen=True, eq=False)
+class Tilts(Kind):
+    """observed = asin(axis . R' up / |axis|) + x[zero] + error: how far a sensitive axis points above the horizontal.
+
+    R = exp([w]x) R0 is ground from frame, see `pose`. A two-axis inclinometer gives two rows, with axes (1, 0, 0) and
+    (0, 1, 0) where it is mounted square: for a small w the first reads -w_y, the second w_x. A turn about the vertical
+    does not show.
+
+    name         what the group is, for reports
+    observed     (m,) rad, positive when the axis points up
+    covariance   of the observed values, see `Observations`
+    axis         (m, 3) or (3,) directions in the frame, of any length but zero
+    turn         (3,) or (m, 3) columns of w, rad; -1 for a parameter that is zero
+    start        R0, (3, 3) or (m, 3, 3), ground from frame
+    zero         (m,) column of the reading when level, rad, -1 for none; or None
+    """
+
+    kind: ClassVar[str] = "tilt"
+    unit: ClassVar[str] = "rad"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    axis: np.ndarray
+    turn: np.ndarray
+    start: np.ndarray
+    zero: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_rotation(self.name, self.start)
+        require_direction(self.name, "sensitive axis", self.axis)
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """(m, 4): w, zero."""
+        m = len(self.observed)
+        return beside(self.name, m, np.atleast_2d(self.turn), optional(self.zero, m))
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian (m, 4) at the parameters x; nan where an axis is vertical.
+
+        >>> t = Tilts("t", np.zeros(1), np.ones(1), np.array([0.0, 1.0, 0.0]), np.arange(3), np.eye(3))
+        >>> t.predict(np.array([0.25, 0.0, 0.0]))[0]
+        array([0.25])
+        """
+        m = len(self.observed)
+        turn = np.atleast_2d(self.turn)
+        up, _, by_turn = turned_back(np.tile([0.0, 0.0, 1.0], (m, 1)), value(x, turn), self.start)
+        axis = np.broadcast_to(self.axis, (m, 3))
+        sine = np.sum(axis * up, axis=1)
+        cosine = np.linalg.norm(np.cross(axis, up), axis=1)  # not from the sine: it would lose digits near the vertical
+        zero = self.columns[:, 3]
+        slope = np.einsum("mi,mij->mj", axis, by_turn) / np.where(cosine > 0.0, cosine, np.nan)[:, None]
+        jacobian = np.concatenate([np.where(turn < 0, 0.0, slope), np.where(zero < 0, 0.0, 1.0)[:, None]], axis=1)
+        return np.arctan2(sine, np.where(cosine > 0.0, cosine, np.nan)) + value(x, zero), jacobian
