@@ -26,3 +26,40 @@ def reduced_night_01(night_01):
     from catseye.reduction.epoch import reduce_epoch
 
     return reduce_epoch(night_01)
+
+
+@pytest.fixture(scope="session")
+def ranging_network():
+    """A function that makes networks of ranges: stations about targets, all free, stations marked as the datum."""
+    import numpy as np
+
+    from catseye.estimation.network import Network, Points
+    from catseye.estimation.observations import Distances
+
+    def made(seed=0, *, stations=6, targets=12, sigma=5e-5, size=100.0, off=0.01, seen=1.0, flat=False):
+        """The network and its true coordinates (n, 3); `off` is how wrong its given coordinates are, over the size."""
+        rng = np.random.default_rng(seed)
+        angle = 2 * np.pi * np.arange(stations) / stations
+        ring = np.stack([np.cos(angle), np.sin(angle), 0.3 * rng.uniform(-1, 1, stations)], axis=1)
+        cloud = rng.uniform(-0.5, 0.5, (targets, 3)) + [0.0, 0.0, 0.5]
+        true = size * np.concatenate([ring, cloud])
+        if flat:
+            true[:, 2] = 0.0
+        pairs = np.stack(np.meshgrid(np.arange(stations), stations + np.arange(targets), indexing="ij"), -1)
+        pairs = pairs.reshape(-1, 2)
+        pairs = pairs[rng.random(len(pairs)) < seen]
+        length = np.linalg.norm(true[pairs[:, 1]] - true[pairs[:, 0]], axis=1)
+        ranges = Distances(
+            "ranges",
+            length + sigma * rng.standard_normal(len(length)),
+            np.full(len(length), sigma**2),
+            3 * pairs[:, 0],
+            3 * pairs[:, 1],
+        )
+        names = tuple([f"S{i + 1:02d}" for i in range(stations)] + [f"T{i + 1:03d}" for i in range(targets)])
+        given = true + off * size / 100.0 * rng.standard_normal(true.shape)
+        datum = np.zeros(true.shape, dtype=bool)
+        datum[:stations] = True
+        return Network(Points(names, given, np.zeros_like(datum), datum), (), (ranges,)), true
+
+    return made

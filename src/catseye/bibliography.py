@@ -147,4 +147,39 @@ SOURCES: dict[str, Source] = {
         locator="8th PICA Conference Proceedings, Minneapolis, pages 63-69",
         used="the recurrence for the entries of an inverse on the pattern of its factor",
     ),
+    "KABSCH76": Source(
+        title="W. Kabsch, A solution for the best rotation to relate two sets of vectors, Acta Cryst. A 32, 1976",
+        locator="doi:10.1107/S0567739476001873",
+        used="closed form of the best rotation between two sets of points",
+    ),
+    "UMEYAMA91": Source(
+        title="S. Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991",
+        locator="doi:10.1109/34.88573",
+        used="the sign that keeps the rotation proper, and the scale",
+    ),
+    "PELZER71": Source(
+        title="H. Pelzer, Zur Analyse geodätischer Deformationsmessungen, 1971",
+        locator="Deutsche Geodätische Kommission, Reihe C, Heft 164, München",
+        used="the global congruence test and the localisation of moved points",
+    ),
+    "CASPARY87": Source(
+        title="W. F. Caspary, Concepts of network and deformation analysis, 1987",
+        locator="Monograph 11, School of Surveying, University of New South Wales",
+        used="congruence test, homogeneity of epochs, localisation, strain and rigid-body models",
+    ),
+    "RAO73": Source(
+        title="C. R. Rao, Linear Statistical Inference and Its Applications, second edition, Wiley, 1973",
+        locator="doi:10.1002/9780470316436",
+        used="section 4i: least squares with a singular covariance",
+    ),
+    "POPE72": Source(
+        title="A. J. Pope, Some pitfalls to be avoided in the iterative adjustment of nonlinear problems, 1972",
+        locator="Proceedings of the 38th Annual Meeting, American Society of Photogrammetry, pages 449-477",
+        used="derivatives at adjusted observations where both sides of a relation are observed",
+    ),
+    "FEDOROV72": Source(
+        title="V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972",
+        locator="ISBN 978-0-12-250750-3",
+        used="sequential design: each further observation the best after those before it",
+    ),
 }

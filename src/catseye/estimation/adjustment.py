@@ -232,28 +232,27 @@ def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
     residual = group.observed - values
     variance = variances(group)
     v = np.where(on, residual, 0.0)
-    empty = [np.zeros(m) for _ in range(4)]
-    fit = Fit(group.name, on, residual, np.sqrt(variance), *empty, pvv=float(np.sum(rows.whiten(v) ** 2)))  # type: ignore[arg-type, call-arg]
+    redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
+    pvv = float(np.sum(rows.whiten(v) ** 2))
+    fit = Fit(group.name, on, residual, np.sqrt(variance), redundancy, standardised, error, detectable, pvv)
     if not tests:
         return fit
     wide = rows.spread(jacobian)
     seen = np.where(on[:, None], wide, 0.0)
     weighted, pv, own = rows.weigh(seen), rows.weigh(v), rows.own_weight()
     visible = np.maximum(own - rows.forms(q, weighted, weighted), 1e-12 * own)  # without a check it stays finite
-    redundancy = 1.0 - rows.forms(q, weighted, seen)
+    redundancy[:] = 1.0 - rows.forms(q, weighted, seen)
+    standardised[:] = pv / np.sqrt(visible)
+    error[:] = pv / visible
+    detectable[:] = NONCENTRALITY / np.sqrt(visible)
     out = np.flatnonzero(~on)
     if len(out):
         gain, expected = rows.prediction(out)
         rest = wide[out] - gain @ seen if gain is not None else wide[out]
         surprise = residual[out] - gain @ v if gain is not None else residual[out]
         expected = expected + rows.forms(q, rest, rest, out)
-    for target, found, lost in (
-        (fit.redundancy, redundancy, lambda: 1.0),
-        (fit.standardised, pv / np.sqrt(visible), lambda: surprise / np.sqrt(expected)),
-        (fit.estimated_error, pv / visible, lambda: surprise),
-        (fit.detectable_error, NONCENTRALITY / np.sqrt(visible), lambda: NONCENTRALITY * np.sqrt(expected)),
-    ):
-        target[:] = found
-        if len(out):
-            target[out] = lost()
+        redundancy[out] = 1.0
+        standardised[out] = surprise / np.sqrt(expected)
+        error[out] = surprise
+        detectable[out] = NONCENTRALITY * np.sqrt(expected)
     return fit

@@ -17,6 +17,7 @@ or hold each"
 FLOATS = "rank deficient: {points} floats; {advice}"
 CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
+TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points hang together by a pose
 LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
 GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
 EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
@@ -26,20 +27,19 @@ EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pair
 def unconnected(network: Network) -> str | None:
     """The status of a network in pieces; None where it is in one, or each piece is held by itself."""
     count = len(network.points.names)
-    pairs = []
+    size = 3 * count + len(network.parameters)
+    pairs = [np.stack([np.arange(3 * count) // 3 * 3, np.arange(3 * count)])]
     for group in network.groups:
-        ends = points_of(group)
-        block = getattr(group, "together", None)  # kinds that tie all their points, such as a rigid body
-        if block is not None:
-            at = np.unique(np.concatenate(ends))
-            at = at[at >= 0]
-            pairs += [np.stack([at[:-1], at[1:]])] if len(at) > 1 else []
-        for a, b in combinations(ends, 2):
-            both = (a >= 0) & (b >= 0)
-            pairs.append(np.stack([a[both], b[both]]))
-    joined = np.concatenate([np.zeros((2, 0), dtype=int), *pairs], axis=1)
-    graph = coo_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
+        columns = np.broadcast_to(group.columns, (len(group.observed), group.columns.shape[-1]))
+        alone = getattr(group, "kind", "") not in TIED_BY_PARAMETERS
+        used = (columns >= 0) & ((columns < 3 * count) | (not alone))
+        first = columns[np.arange(len(columns)), np.argmax(used, axis=1)][:, None]
+        pairs.append(np.stack([np.broadcast_to(first, columns.shape)[used], columns[used]]))
+    joined = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(size, size))
+    label = connected_components(graph, directed=False)[1][: 3 * count : 3]
+    _, label = np.unique(label, return_inverse=True)
+    number = int(label.max(initial=-1)) + 1
     if number < 2:
         return None
     members = [[network.points.names[i] for i in np.flatnonzero(label == k)] for k in range(number)]

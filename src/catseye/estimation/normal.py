@@ -98,7 +98,8 @@ class NormalEquations:
 
         order = self._order[0]
         inside = (self._scale * right)[order][:, None].copy()
-        solve(*self._factor, inside)
+        lp, li, lx, d = self._factor
+        solve(lp, li, lx, d, inside)
         result = np.empty_like(right)
         result[order] = inside[:, 0]
         return result * self._scale

@@ -163,7 +163,7 @@ def schedule(
 def _interest(solution: NetworkSolution, names: Sequence[str] | None) -> np.ndarray:
     points = solution.network.points
     if names is None:
-        return ~points.fixed.all(axis=1)
+        return np.asarray(~points.fixed.all(axis=1))
     strange = [name for name in names if name not in solution.index]
     if strange:
         raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
