@@ -88,7 +88,7 @@ def test_a_stranger_with_our_file_name_is_not_replaced(tmp_path, campaign, prove
 
 @pytest.mark.parametrize("where", ["input/campaign", "input/campaign/report", "input", "."])
 def test_neither_in_nor_around_nor_the_campaign(tmp_path, campaign, where):
-    with pytest.raises(InputError, match="is, holds or lies in the campaign"):
+    with pytest.raises(InputError, match="is, holds or lies in the input"):
         write(tmp_path / where, campaign, "a")
 
 

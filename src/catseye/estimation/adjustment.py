@@ -112,6 +112,7 @@ def adjust(
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
     extra_variance: Sequence[np.ndarray] | None = None,
+    inflation: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
     iterations: int = 50,
     tests: bool = True,
@@ -124,6 +125,7 @@ def adjust(
     free            (n,) bool: False holds a parameter at its start value (default: all free)
     active          one (m,) bool array a group: False leaves an observation out, but still predicts it
     extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
+    inflation       one (m,) array a group, a factor on its standard uncertainties; correlations stay
     names           (n,) what the parameters are called, for the status
     iterations      cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
     tests           False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
@@ -136,10 +138,8 @@ def adjust(
     x = np.array(x0, dtype=float)
     n = len(x)
     moving = np.arange(n) if free is None else np.flatnonzero(free)
-    rows = [
-        Rows.of(g, active[i] if active is not None else None, extra_variance[i] if extra_variance is not None else None)
-        for i, g in enumerate(groups)
-    ]
+    given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
+    rows = [Rows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
     normal = NormalEquations.of(rows, moving, n, sparse)
     q: Covariance = Dense(np.zeros((n, n))) if not normal.sparse else _Nothing(n)
     floating = np.zeros((0, n))

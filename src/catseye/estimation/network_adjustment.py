@@ -162,15 +162,8 @@ class _Problem:
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
-        extra = None
-        if inflation is not None:
-            from catseye.estimation.rows import variances
-
-            extra = [
-                variances(g) * (np.where(np.isfinite(f), f, 1.0) ** 2 - 1.0)
-                for g, f in zip(self.groups, _padded(inflation, self.groups, 1.0) or [], strict=True)
-            ]
-        rows = [Rows.of(g, None if chosen is None else chosen[i], None) for i, g in enumerate(self.groups)]
+        larger = _padded(inflation, self.groups, 1.0)
+        rows = [Rows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
         x, datum, taken = self.x0, points.datum.ravel() & self.free[:n] & np.isfinite(points.xyz.ravel()), 0
         reference = np.full(len(x), np.nan)
         reference[:n] = points.xyz.ravel()
@@ -193,7 +186,7 @@ class _Problem:
                 self.groups,
                 free=held,
                 active=chosen,
-                extra_variance=extra,
+                inflation=larger,
                 names=self.names,
                 iterations=iterations,
                 tests=tests,
@@ -220,6 +213,12 @@ class _Problem:
             status = unconnected(self.network) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
+        degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
+        answer = replace(
+            answer,
+            degrees_of_freedom=float(degrees),
+            variance_factor=sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan"),
+        )
         if answer.status == CONVERGED and tests:
             answer = replace(answer, status=contradiction(answer, _factor_alone) or CONVERGED)
         return answer

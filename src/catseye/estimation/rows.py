@@ -59,15 +59,25 @@ class Rows:
     columns: np.ndarray
 
     @classmethod
-    def of(cls, group: Observations, active: np.ndarray | None, extra: np.ndarray | None) -> "Rows":
+    def of(
+        cls,
+        group: Observations,
+        active: np.ndarray | None = None,
+        extra: np.ndarray | None = None,
+        inflation: np.ndarray | None = None,
+    ) -> "Rows":
         """Rows of a group; EstimationError where the covariance of the active ones is none.
 
-        active   (m,) bool, all if None
-        extra    (m,) added to the variances
+        active      (m,) bool, all if None
+        extra       (m,) added to the variances
+        inflation   (m,) factor on the standard uncertainties; correlations stay as they are
         """
         m = len(group.observed)
         chosen = np.ones(m, dtype=bool) if active is None else np.asarray(active, dtype=bool)
         covariance, more = group.covariance, np.zeros(m) if extra is None else extra
+        if inflation is not None:
+            f = np.where(chosen, inflation, 1.0).reshape(covariance.shape[: max(1, covariance.ndim - 1)])
+            covariance = covariance * (f**2 if covariance.ndim == 1 else f[..., :, None] * f[..., None, :])
         try:
             if covariance.ndim == 1:
                 variance = covariance + more

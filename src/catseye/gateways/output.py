@@ -13,14 +13,15 @@ from catseye.errors import InputError
 from catseye.gateways.interruption import deferred, undone_when_interrupted
 
 PROVENANCE = "provenance.json"
-FORMAT = "catseye-reduction-1"  # marks a directory as ours, so that it may be replaced
+FORMAT = "catseye-reduction-1"  # marks a directory as ours, so that it may be replaced; as do the next
+FORMATS = (FORMAT, "catseye-adjustment-1", "catseye-comparison-1", "catseye-plan-1")
 
 
 def refuse_output(out: Path, campaign: Path) -> Path:
     """The directory that `out` stands for, links resolved, when it can be made or replaced; or InputError.
 
     out        as the user wrote it; missing, empty, or an earlier output of catseye and of nobody else
-    campaign   the directory that is read, which must be neither in it nor around it
+    campaign   the directory or file that is read, which must be neither in it nor around it
     """
     where = out.resolve()
     source = campaign.resolve()
@@ -28,7 +29,7 @@ def refuse_output(out: Path, campaign: Path) -> Path:
     if where == here or where in here.parents:
         raise InputError(f"--out {out}: is the current directory or holds it (expected a directory of its own)")
     if where == source or where in source.parents or source in where.parents:
-        raise InputError(f"--out {out}: is, holds or lies in the campaign {campaign} (expected a place outside it)")
+        raise InputError(f"--out {out}: is, holds or lies in the input {campaign} (expected a place outside it)")
     if not where.parent.is_dir():
         raise InputError(f"--out {out}: {out.parent} is not a directory (expected an existing one)")
     if not os.access(where.parent, os.W_OK | os.X_OK):
@@ -60,7 +61,7 @@ def _written(where: Path) -> set[str]:
         provenance: Any = json.loads((where / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return set()
-    if not isinstance(provenance, dict) or provenance.get("format") != FORMAT:
+    if not isinstance(provenance, dict) or provenance.get("format") not in FORMATS:
         return set()
     outputs = provenance.get("outputs")
     return set(outputs) if isinstance(outputs, dict) else set()

@@ -1,0 +1,185 @@
+"""The recipe for a network: adjusted plainly, or robustly, or with wrong observations left out, weights estimated or not."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.errors import EstimationError
+from catseye.estimation.adjustment import CONVERGED, Fit
+from catseye.estimation.network import Network, NetworkSolution, points_of
+from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.observations import Distances
+from catseye.estimation.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
+from catseye.estimation.variance_components import Components, GroupFactors, RowModel, variance_components
+
+START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """A network with its answer and how observations were treated.
+
+    solution     of the adjustment, with the treatment below
+    treatment    "plain", "rejected", or the name of a robust method
+    weights      one (m,) a group: share of its claimed weight that each observation was given; 0 where left out
+    rejected     one (m,) bool a group
+    undecided    one (m,) bool a group: contradicted by others, nothing says which is wrong; given next to no weight
+    rejections   what data snooping says of each it left out
+    components   estimated components of variance, where asked
+    notes        what a person should know, one line each
+    """
+
+    solution: NetworkSolution
+    treatment: str
+    weights: tuple[np.ndarray, ...]
+    rejected: tuple[np.ndarray, ...]
+    undecided: tuple[np.ndarray, ...]
+    rejections: tuple[Rejection, ...] = ()
+    components: Components | None = None
+    notes: tuple[str, ...] = ()
+
+
+def adjusted(
+    network: Network,
+    *,
+    datum: str | None = None,
+    reject: bool = False,
+    robust: str | None = None,
+    level: float = 0.05,
+    components: str | None = None,
+    progress: Progress | None = None,
+) -> Adjusted:
+    """A network's coordinates, every observation used as claimed unless asked otherwise.
+
+    network      from `records.read_network`
+    datum        as `adjust_network`
+    reject       leave out observations that the w test rejects, found from a robust start
+    robust       or give each the weight of an M-estimate: a key of `robustness.WEIGHTS`
+    level        of all tests together, for `reject`
+    components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
+
+    Raises EstimationError for an unknown method, or where a network without an answer is to be treated.
+    """
+    if robust is not None and robust not in WEIGHTS:
+        raise EstimationError(f"robust method {robust!r} is not known (expected one of {', '.join(WEIGHTS)})")
+    if components not in (None, "rangers", "groups"):
+        raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
+    plain = adjust_network(network, datum=datum)
+    sizes = [len(g.observed) for g in network.groups]
+    nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
+    result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
+    if not (reject or robust or components):
+        return result
+    if not plain.status.startswith(CONVERGED):
+        return result
+    count = 0
+
+    def solve(inflation: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+        nonlocal count
+        count += 1
+        if progress is not None:
+            progress("adjusting", count, 0)
+        return adjust_network(network, datum=datum, inflation=inflation, start=plain).fits
+
+    if robust is not None:
+        found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
+        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
+        solution = adjust_network(network, datum=datum, inflation=inflation, start=plain)
+        notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
+        result = replace(
+            result,
+            solution=solution,
+            treatment=robust,
+            weights=found.weights,
+            rejected=found.rejected,
+            undecided=found.undecided,
+            notes=notes,
+        )
+    elif reject:
+        start = estimate_robustly(solve, sizes, places=_places(network))
+        chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
+        inflation = [
+            np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
+            for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
+        ]
+        solution = adjust_network(network, datum=datum, inflation=inflation, start=plain)
+        result = replace(
+            result,
+            solution=solution,
+            treatment="rejected",
+            weights=tuple(1.0 / np.square(i) for i in inflation),
+            rejected=chosen.rejected,
+            undecided=chosen.undecided,
+            rejections=chosen.rejections,
+            notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
+        )
+    if components is not None:
+        result = _with_components(network, result, datum, components, solve)
+    return result
+
+
+def _places(network: Network) -> list[np.ndarray]:
+    """For the search at single points: the target of each range, -1 for other observations."""
+    return [
+        points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups
+    ]
+
+
+def _with_components(
+    network: Network, result: Adjusted, datum: str | None, by: str, solve: Callable[[Sequence[np.ndarray]], tuple[Fit, ...]]
+) -> Adjusted:
+    """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
+    out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
+
+    def scaled(scales: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+        return solve(scales if out is None else [s * o for s, o in zip(scales, out, strict=True)])
+
+    sizes = tuple(len(g.observed) for g in network.groups)
+    if by == "groups":
+        model: GroupFactors | RowModel = GroupFactors(tuple(g.name for g in network.groups), sizes)
+    else:
+        model = _ranger_model(network, result.solution)
+    found = variance_components(scaled, model)
+    inflation = model.scales(found.values)
+    if out is not None:
+        inflation = [s * o for s, o in zip(inflation, out, strict=True)]
+    solution = adjust_network(network, datum=datum, inflation=inflation, start=result.solution)
+    notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
+    return replace(result, solution=solution, components=found, notes=notes)
+
+
+def _ranger_model(network: Network, solution: NetworkSolution) -> RowModel:
+    """sigma^2 = a^2 + (b D)^2 of each point that ranges, over all groups of ranges; other groups as claimed."""
+    ranging = [points_of(g)[0] if isinstance(g, Distances) and g.covariance.ndim == 1 else None for g in network.groups]
+    used = [o for o in ranging if o is not None]
+    if not used:
+        raise EstimationError("variance components by rangers: no independent ranges (expected slope distances)")
+    rangers = np.unique(np.concatenate(used))
+    names = [network.points.names[i] for i in rangers]
+    cofactors, columns, fixed = [], [], []
+    for group, origin, fit in zip(network.groups, ranging, solution.fits, strict=True):
+        m = len(group.observed)
+        if origin is None:
+            cofactors.append(np.zeros((m, 0)))
+            columns.append(np.zeros(0, dtype=int))
+            fixed.append(fit.sigma**2)
+            continue
+        k = np.searchsorted(rangers, origin)
+        part = np.zeros((m, 2 * len(rangers)))
+        part[np.arange(m), 2 * k] = 1.0
+        part[np.arange(m), 2 * k + 1] = np.square(group.observed)
+        cofactors.append(part)
+        columns.append(np.arange(2 * len(rangers)))
+        fixed.append(np.zeros(m))
+    return RowModel(
+        names=tuple(f"{what}^2 of {name}" for name in names for what in ("constant", "scale")),
+        sigmas=tuple(f.sigma for f in solution.fits),
+        cofactors=tuple(cofactors),
+        columns=tuple(columns),
+        start=np.tile(np.square(START), len(rangers)),
+        fixed=tuple(fixed),
+    )
