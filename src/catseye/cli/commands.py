@@ -27,6 +27,8 @@ app = typer.Typer(
 
 def main() -> None:
     """The command line of this process; leaves with SystemExit."""
+    import catseye.cli.networks  # noqa: F401  its commands join the app
+
     typer.main.get_command(app)(prog_name="catseye")
 
 

@@ -1,4 +1,4 @@
-"""The recipe for a network: adjusted plainly, or robustly, or with wrong observations left out, weights estimated or not."""
+"""The recipe for a network: adjusted plainly, robustly, or without wrong observations; weights estimated."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, Fit
+from catseye.estimation.monte_carlo import Disturbance, Scatter, scatter
 from catseye.estimation.network import Network, NetworkSolution, points_of
 from catseye.estimation.network_adjustment import adjust_network
 from catseye.estimation.observations import Distances
@@ -124,14 +125,13 @@ def adjusted(
 
 def _places(network: Network) -> list[np.ndarray]:
     """For the search at single points: the target of each range, -1 for other observations."""
-    return [
-        points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups
-    ]
+    return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
-def _with_components(
-    network: Network, result: Adjusted, datum: str | None, by: str, solve: Callable[[Sequence[np.ndarray]], tuple[Fit, ...]]
-) -> Adjusted:
+Solve = Callable[[Sequence[np.ndarray]], tuple[Fit, ...]]
+
+
+def _with_components(network: Network, result: Adjusted, datum: str | None, by: str, solve: Solve) -> Adjusted:
     """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
 
@@ -183,3 +183,29 @@ def _ranger_model(network: Network, solution: NetworkSolution) -> RowModel:
         start=np.tile(np.square(START), len(rangers)),
         fixed=tuple(fixed),
     )
+
+
+def measured_on_paper(
+    network: Network,
+    *,
+    runs: int,
+    seed: int,
+    air_ppm: float = 0.0,
+    station_ppm: float = 0.0,
+    blunders: float = 0.0,
+    progress: Progress | None = None,
+) -> Scatter:
+    """A planned network measured many times with what goes wrong outside, and adjusted each time; see `scatter`.
+
+    network      with its datum as it will be; its coordinates are taken for the truth
+    runs, seed   how many, of which generator
+    air_ppm      standard deviation of a scale error of all ranges together
+    station_ppm  the same of each ranger
+    blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
+    """
+    disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, blunders=blunders)
+
+    def solve(drawn: Network) -> NetworkSolution:
+        return adjusted(drawn, reject=blunders > 0.0).solution
+
+    return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)

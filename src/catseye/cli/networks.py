@@ -1,0 +1,309 @@
+"""The commands of networks: adjust, plan."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.errors import EstimationError, InputError
+
+if TYPE_CHECKING:
+    from catseye.estimation.network import Network
+    from catseye.gateways.network_findings import Findings
+    from catseye.gateways.network_plan import PlanFindings
+    from catseye.reduction.networks import Adjusted
+
+DATUMS = "free|fixed"
+METHODS = "huber|l1|biweight|igg3"
+COMPONENTS = "rangers|groups"
+SUFFIXES = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
+
+
+def _one_of(words: str):  # type: ignore[no-untyped-def]
+    def check(value: str | None) -> str | None:
+        if value is not None and value not in words.split("|"):
+            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
+        return value
+
+    return check
+
+
+def _level(value: float) -> float:
+    if not 0.0 < value < 1.0:
+        raise typer.BadParameter(f"{value} is not a probability between 0 and 1.")
+    return value
+
+
+def _positive(value: float | None) -> float | None:
+    if value is not None and not (0.0 < value < float("inf")):
+        raise typer.BadParameter(f"{value} is not a time above zero.")
+    return value
+
+
+Datum = Annotated[
+    str | None,
+    typer.Option(
+        "--datum",
+        metavar=DATUMS,
+        callback=_one_of(DATUMS),
+        help="free: nothing held, inner constraints on the marked points; fixed: marked points held. "
+        "As the file marks it if not given.",
+    ),
+]
+Scaled = Annotated[
+    bool,
+    typer.Option("--scale-by-variance-factor", help="Multiply covariances by the variance factor; tau tests."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
+]
+
+
+@app.command(epilog="\b\nExamples: catseye adjust examples/networks/feed-arm.toml --out feed-arm-report\n"
+             "          catseye adjust epoch-1.gkf epoch-2.gkf --points P1,P2,P3")  # fmt: skip
+def adjust(
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
+    later: Annotated[
+        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
+    ] = None,
+    datum: Datum = None,
+    scaled: Scaled = False,
+    reject: Annotated[
+        bool, typer.Option("--reject", help="Leave out observations that the tests reject, one by one.")
+    ] = False,
+    robust: Annotated[
+        str | None,
+        typer.Option("--robust", metavar=METHODS, callback=_one_of(METHODS), help="Weigh observations robustly."),
+    ] = None,
+    components: Annotated[
+        str | None,
+        typer.Option(
+            "--components",
+            metavar=COMPONENTS,
+            callback=_one_of(COMPONENTS),
+            help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
+        ),
+    ] = None,
+    level: Annotated[
+        float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
+    ] = 0.05,
+    points: Annotated[
+        str | None, typer.Option("--points", metavar="A,B,...", help="Points to compare between two epochs.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A network adjusted by least squares, or two epochs of it compared."""
+    if reject and robust is not None:
+        raise typer.BadParameter("cannot go with --reject: either weigh or leave out.", param_hint="'--robust'")
+    if points is not None and later is None:
+        raise typer.BadParameter("needs a second network to compare with.", param_hint="'--points'")
+    progress = ProgressLine(quiet)
+    sources = [network] if later is None else [network, later]
+    if out is not None:
+        from catseye.gateways.output import refuse_output
+
+        for source in sources:
+            refuse_output(out, source)
+    try:
+        from catseye.gateways.network_findings import findings
+        from catseye.records.network import read_network
+        from catseye.reduction.networks import adjusted
+
+        treated = [
+            adjusted(
+                _read(read_network, source),
+                datum=datum,
+                reject=reject,
+                robust=robust,
+                level=level,
+                components=components,
+                progress=progress,
+            )
+            for source in sources
+        ]
+        found = [findings(t.solution, scaled=scaled, level=level) for t in treated]
+        if later is not None:
+            _compared(found, sources, points, level, out, json, quiet, progress)
+            return
+        _write_adjusted(found[0], network, out, progress)
+    finally:
+        progress.clear()
+    _tell_adjusted(treated[0], found[0], json, quiet, out)
+    if not found[0].answered:
+        raise EstimationError(f"{network}: {treated[0].solution.status}")
+
+
+def _read(reader, source: Path) -> "Network":  # type: ignore[no-untyped-def]
+    if not source.exists():
+        raise InputError(f"{source}: missing (expected {SUFFIXES})")
+    return reader(source)
+
+
+def _write_adjusted(found: "Findings", source: Path, out: Path | None, progress: ProgressLine) -> None:
+    if out is None:
+        return
+    from catseye.gateways.network_files import input_hashes, write_network
+    from catseye.gateways.output import whole_directory
+
+    with whole_directory(out, source) as directory:
+        write_network(found, directory, input_hashes(source), progress)
+
+
+def _tell_adjusted(treated: "Adjusted", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
+    if json:
+        from catseye.gateways.network_objects import network_json
+
+        say("".join(network_json(found, treated=treated)).rstrip("\n"))
+        return
+    if quiet:
+        return
+    from catseye.gateways.network_summary import passages, treatment_passages
+
+    for passage in [*passages(found), *treatment_passages(treated, found)]:
+        say(wrapped(passage.title, passage.text))
+    if len(found.names) <= 40:
+        for name, x, u in zip(found.names, found.x, found.u, strict=True):
+            axes = zip(found.network.axis_names, x, strict=True)
+            say(
+                f"{'':<14}{name:<10} "
+                + "  ".join(f"{axis} {value:12.5f}" for axis, value in axes)
+                + "   u "
+                + ", ".join(f"{v * 1e3:.3f}" for v in u)
+                + " mm"
+            )
+    if out is not None:
+        say(wrapped("Written to", f"{out}/: report.html, coordinates.csv, observations.csv, adjustment.json, and more"))
+
+
+def _compared(
+    found: "list[Findings]",
+    sources: list[Path],
+    points: str | None,
+    level: float,
+    out: Path | None,
+    json: bool,
+    quiet: bool,
+    progress: ProgressLine,
+) -> None:
+    from catseye.estimation.comparison import compare
+    from catseye.gateways.network_comparison import Comparison, comparison_object
+    from catseye.gateways.objects import json_line
+
+    for one, source in zip(found, sources, strict=True):
+        if not one.answered:
+            raise EstimationError(f"{source}: {one.solution.status}")
+    names = None if points is None else [p.strip() for p in points.split(",") if p.strip()]
+    moved = compare(found[0].solution, found[1].solution, points=names, level=level)
+    compared = Comparison(found[0], found[1], moved)
+    if out is not None:
+        from catseye.gateways.network_files import input_hashes, write_comparison
+        from catseye.gateways.output import whole_directory
+
+        hashes = {f"{k + 1}: {name}": h for k, s in enumerate(sources) for name, h in input_hashes(s).items()}
+        with whole_directory(out, sources[0]) as directory:
+            write_comparison(compared, directory, hashes, progress)
+    progress.clear()
+    if json:
+        say(json_line(comparison_object(compared)))
+    elif not quiet:
+        from catseye.gateways.network_comparison import comparison_passages
+
+        for passage in comparison_passages(compared):
+            say(wrapped(passage.title, passage.text))
+        if out is not None:
+            say(wrapped("Written to", f"{out}/: report.html, displacements.csv, comparison.json, and both epochs"))
+
+
+@app.command(epilog="\b\nExample: catseye plan examples/networks/feed-arm.toml --budget-s 600 --shot-s 5")
+def plan(
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
+    datum: Datum = None,
+    interest: Annotated[
+        str | None,
+        typer.Option("--interest", metavar="A,B,...", help="Points that matter; all that are not held if not given."),
+    ] = None,
+    budget_s: Annotated[
+        float | None,
+        typer.Option("--budget-s", callback=_positive, help="Time of every ranger for further ranges, s."),
+    ] = None,
+    shot_s: Annotated[float, typer.Option("--shot-s", callback=_positive, help="Time of one range, s.")] = 5.0,
+    most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20,
+    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1,
+    air_ppm: Annotated[
+        float, typer.Option("--air-ppm", min=0.0, help="In the runs: scale error of all ranges together, ppm (1σ).")
+    ] = 0.0,
+    station_ppm: Annotated[
+        float, typer.Option("--station-ppm", min=0.0, help="In the runs: scale error of each station's ranges, ppm.")
+    ] = 0.0,
+    blunders_percent: Annotated[
+        float,
+        typer.Option("--blunders-percent", min=0.0, max=30.0, help="In the runs: share of gross errors, rejected."),
+    ] = 0.0,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A network before it is measured: what it will be worth, where it is weak, what to measure next."""
+    progress = ProgressLine(quiet)
+    if out is not None:
+        from catseye.gateways.output import refuse_output
+
+        refuse_output(out, network)
+    try:
+        from catseye.estimation.plan import plan as planned
+        from catseye.estimation.plan import schedule
+        from catseye.gateways.network_findings import findings
+        from catseye.gateways.network_plan import PlanFindings
+        from catseye.records.network import read_network
+        from catseye.reduction.networks import measured_on_paper
+
+        read = _read(read_network, network)
+        names = None if interest is None else [p.strip() for p in interest.split(",") if p.strip()]
+        worth = planned(read, datum=datum, interest=names, most=most)
+        picked = schedule(worth, budget_s=budget_s, shot_s=shot_s) if budget_s is not None else ()
+        runs_made = (
+            measured_on_paper(
+                worth.solution.network,
+                runs=runs,
+                seed=seed,
+                air_ppm=air_ppm,
+                station_ppm=station_ppm,
+                blunders=blunders_percent / 100.0,
+                progress=progress,
+            )
+            if runs
+            else None
+        )
+        told = PlanFindings(findings(worth.solution), worth, picked, runs_made)
+        if out is not None:
+            from catseye.gateways.network_files import input_hashes
+            from catseye.gateways.network_plan import write_plan
+            from catseye.gateways.output import whole_directory
+
+            with whole_directory(out, network) as directory:
+                write_plan(told, directory, input_hashes(network), progress)
+    finally:
+        progress.clear()
+    _tell_plan(told, json, quiet, out)
+
+
+def _tell_plan(told: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
+    if json:
+        from catseye.gateways.network_plan import plan_json
+
+        say("".join(plan_json(told)).rstrip("\n"))
+        return
+    if quiet:
+        return
+    from catseye.gateways.network_plan import plan_passages
+
+    for passage in plan_passages(told):
+        say(wrapped(passage.title, passage.text))
+    if out is not None:
+        say(wrapped("Written to", f"{out}/: report.html, points.csv, candidates.csv, plan.json"))
