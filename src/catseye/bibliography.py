@@ -182,4 +182,27 @@ SOURCES: dict[str, Source] = {
         locator="ISBN 978-0-12-250750-3",
         used="sequential design: each further observation the best after those before it",
     ),
+    "CROCCO12": Source(
+        title="M. Crocco, A. Del Bue and V. Murino, A bilinear approach to the position self-calibration of multiple "
+        "sensors, 2012",
+        locator="IEEE Transactions on Signal Processing 60 (2), pages 660-673",
+        used="factors of the squared ranges between two unknown sets of points, and the small matrix that mixes them",
+    ),
+    "POLLEFEYS08": Source(
+        title="M. Pollefeys and D. Nistér, Direct computation of sound and microphone locations from "
+        "time-difference-of-arrival data, 2008",
+        locator="doi:10.1109/ICASSP.2008.4518142",
+        used="the linear upgrade of the factors where ten points of a kind are there",
+    ),
+    "KUANG13": Source(
+        title="Y. Kuang, S. Burgess, A. Torstensson and K. Åström, A complete characterization and solution to the "
+        "microphone position self-calibration problem, 2013",
+        locator="IEEE International Conference on Acoustics, Speech and Signal Processing 2013, pages 3875-3879",
+        used="least numbers of stations and targets: 4 x 6 and 5 x 5",
+    ),
+    "TORGERSON52": Source(
+        title="W. S. Torgerson, Multidimensional scaling: I. Theory and method, Psychometrika 17, 1952",
+        locator="doi:10.1007/BF02288916",
+        used="points from all their distances by the eigenvectors of the doubly centred squares",
+    ),
 }
