@@ -33,6 +33,7 @@ SOURCES: dict[str, Source] = {
             "1.34 prints 6283 rad (c taken as 3e8 m/s); 1.32 gives 6287.535 rad",
             "2.14 and 5.4 print arctan(b/a): the quadrant matters",
             "2.44 omits the plus signs between X_r and its offset",
+            "3.1 says the coordinates are unique: three ranges give two points, mirror images in the stations' plane",
             "2.5 (example) says the y origin is the tooling ball of ZY2: z is meant",
             "5.14 and 5.17 print -2pi(n_i - n_0); 5.12 and 5.15 require +2pi(n_i - n_0)",
         ),
@@ -204,5 +205,71 @@ SOURCES: dict[str, Source] = {
         title="W. S. Torgerson, Multidimensional scaling: I. Theory and method, Psychometrika 17, 1952",
         locator="doi:10.1007/BF02288916",
         used="points from all their distances by the eigenvectors of the doubly centred squares",
+    ),
+    "GAMA18": Source(
+        title="A. Cepek, GNU Gama: adjustment of geodetic networks, manual and schema gama-local.xsd 1.00, 2018",
+        locator="https://www.gnu.org/software/gama/manual/",
+        used="chapter XML input data format for gama-local",
+    ),
+    "STARNET04": Source(
+        title="STAR*NET V6 Least Squares Survey Adjustment Program, Reference Manual, Standard and PLUS Editions, 2004",
+        locator="Starplus Software, Oakland",
+        used="chapter 5, Preparing input data",
+    ),
+    "POPE76": Source(
+        title="A. J. Pope, The statistics of residuals and the detection of outliers, 1976",
+        locator="NOAA Technical Report NOS 65 NGS 1, Rockville",
+        used="the tau test and its relation to Student's t",
+    ),
+    "SIDAK67": Source(
+        title="Z. Šidák, Rectangular confidence regions for the means of multivariate normal distributions, 1967",
+        locator="doi:10.1080/01621459.1967.10482935",
+        used="theorem 1: the level of one among many two-sided tests",
+    ),
+    "BENJAMINI95": Source(
+        title="Y. Benjamini and Y. Hochberg, Controlling the false discovery rate, 1995",
+        locator="doi:10.1111/j.2517-6161.1995.tb02031.x",
+        used="section 3: the step-up procedure",
+    ),
+    "BEATON74": Source(
+        title="A. E. Beaton and J. W. Tukey, The fitting of power series, meaning polynomials, 1974",
+        locator="doi:10.1080/00401706.1974.10489171",
+        used="the biweight",
+    ),
+    "YANG02": Source(
+        title="Y. Yang, L. Song and T. Xu, Robust estimator for correlated observations, 2002",
+        locator="doi:10.1007/s00190-002-0256-7",
+        used="the IGG III weight function",
+    ),
+    "GEMAN87": Source(
+        title="S. Geman and D. E. McClure, Statistical methods for tomographic image reconstruction, 1987",
+        locator="Bulletin of the International Statistical Institute 52 (4), pages 5-21",
+        used="the weight function",
+    ),
+    "BLACK96": Source(
+        title="M. J. Black and A. Rangarajan, On the unification of line processes, outlier rejection, and robust "
+        "statistics with applications in early vision, 1996",
+        locator="doi:10.1007/BF00131148",
+        used="annealing the width of a redescending estimator",
+    ),
+    "TORR00": Source(
+        title="P. H. S. Torr and A. Zisserman, MLESAC: a new robust estimator, 2000",
+        locator="doi:10.1006/cviu.1999.0832",
+        used="the truncated cost of a choice drawn at random",
+    ),
+    "FOERSTNER79": Source(
+        title="W. Förstner, Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten, 1979",
+        locator="Allgemeine Vermessungs-Nachrichten 86, pages 446-453",
+        used="the fixed point of variance components",
+    ),
+    "PATTERSON71": Source(
+        title="H. D. Patterson and R. Thompson, Recovery of inter-block information, 1971",
+        locator="doi:10.1093/biomet/58.3.545",
+        used="restricted maximum likelihood and its information",
+    ),
+    "JCGM102": Source(
+        title="JCGM, Extension of the guide to any number of output quantities, 2011",
+        locator="JCGM 102:2011",
+        used="clause 6.5.2: coverage factors of ellipsoidal regions",
     ),
 }

@@ -30,7 +30,7 @@ def bordered(network, x):
     for row, (columns, slopes) in enumerate(zip(ranges.columns, jacobian, strict=True)):
         np.add.at(a[row], columns, slopes)
     sigma = np.sqrt(ranges.covariance)[:, None]
-    g = (motions(x)[:, :6] * network.points.datum.ravel()[:, None]).T
+    g = (motions(network.points.xyz)[:, :6] * network.points.datum.ravel()[:, None]).T
     scale = 1e4  # so that both kinds of row weigh alike
     full = np.block([[(a / sigma).T @ (a / sigma), scale * g.T], [scale * g, np.zeros((6, 6))]])
     return np.linalg.inv(full)[:n, :n]

@@ -56,7 +56,7 @@ def test_released_buffers_still_load():
 
 
 def test_every_file_kept_here_is_tested():
-    assert {path.name for path in FORMATS.iterdir()} == {*RECORDS, *TABLES, "frames-1.npy"}
+    assert {path.name for path in FORMATS.iterdir()} == {*RECORDS, *TABLES, "frames-1.npy", "network-1.toml"}  # the last in test_network_toml
 
 
 @pytest.mark.parametrize("kind", ["monument", "mirror", "triplet"])

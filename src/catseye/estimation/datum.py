@@ -18,18 +18,20 @@ MOTIONS = ("shift along x", "shift along y", "shift along z", "turn about x", "t
 UNHELD = 1e-7  # share of a unit motion in the datum's coordinates, below which they do not hold it
 
 
-def motions(xyz: np.ndarray) -> np.ndarray:
-    """The seven motions of points (n, 3): (3 n, 7), about their mean, none moving the points by more than metres.
+def motions(xyz: np.ndarray, centre: np.ndarray | None = None, size: float | None = None) -> np.ndarray:
+    """The seven motions of points (n, 3): (3 n, 7), none moving the points by more than metres.
 
-    Order as MOTIONS; turns and scale are divided by the root mean square distance from the mean, in metres.
+    centre   (3,) m, about which points are turned and scaled; their mean if None
+    size     m, by which turns and scale are divided; their root mean square distance from the mean if None
+
+    Order as MOTIONS.
 
     >>> motions(np.array([[0.0, 0, 0], [2.0, 0, 0]]))[:, 6].tolist()
     [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
     """
     n = len(xyz)
-    arm = xyz - xyz.mean(axis=0)
-    size = float(np.sqrt(np.mean(np.sum(arm**2, axis=1)))) or 1.0
-    arm = arm / size
+    arm = xyz - (xyz.mean(axis=0) if centre is None else centre)
+    arm = arm / (_size(arm) if size is None else size)
     result = np.zeros((n, 3, 7))
     result[:, [0, 1, 2], [0, 1, 2]] = 1.0
     for axis in range(3):
@@ -38,16 +40,24 @@ def motions(xyz: np.ndarray) -> np.ndarray:
     return result.reshape(3 * n, 7)
 
 
+def _size(arm: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(arm**2, axis=1)))) or 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Floating:
     """Motions that no observation holds, at some x.
 
     motions   (n, d) over all parameters, a unit of the largest displacement 1 m
     kinds     (7, d) what each is made of, in the order of MOTIONS
+    centre    (3,) m, about which they turn
+    size      m, by which turns and scale are divided
     """
 
     motions: np.ndarray
     kinds: np.ndarray
+    centre: np.ndarray
+    size: float
 
     def words(self, which: np.ndarray | None = None) -> str:
         """Names of the motions among (some combinations (d, k) of) these."""
@@ -82,14 +92,16 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     n, coordinates = len(x), 3 * len(xyz)
     linear = [(r, *_row_form(r, x)) for r in rows]
     norms = sum((np.bincount(at.ravel(), (j**2).ravel(), n) for _, at, j in linear), np.zeros(n))
-    h, allowed = motions(xyz), np.eye(7)
+    centre = xyz.mean(axis=0)
+    size = _size(xyz - centre)
+    h, allowed = motions(xyz, centre, size), np.eye(7)
     still = ~free[:coordinates]
     if still.any():  # a held coordinate must not move
         _, singular, turned = np.linalg.svd(h[still], full_matrices=True)
         allowed = turned[int(np.sum(singular > 1e-9 * np.sqrt(len(xyz)))) :].T
     others = coordinates + np.flatnonzero(free[coordinates:] & (norms[coordinates:] > 0.0))
     if not (allowed.size and norms[:coordinates].any()):
-        return Floating(np.zeros((n, 0)), np.zeros((7, 0)))
+        return Floating(np.zeros((n, 0)), np.zeros((7, 0)), centre, size)
     k = allowed.shape[1]
     basis = np.zeros((n, k + len(others)))
     basis[:coordinates, :k] = h @ allowed
@@ -103,8 +115,8 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     combination = back @ turned[squares < FLOATS].T
     moving = np.linalg.norm(combination[:k], axis=0) > 1e-9 * np.linalg.norm(combination, axis=0)
     found = basis @ combination[:, moving]
-    size = np.abs(found[:coordinates]).max(axis=0, initial=0.0)
-    return Floating(found / size, allowed @ combination[:k, moving] / size)
+    largest = np.abs(found[:coordinates]).max(axis=0, initial=0.0)
+    return Floating(found / largest, allowed @ combination[:k, moving] / largest, centre, size)
 
 
 def _row_form(rows: Rows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,20 +126,23 @@ def _row_form(rows: Rows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(at, 0), np.where(at < 0, 0.0, j)
 
 
-def datum_conditions(floating: Floating, datum: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def datum_conditions(floating: Floating, datum: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Conditions G (d, n) by which coordinates hold floating motions, and the combinations (d, k) they do not hold.
 
-    datum   (c,) bool over the coordinates at the head of the parameters
+    datum       (k, 3) bool over the coordinates at the head of the parameters
+    reference   (k, 3) m, where the datum coordinates should be; anything elsewhere
 
     G (x - reference) = 0 makes the sum of squares of the datum coordinates' departures from their reference least
-    against every floating motion: the inner constraint on a subset. For rigid motions it holds exactly whether G is
-    formed at x or at the reference, because x cross (x - r) = r cross (x - r).
+    against every floating motion: the inner constraint on a subset. That least is where the motions formed at x meet
+    the departures at right angles; for turns this is the same as with motions formed at the reference, because
+    x cross (x - r) = r cross (x - r), and only these are the derivatives of the condition by x.
     """
-    inside = np.zeros(len(floating.motions), dtype=bool)
-    inside[: len(datum)] = datum
-    g = np.where(inside[:, None], floating.motions, 0.0).T
+    g = np.zeros((floating.kinds.shape[1], len(floating.motions)))
+    at = np.where(datum, reference, floating.centre)
+    moved = motions(at, floating.centre, floating.size) @ floating.kinds
+    g[:, : datum.size] = np.where(datum.ravel()[:, None], moved, 0.0).T
     _, singular, turned = np.linalg.svd(g.T, full_matrices=False)
-    loose = singular < UNHELD * np.sqrt(max(1, int(inside.sum())))
+    loose = singular < UNHELD * np.sqrt(max(1, int(datum.sum())))
     return g, turned[loose].T
 
 
@@ -143,10 +158,16 @@ def to_datum(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The floating motion (n,) that carries x where G (x - reference) = 0, to first order, and T = H (G H)^-1 (n, d).
 
+    x            (n,) parameters
+    reference    (c,) of the coordinates at their head; nan where there is none
+    floating     (n, d) motions H
+    conditions   (d, n) G
+
     Source: [BAARDA73], S-transformation.
     """
     t = np.linalg.solve((conditions @ floating).T, floating.T).T
-    off = np.where(np.isfinite(reference), x - reference, 0.0)
+    off = np.zeros(len(x))
+    off[: len(reference)] = np.where(np.isfinite(reference), x[: len(reference)] - reference, 0.0)
     return -t @ (conditions @ off), t
 
 

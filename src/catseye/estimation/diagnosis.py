@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtrc
 
-from catseye.estimation.adjustment import Solution
+from catseye.estimation.adjustment import CONVERGED, Solution
 from catseye.estimation.network import Network, NetworkSolution, points_of
 
 PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
@@ -98,10 +98,10 @@ def _advice(network: Network, solution: Solution, point: int) -> str:
     return f"{text}: no range within the network would hold it, its {network.axis_names[axis]} or a height would"
 
 
-def contradiction(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str | None:
-    """The status of a solution whose observations contradict each other grossly; None where they do not.
+def diagnosed(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
+    """The status of a solution, which says more where it did not converge or its observations contradict grossly.
 
-    solution   converged
+    solution   with an answer, converged or not
     solve      how to try the network with two points exchanged
 
     Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
@@ -109,11 +109,13 @@ def contradiction(solution: NetworkSolution, solve: Callable[[Network], NetworkS
     """
     factor, degrees = solution.variance_factor, solution.degrees_of_freedom
     if not degrees > 0.5:
-        return None
+        return solution.status
+    if solution.status != CONVERGED:
+        return solution.status + _guess(solution, solve)
     tests = [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
     largest = [float(t.max(initial=0.0)) for t in tests]
     if not (chdtrc(degrees, factor * degrees) < LIKELY and (factor > GROSS_FACTOR or max(largest) > GROSS_TEST)):
-        return None
+        return CONVERGED
     group = int(np.argmax(largest))
     row = int(np.argmax(tests[group]))
     fit, network = solution.fits[group], solution.network
@@ -147,11 +149,11 @@ def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution
             xyz, order = network.points.xyz.copy(), [j, i]
             xyz[[i, j]] = xyz[order]
             trial = solve(replace(network, points=replace(network.points, xyz=xyz)))
-            if trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
+            if trial.status == CONVERGED and trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
                 trials.append((float(np.nansum((trial.x - xyz) ** 2)), i, j, trial.variance_factor))
         if trials:  # a symmetric network fits after other exchanges too, but far from the given coordinates
             _, i, j, factor = min(trials)
-            return f"; with {names[i]} and {names[j]} exchanged it falls to {factor:.3g}"
+            return f"; with {names[i]} and {names[j]} exchanged the variance factor is {factor:.3g}"
     share = total / np.maximum(number, 1.0)
     stands = [names[i] for i in np.argsort(-share)[:2] if share[i] > 4.0 * np.median(share[number > 0])]
     return f"; most of it at {' and '.join(stands)}" if stands else ""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import CONVERGED, Solution, adjust
+from catseye.estimation.adjustment import Solution, adjust
 from catseye.estimation.covariance import Covariance
 from catseye.estimation.datum import (
     Floating,
@@ -16,10 +16,10 @@ from catseye.estimation.datum import (
     to_datum,
     transformed,
 )
-from catseye.estimation.diagnosis import contradiction, floating_text, unconnected
+from catseye.estimation.diagnosis import diagnosed, floating_text, unconnected
 from catseye.estimation.network import Network, NetworkSolution
 from catseye.estimation.observations import Linear, Observations
-from catseye.estimation.rows import Rows
+from catseye.estimation.rows import Rows, variances
 
 DATUMS = ("free", "fixed")
 PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
@@ -58,6 +58,7 @@ def adjust_network(
     datum: str | None = None,
     active: Sequence[np.ndarray] | None = None,
     inflation: Sequence[np.ndarray] | None = None,
+    alone: bool = False,
     start: NetworkSolution | None = None,
     iterations: int = 50,
     tests: bool = True,
@@ -69,6 +70,8 @@ def adjust_network(
     datum       None as marked, or "free" or "fixed", see `with_datum`
     active      one (m,) bool a group: False leaves an observation out, but still predicts it
     inflation   one (m,) a group, a factor on its standard uncertainties (robust estimation); infinite leaves out
+    alone       inflation of a correlated observation adds to its own variance and dilutes its correlations; else they
+                stay, as when a whole group is scaled
     start       an earlier solution of the same network to begin from
     iterations  cap of Gauss-Newton steps of each pass
     tests       False leaves out covariance and test statistics
@@ -94,7 +97,7 @@ def adjust_network(
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
     sparse = None if engine is None else engine == "sparse"
-    return problem.solve(active, inflation, iterations, tests, sparse)
+    return problem.solve(active, (inflation, alone), iterations, tests, sparse)
 
 
 def _factor_alone(network: Network) -> NetworkSolution:
@@ -154,7 +157,7 @@ class _Problem:
     def solve(
         self,
         active: Sequence[np.ndarray] | None,
-        inflation: Sequence[np.ndarray] | None,
+        inflation: tuple[Sequence[np.ndarray] | None, bool],
         iterations: int,
         tests: bool,
         sparse: bool | None,
@@ -162,18 +165,20 @@ class _Problem:
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
-        larger = _padded(inflation, self.groups, 1.0)
+        larger, added = _padded(inflation[0], self.groups, 1.0), None
+        if larger is not None and inflation[1]:
+            finite = [np.where(np.isfinite(f), f, 1.0) for f in larger]
+            larger, added = None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
         rows = [Rows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
-        x, datum, taken = self.x0, points.datum.ravel() & self.free[:n] & np.isfinite(points.xyz.ravel()), 0
-        reference = np.full(len(x), np.nan)
-        reference[:n] = points.xyz.ravel()
+        x, taken = self.x0, 0
+        datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: Solution | None = None
         for _ in range(PASSES):
             try:
                 floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
             except np.linalg.LinAlgError:
-                floating = Floating(np.zeros((len(x), 0)), np.zeros((7, 0)))
-            conditions, loose = datum_conditions(floating, datum)
+                floating = Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+            conditions, loose = datum_conditions(floating, datum, points.xyz)
             if loose.shape[1]:
                 apart = unconnected(self.network)
                 text = WEAK_DATUM if datum.any() else NO_DATUM
@@ -187,6 +192,7 @@ class _Problem:
                 free=held,
                 active=chosen,
                 inflation=larger,
+                extra_variance=added,
                 names=self.names,
                 iterations=iterations,
                 tests=tests,
@@ -196,11 +202,11 @@ class _Problem:
             x = solution.x
             if not solution.solved or not len(conditions):
                 break
-            motions = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free).motions
-            if motions.shape[1] != floating.motions.shape[1]:
+            floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
+            if floating.motions.shape[1] != len(conditions):
                 break
-            conditions = np.where(np.any(conditions != 0.0, axis=0)[:, None], motions, 0.0).T
-            moved, t = to_datum(x, reference, motions, conditions)
+            conditions, _ = datum_conditions(floating, datum, points.xyz)
+            moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
             x = x + moved
             size = float(np.ptp(x[:n].reshape(-1, 3), axis=0).max())
             if np.abs(moved[:n]).max() <= SETTLED * size:
@@ -214,21 +220,16 @@ class _Problem:
             return self.unanswered(status, solution.x)
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
-        answer = replace(
-            answer,
-            degrees_of_freedom=float(degrees),
-            variance_factor=sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan"),
-        )
-        if answer.status == CONVERGED and tests:
-            answer = replace(answer, status=contradiction(answer, _factor_alone) or CONVERGED)
-        return answer
+        factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
+        answer = replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
+        return replace(answer, status=diagnosed(answer, _factor_alone)) if tests else answer
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points
         held = int(np.sum(points.fixed))
         words = [f"{held} coordinates held"] if held else []
         if floating.motions.shape[1]:
-            on = int(datum.reshape(-1, 3).any(axis=1).sum())
+            on = int(datum.any(axis=1).sum())
             words.append(f"inner constraints on {on} points against {floating.words()}")
         return "; ".join(words) or "held by observations and priors"
 

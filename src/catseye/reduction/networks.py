@@ -8,9 +8,10 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, Fit
+from catseye.estimation.approximate import approximate
 from catseye.estimation.monte_carlo import Disturbance, Scatter, scatter
 from catseye.estimation.network import Network, NetworkSolution, points_of
-from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.network_adjustment import adjust_network, with_datum
 from catseye.estimation.observations import Distances
 from catseye.estimation.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
 from catseye.estimation.variance_components import Components, GroupFactors, RowModel, variance_components
@@ -69,7 +70,8 @@ def adjusted(
         raise EstimationError(f"robust method {robust!r} is not known (expected one of {', '.join(WEIGHTS)})")
     if components not in (None, "rangers", "groups"):
         raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
-    plain = adjust_network(network, datum=datum)
+    network, found_names = _placed(with_datum(network, datum))
+    plain = replace(adjust_network(network), approximate=found_names)
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
     result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
@@ -84,12 +86,12 @@ def adjusted(
         count += 1
         if progress is not None:
             progress("adjusting", count, 0)
-        return adjust_network(network, datum=datum, inflation=inflation, start=plain).fits
+        return adjust_network(network, inflation=inflation, alone=True).fits
 
     if robust is not None:
         found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
         inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
-        solution = adjust_network(network, datum=datum, inflation=inflation, start=plain)
+        solution = _final(network, inflation, found_names, alone=True)
         notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
         result = replace(
             result,
@@ -107,7 +109,7 @@ def adjusted(
             np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
             for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
         ]
-        solution = adjust_network(network, datum=datum, inflation=inflation, start=plain)
+        solution = _final(network, inflation, found_names, alone=True)
         result = replace(
             result,
             solution=solution,
@@ -119,7 +121,7 @@ def adjusted(
             notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
         )
     if components is not None:
-        result = _with_components(network, result, datum, components, solve)
+        result = _with_components(network, result, components, progress)
     return result
 
 
@@ -128,15 +130,34 @@ def _places(network: Network) -> list[np.ndarray]:
     return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
-Solve = Callable[[Sequence[np.ndarray]], tuple[Fit, ...]]
+def _placed(network: Network) -> tuple[Network, tuple[str, ...]]:
+    """The network with approximate coordinates for points that have none, found once, and the names of these."""
+    if np.isfinite(network.points.xyz).all():
+        return network, ()
+    begin = approximate(network)
+    parameters = tuple(replace(p, start=float(v)) for p, v in zip(network.parameters, begin.parameters, strict=True))
+    points = replace(network.points, xyz=begin.xyz, datum=network.points.datum & np.isfinite(network.points.xyz))
+    return replace(network, points=points, parameters=parameters), begin.found
 
 
-def _with_components(network: Network, result: Adjusted, datum: str | None, by: str, solve: Solve) -> Adjusted:
+def _final(
+    network: Network, inflation: Sequence[np.ndarray], found: tuple[str, ...], *, alone: bool
+) -> NetworkSolution:
+    return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=found)
+
+
+def _with_components(network: Network, result: Adjusted, by: str, progress: Progress | None) -> Adjusted:
     """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
+    count = 0
 
     def scaled(scales: Sequence[np.ndarray]) -> tuple[Fit, ...]:
-        return solve(scales if out is None else [s * o for s, o in zip(scales, out, strict=True)])
+        nonlocal count
+        count += 1
+        if progress is not None:
+            progress("estimating components", count, 0)
+        used = scales if out is None else [s * o for s, o in zip(scales, out, strict=True)]
+        return adjust_network(network, inflation=used).fits
 
     sizes = tuple(len(g.observed) for g in network.groups)
     if by == "groups":
@@ -147,7 +168,7 @@ def _with_components(network: Network, result: Adjusted, datum: str | None, by: 
     inflation = model.scales(found.values)
     if out is not None:
         inflation = [s * o for s, o in zip(inflation, out, strict=True)]
-    solution = adjust_network(network, datum=datum, inflation=inflation, start=result.solution)
+    solution = _final(network, inflation, result.solution.approximate, alone=False)
     notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
     return replace(result, solution=solution, components=found, notes=notes)
 

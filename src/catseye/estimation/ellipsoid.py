@@ -1,0 +1,232 @@
+"""Standard and confidence ellipsoids of points, their ellipses in plan and elevation, and relative ones of pairs.
+
+Axes are x east, y north, z up. A covariance may be singular (a held coordinate has none): its ellipsoid is then flat.
+Where a point has no answer its covariance is nan, and so is everything here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtr, chdtri, fdtr, fdtri
+
+from catseye.errors import EstimationError
+
+PLAN = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # east to the right, north up
+ROUNDING = 1e-10  # of the largest eigenvalue: a negative one below this is zero, a larger one is no covariance
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """Standard ellipsoid: the surface x' C^-1 x = 1.
+
+    semi_axes    (..., 3) m, longest first
+    directions   (..., 3, 3): column k is the unit vector of semi-axis k; a rotation (right-handed), the first two
+                 columns with their largest component positive
+    """
+
+    semi_axes: np.ndarray
+    directions: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipse:
+    """Standard ellipse in a plane with an axis to the right and one up (in plan: east and north).
+
+    major, minor   (...) m, semi-axes
+    bearing        (...) rad of the major axis, clockwise from the axis up (in plan: from north), 0 to pi; 0 of a circle
+    """
+
+    major: np.ndarray
+    minor: np.ndarray
+    bearing: np.ndarray
+
+
+def _square_roots(values: np.ndarray) -> np.ndarray:
+    """Roots of eigenvalues, ascending in the last axis; those that rounding made negative are zero."""
+    with np.errstate(invalid="ignore"):
+        negative = values[..., 0] < -ROUNDING * np.abs(values[..., -1])
+    if np.any(negative):
+        where = np.unravel_index(np.argmax(negative), negative.shape)
+        raise EstimationError(
+            f"covariance {', '.join(str(int(i)) for i in where) or 'given'} is none: its smallest eigenvalue is "
+            f"{values[where][0]:.3g} beside a largest of {values[where][-1]:.3g}; it must not be negative"
+        )
+    return np.sqrt(np.where(values < 0.0, 0.0, values))
+
+
+def _eigen(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and vectors, ascending; nan for a matrix that is not finite."""
+    known = np.isfinite(covariance).all(axis=(-2, -1))
+    values, vectors = np.linalg.eigh(np.where(known[..., None, None], covariance, 0.0))
+    return np.where(known[..., None], values, np.nan), np.where(known[..., None, None], vectors, np.nan)
+
+
+def ellipsoid(covariance: np.ndarray) -> Ellipsoid:
+    """Standard ellipsoid of each covariance.
+
+    covariance   (..., 3, 3) m^2
+
+    Raises EstimationError for a matrix with a negative eigenvalue. Multiply `semi_axes` by `confidence_scale`.
+
+    Source: [FOERSTNER16] chapter 2, standard ellipse and ellipsoid of the normal distribution.
+
+    >>> ellipsoid(np.diag([4.0, 1.0, 9.0])).semi_axes
+    array([3., 2., 1.])
+    """
+    values, vectors = _eigen(np.asarray(covariance, dtype=float))
+    first, second = (_upright(vectors[..., :, k]) for k in (2, 1))
+    directions = np.stack([first, second, np.cross(first, second)], axis=-1)
+    return Ellipsoid(_square_roots(values)[..., ::-1], directions)
+
+
+def _upright(vectors: np.ndarray) -> np.ndarray:
+    """The vectors or their opposites, largest component positive: one of two equal answers, always the same."""
+    largest = np.take_along_axis(vectors, np.argmax(np.abs(vectors), axis=-1)[..., None], axis=-1)
+    return np.where(largest < 0.0, -vectors, vectors)
+
+
+def confidence_scale(probability: float, dimensions: int, degrees_of_freedom: float = np.inf) -> float:
+    """What multiplies the standard ellipsoid (3), ellipse (2) or interval (1) to hold the truth with a probability.
+
+    probability          0 to 1, both ends excluded
+    dimensions           1, 2 or 3 (any other number of quantities taken together as well)
+    degrees_of_freedom   of the variance factor, where the covariance was multiplied by it; infinite for a-priori ones
+
+    An ellipse in plan with the factor of 3 dimensions is the shadow of the ellipsoid, and holds more.
+
+    Source: [JCGM102] clause 6.5.2 (chi-square; Fisher's F with an estimated variance factor).
+
+    >>> [round(confidence_scale(0.95, d), 4) for d in (1, 2, 3)]
+    [1.96, 2.4477, 2.7955]
+    """
+    if not (0.0 < probability < 1.0 and dimensions >= 1 and degrees_of_freedom > 0.0):
+        raise EstimationError(
+            f"no confidence region of probability {probability:g} in {dimensions} dimensions with "
+            f"{degrees_of_freedom:g} degrees of freedom: expected 0 to 1, 1 or more, more than 0"
+        )
+    if np.isinf(degrees_of_freedom):
+        return float(np.sqrt(chdtri(dimensions, 1.0 - probability)))
+    return float(np.sqrt(dimensions * fdtri(dimensions, degrees_of_freedom, probability)))
+
+
+def contained_probability(scale: float, dimensions: int, degrees_of_freedom: float = np.inf) -> float:
+    """Probability that the truth lies in `scale` times the standard region; the inverse of `confidence_scale`.
+
+    Source: [JCGM102] clause 6.5.2.
+
+    >>> [round(contained_probability(1.0, d), 4) for d in (1, 2, 3)]
+    [0.6827, 0.3935, 0.1987]
+    """
+    if np.isinf(degrees_of_freedom):
+        return float(chdtr(dimensions, scale**2))
+    return float(fdtr(dimensions, degrees_of_freedom, scale**2 / dimensions))
+
+
+def elevation_view(bearing: float) -> np.ndarray:
+    """Axes (2, 3) to the right and up of a view along a horizontal bearing, clockwise from north, rad.
+
+    >>> elevation_view(0.0) + 0.0  # looking north, east is to the right
+    array([[1., 0., 0.],
+           [0., 0., 1.]])
+    """
+    return np.array([[np.cos(bearing), -np.sin(bearing), 0.0], [0.0, 0.0, 1.0]])
+
+
+def projected(covariance: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """Covariance (..., 2, 2) in a view: the shadow of the ellipsoid, by propagation.
+
+    covariance   (..., 3, 3) m^2
+    view         (2, 3) orthonormal axes to the right and up: PLAN, or `elevation_view`
+
+    Source: [FOERSTNER16] chapter 2, variance propagation.
+    """
+    return view @ np.asarray(covariance, dtype=float) @ view.T
+
+
+def ellipse(covariance: np.ndarray) -> Ellipse:
+    """Standard ellipse of each (..., 2, 2) covariance in a plane with an axis to the right and one up.
+
+    Raises EstimationError for a matrix with a negative eigenvalue.
+
+    Source: [FOERSTNER16] chapter 2, standard ellipse.
+    """
+    covariance = np.asarray(covariance, dtype=float)
+    values = _square_roots(_eigen(covariance)[0])
+    right, up, both = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
+    bearing = np.mod(0.5 * np.arctan2(2.0 * both, up - right), np.pi)
+    return Ellipse(values[..., 1], values[..., 0], bearing)
+
+
+def horizontal_ellipse(covariance: np.ndarray) -> Ellipse:
+    """Standard ellipse in plan of each (..., 3, 3) covariance; its bearing is clockwise from north.
+
+    >>> e = horizontal_ellipse(np.array([[2.5, 1.5, 0.0], [1.5, 2.5, 0.0], [0.0, 0.0, 9.0]]))  # longest to the NE
+    >>> round(float(np.degrees(e.bearing)), 9), round(float(e.major), 9), round(float(e.minor), 9)
+    (45.0, 2.0, 1.0)
+    """
+    return ellipse(projected(covariance, PLAN))
+
+
+def outline(covariance: np.ndarray, *, scale: float = 1.0, corners: int = 72) -> np.ndarray:
+    """Closed polygon (..., corners + 1, 2) of the ellipse of each (..., 2, 2) covariance, right and up, for drawing.
+
+    It starts at the end of the major axis and runs clockwise.
+    """
+    e = ellipse(covariance)
+    turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)
+    along, across = e.major[..., None] * np.cos(turn), e.minor[..., None] * np.sin(turn)
+    s, c = np.sin(e.bearing)[..., None], np.cos(e.bearing)[..., None]
+    return scale * np.stack([along * s + across * c, along * c - across * s], axis=-1)
+
+
+def relative_covariance(joint: np.ndarray) -> np.ndarray:
+    """Covariance (..., 3, 3) of the vector between two points from their joint one.
+
+    joint   (..., 6, 6) m^2, first point first
+
+    Source: [FOERSTNER16] chapter 2, variance propagation.
+    """
+    joint = np.asarray(joint, dtype=float)
+    cross = joint[..., :3, 3:]
+    return joint[..., :3, :3] + joint[..., 3:, 3:] - cross - np.swapaxes(cross, -1, -2)
+
+
+def point_uncertainty(covariance: np.ndarray) -> np.ndarray:
+    """Helmert's point error (...): root of the trace, the same in every frame, m.
+
+    covariance   (..., d, d) m^2; in plan give the upper left (..., 2, 2)
+
+    Source: [FOERSTNER16] chapter 4, evaluation of the result.
+
+    >>> float(point_uncertainty(np.diag([4.0, 4.0, 1.0])))
+    3.0
+    """
+    return np.sqrt(np.trace(np.asarray(covariance, dtype=float), axis1=-2, axis2=-1))
+
+
+def mean_coordinate_uncertainty(covariance: np.ndarray) -> np.ndarray:
+    """Root mean square (...) of the coordinates' standard uncertainties, (..., d, d) m^2 to m."""
+    return point_uncertainty(covariance) / np.sqrt(np.shape(covariance)[-1])
+
+
+def weakest_direction(joint: np.ndarray) -> tuple[float, np.ndarray]:
+    """What a network knows least: the standard uncertainty of its weakest direction, m, and how each point moves in it.
+
+    joint   (3k, 3k) m^2, joint covariance of k points
+
+    Returns the root of the largest eigenvalue and its unit vector (k, 3), largest component positive.
+    Raises EstimationError where the covariance is not finite.
+
+    Source: [FOERSTNER16] chapter 2, principal axes of the standard ellipsoid.
+
+    >>> u, motion = weakest_direction(np.diag([1.0, 4.0, 1.0, 1.0, 1.0, 1.0]))
+    >>> float(u), motion[0]
+    (2.0, array([0., 1., 0.]))
+    """
+    from scipy.linalg import eigh
+
+    joint = np.asarray(joint, dtype=float)
+    if not np.isfinite(joint).all():
+        raise EstimationError("the weakest direction of a covariance with nan: some point has no answer; leave it out")
+    values, vectors = eigh(joint, subset_by_index=[len(joint) - 1, len(joint) - 1])
+    return float(np.sqrt(values[0])), _upright(vectors[:, 0]).reshape(-1, 3)
