@@ -1,0 +1,115 @@
+"""All files of an adjusted network, or of two epochs compared, written into a directory."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from catseye.gateways.network_comparison import FORMAT as COMPARISON
+from catseye.gateways.network_comparison import Comparison, comparison_object, displacements_csv
+from catseye.gateways.network_findings import Findings
+from catseye.gateways.network_objects import FORMAT, network_json
+from catseye.gateways.network_tables import coordinates_csv, observations_csv, parameters_csv
+from catseye.gateways.network_xml import network_xml
+from catseye.gateways.objects import json_page, versions
+from catseye.gateways.output import PROVENANCE
+
+Progress = Callable[[str, int, int], None]  # what is being done, steps done, steps in all
+Files = dict[str, Callable[[], Iterable[str]]]  # pieces of text by the file's name
+
+
+def input_hashes(source: Path) -> dict[str, str]:
+    """SHA-256 of a network's file, or of the tables in its folder, by name.
+
+    source   a file, or a folder with points.csv and ranges.csv
+    """
+    files = sorted(source.glob("*.csv")) if source.is_dir() else [source]
+    return {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
+
+
+def write_network(
+    found: Findings, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """Tables, objects, report, and last the provenance with the hashes of the others.
+
+    found       what is told of a solution
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    inputs      SHA-256 of each file read, by its name, see `input_hashes`
+    progress    told of each file
+    """
+    when = datetime.now(UTC)
+    made = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(found)}
+    _write(_files(found, when, inputs, ""), directory, {**made, **_origin(when, inputs)}, progress)
+
+
+def write_comparison(
+    compared: Comparison, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """What moved, then the files of each epoch with its number before their names, last the provenance.
+
+    compared    two epochs
+    directory   exists, and is ours to fill
+    inputs      SHA-256 of each file read, by its name
+    progress    told of each file
+    """
+    from catseye.gateways.network_comparison_report import comparison_report
+
+    when = datetime.now(UTC)
+    files: Files = {
+        "displacements.csv": lambda: displacements_csv(compared),
+        "comparison.json": lambda: [json_page(comparison_object(compared))],
+        "report.html": lambda: [comparison_report(compared, when, inputs)],
+        **_files(compared.first, when, inputs, "epoch-1-"),
+        **_files(compared.second, when, inputs, "epoch-2-"),
+    }
+    d = compared.deformation
+    settings = {
+        **_settings(compared.first),
+        "displacement_level": d.level,
+        "displacement_power": d.power,
+        "datums_may_differ_by": d.datum,
+        "variance_factor": compared.variance_factor.value,
+    }
+    made = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
+    _write(files, directory, {**made, **_origin(when, inputs)}, progress)
+
+
+def _settings(found: Findings) -> dict[str, Any]:
+    return {"level": found.level, "scaled": found.scaled, "test": found.test, "datum": found.solution.datum}
+
+
+def _origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
+    return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
+
+
+def _files(found: Findings, when: datetime, inputs: Mapping[str, str], prefix: str) -> Files:
+    from catseye.gateways.network_report import network_report  # matplotlib is heavy
+
+    files: Files = {
+        "coordinates.csv": lambda: coordinates_csv(found),
+        "observations.csv": lambda: observations_csv(found),
+        "parameters.csv": lambda: parameters_csv(found),
+        "adjustment.json": lambda: network_json(found, lines=True),
+        "adjustment.xml": lambda: network_xml(found),
+        "report.html": lambda: [network_report(found, when, inputs, prefix=prefix)],
+    }
+    return {prefix + name: pieces for name, pieces in files.items()}
+
+
+def _write(files: Files, directory: Path, provenance: dict[str, Any], progress: Progress | None) -> None:
+    """Piece by piece, so that a large network needs no more memory than its columns."""
+    outputs: dict[str, str] = {}
+    for done, (name, pieces) in enumerate(files.items()):
+        if progress is not None:
+            progress(f"writing {name}", done, len(files))
+        digest = hashlib.sha256()
+        with (directory / name).open("wb") as stream:
+            for piece in pieces():
+                raw = piece.encode("utf-8")
+                digest.update(raw)
+                stream.write(raw)
+        outputs[name] = digest.hexdigest()
+    (directory / PROVENANCE).write_bytes(json_page({**provenance, "outputs": outputs}).encode("utf-8"))
+    if progress is not None:
+        progress("writing", len(files), len(files))

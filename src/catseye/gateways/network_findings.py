@@ -1,0 +1,323 @@
+"""What the ways out tell of an adjusted network, computed once, in the axes of its own file."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from operator import itemgetter
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.adjustment import CONVERGED, NONCENTRALITY
+from catseye.estimation.diagnosis import label
+from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, point_uncertainty
+from catseye.estimation.network import Network, NetworkSolution, points_of
+from catseye.estimation.reliability import (
+    GlobalTest,
+    bias_to_noise,
+    checked,
+    global_test,
+    observation_tests,
+    single_level,
+    tau_critical,
+    w_critical,
+)
+
+ROLES = ("from", "to", "third", "fourth")
+STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the kinds that are measured from a station
+MEASURES = ("observed", "u", "residual", "standardised", "redundancy", "mdb", "estimated_error", "bias_to_noise")
+NUMBER = re.compile(r"\d+")
+COMPONENTS = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationTable:
+    """All m observations of a network in the order of its file, a column each; lengths in m, angles in rad.
+
+    kinds             names of kinds, to which `kind` points
+    kind              (m,) int
+    unit              (m,) "m", "rad" or "1"
+    component         (m,) axis of the file, for one coordinate of a point or vector; else ""
+    sign              (m,) -1 where the file counts that axis the other way than this package
+    ends              (m, 4) rows of the points by role, from, to, third, fourth; -1 for none
+    group, row        (m,) int: where it stands in the network's groups
+    active            (m,) bool: took part
+    checked           (m,) bool: other observations would show an error in it
+    bias_to_noise     (m,) how many standard uncertainties of any result an error just not detectable moves it, at most;
+                      nan where unknown, as within correlated groups
+    observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `Fit`; mdb is its
+                      detectable_error; the last three are nan where nothing checks the observation, and all four
+                      where there is no answer
+    """
+
+    kinds: tuple[str, ...]
+    kind: np.ndarray
+    unit: np.ndarray
+    component: np.ndarray
+    sign: np.ndarray
+    ends: np.ndarray
+    group: np.ndarray
+    row: np.ndarray
+    active: np.ndarray
+    checked: np.ndarray
+    observed: np.ndarray
+    residual: np.ndarray
+    u: np.ndarray
+    redundancy: np.ndarray
+    standardised: np.ndarray
+    mdb: np.ndarray
+    estimated_error: np.ndarray
+    bias_to_noise: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @cached_property
+    def worst_first(self) -> np.ndarray:
+        """(m,) rows by falling |standardised|, those without a test last; of |residual| / u if none has one."""
+        size = np.abs(self.standardised)
+        if not np.isfinite(size).any():
+            size = np.abs(self.residual) / self.u
+        return np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
+
+
+def observation_table(solution: NetworkSolution) -> ObservationTable:
+    """The observations of a solution, in the order of the file where the network knows it, else group by group.
+
+    solution   an adjusted network
+
+    A component along an axis that the file counts the other way has its sign turned, with all that follows it.
+    """
+    network = solution.network
+    kinds: dict[str, int] = {}
+    parts = [_part(solution, g, kinds) for g in range(len(network.groups))]
+    order = _file_order(network)
+    joined = {
+        name: np.concatenate([part[name] for part in parts])[order] if parts else np.zeros(0) for name in _COLUMNS
+    }
+    if not parts:
+        joined |= {"ends": np.zeros((0, len(ROLES)), dtype=int), "component": np.zeros(0, dtype="U1")}
+    return ObservationTable(kinds=tuple(kinds), **joined)
+
+
+_COLUMNS = tuple(ObservationTable.__dataclass_fields__)[1:]
+
+
+def _part(solution: NetworkSolution, g: int, kinds: dict[str, int]) -> dict[str, np.ndarray]:
+    """The columns of one group; `kinds` gains its kinds."""
+    group, fit = solution.network.groups[g], solution.fits[g]
+    m = len(fit.residual)
+    own = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else each row has its own
+    names, at = (
+        (np.array([own]), np.zeros(m, dtype=int)) if own else np.unique(_each(group, "kinds"), return_inverse=True)
+    )
+    code = np.array([kinds.setdefault(str(name), len(kinds)) for name in names], dtype=int)
+    ends = np.full((m, len(ROLES)), -1)
+    for role, end in enumerate(points_of(group)[: len(ROLES)]):
+        ends[:, role] = end
+    component, sign = _components(solution.network, getattr(group, "component", np.full(m, "")))
+    known = fit.detectable_error > 0.0  # zero where no statistics were computed
+    shown = fit.active & known & checked(fit)
+    independent = group.covariance.ndim == 1
+    tested = np.where(shown | (known & ~fit.active), sign, np.nan)
+    return {
+        "kind": code[at],
+        "unit": np.asarray(getattr(group, "units", np.full(m, getattr(group, "unit", "") or "1"))),
+        "component": component,
+        "sign": sign,
+        "ends": ends,
+        "group": np.full(m, g),
+        "row": np.arange(m),
+        "active": fit.active,
+        "checked": shown,
+        "observed": sign * group.observed,
+        "residual": sign * fit.residual,
+        "u": fit.sigma,
+        "redundancy": np.where(known, fit.redundancy, np.nan),
+        "standardised": tested * fit.standardised,
+        "mdb": np.abs(tested) * fit.detectable_error,
+        "estimated_error": tested * fit.estimated_error,
+        "bias_to_noise": np.where(shown & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
+    }
+
+
+def _each(group: object, name: str) -> np.ndarray:
+    """(m,) texts of a group's rows, its name where it is of no kind of ours."""
+    own = getattr(group, name, None)
+    return np.asarray(own) if own is not None else np.full(len(group.observed), group.name)  # type: ignore[attr-defined]
+
+
+def _components(network: Network, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Components as the file calls them, and the sign with which it counts them."""
+    called, sign = component.astype("U8"), np.ones(len(component))
+    for k, name in enumerate(COMPONENTS):
+        mine = component == name
+        if mine.any():
+            j = int(np.argmax(np.abs(network.axes[k])))
+            called[mine], sign[mine] = network.axis_names[j], network.axes[k, j]
+    return called, sign
+
+
+def in_file_axes(network: Network, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates or displacements (n, 3) and covariances (n, 3, 3) turned into the axes of the network's file.
+
+    By exchange and sign, not by a product: an unknown coordinate leaves the others known.
+    """
+    at = np.argmax(np.abs(network.axes), axis=0)
+    sign = network.axes[at, np.arange(3)]
+    return sign * x[:, at], np.outer(sign, sign) * covariance[:, at[:, None], at]
+
+
+def _file_order(network: Network) -> np.ndarray:
+    """Rows of all groups, one after another, in the order of their places in the file; as they are if one has none."""
+    total = sum(len(g.observed) for g in network.groups)
+    if len(network.groups) < 2 or len(network.places) != len(network.groups) or not all(network.places):
+        return np.arange(total)
+    rank: dict[str, int] = {}
+    keys = []
+    for place in (place for places in network.places for place in places):
+        words = NUMBER.sub("", place)
+        keys.append((rank.setdefault(words, len(rank)), *map(int, NUMBER.findall(place))))
+    return np.array([i for i, _ in sorted(enumerate(keys), key=itemgetter(1))], dtype=int)
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """A solution and what is said of it, in the axes of its file.
+
+    solution      what was adjusted
+    x             (n, 3) m
+    covariance    (n, 3, 3) m^2, times the variance factor where `scaled`
+    factor        what the covariances and squared uncertainties were multiplied by; 1 unless `scaled`
+    scaled        the variance factor was applied
+    ellipsoid     standard ones of the points
+    table         observations
+    test          which test single observations had: "w" with the claimed sigmas, "tau" where `scaled`
+    statistic, p  (m,) of it in the order of `table`, the p-value corrected for their number; nan without a test
+    suspects      rows of `table` that the tests reject, worst first
+    whole         chi-square test of the variance factor against 1
+    level         of `whole`, and of all single tests together
+    level_single  of one of them; nan where nothing is tested
+    critical      |statistic| beyond which an observation is suspect; nan where nothing is tested
+    """
+
+    solution: NetworkSolution
+    x: np.ndarray
+    covariance: np.ndarray
+    factor: float
+    scaled: bool
+    ellipsoid: Ellipsoid
+    table: ObservationTable
+    test: str
+    statistic: np.ndarray
+    p: np.ndarray
+    suspects: np.ndarray
+    whole: GlobalTest
+    level: float
+    level_single: float
+    critical: float
+
+    @property
+    def network(self) -> Network:
+        return self.solution.network
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.network.points.names
+
+    @property
+    def answered(self) -> bool:
+        """There are coordinates to trust as far as their covariance says."""
+        return self.solution.status.startswith(CONVERGED)
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """(n, 3) m, standard uncertainties of the coordinates."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @cached_property
+    def u_point(self) -> np.ndarray:
+        """(n,) m, root of the trace of the covariance."""
+        return point_uncertainty(self.covariance)
+
+    @cached_property
+    def u_parameters(self) -> np.ndarray:
+        """(p,) of the parameters, variance factor applied where `scaled`."""
+        return self.solution.u_parameters * np.sqrt(self.factor)
+
+    @cached_property
+    def stations(self) -> np.ndarray:
+        """(n,) bool: points that something was measured from."""
+        from_here = np.zeros(len(self.names), dtype=bool)
+        table = self.table
+        sighted = np.array([any(word in kind for word in STATIONED) for kind in table.kinds], dtype=bool)
+        start = table.ends[:, 0] if len(table) else np.zeros(0, dtype=int)
+        from_here[start[(start >= 0) & sighted[table.kind]]] = True
+        return from_here
+
+    @cached_property
+    def seen(self) -> np.ndarray:
+        """(n,) how many active observations name each point."""
+        count = np.zeros(len(self.names), dtype=int)
+        for end in self.table.ends[self.table.active].T:
+            count += np.bincount(end[end >= 0], minlength=len(count))
+        return count
+
+    def label(self, row: int) -> str:
+        """What an observation of the table is called: its kind, its points, its place in the file."""
+        component = str(self.table.component[row])
+        text = label(self.network, int(self.table.group[row]), int(self.table.row[row]))
+        return f"{component} of {text}" if component else text
+
+    def kind(self, row: int) -> str:
+        return self.table.kinds[self.table.kind[row]]
+
+
+def findings(solution: NetworkSolution, *, scaled: bool = False, level: float = 0.05) -> Findings:
+    """All that the ways out tell of a solution.
+
+    solution   an adjusted network, with an answer or without
+    scaled     multiply covariances by the variance factor, and test observations against it (tau tests)
+    level      of the chi-square test, and of all tests of single observations together
+
+    Raises EstimationError where `scaled` and nothing was measured twice.
+    """
+    factor = solution.variance_factor if scaled else 1.0
+    if scaled and not np.isfinite(factor) and np.isfinite(solution.covariance).any():
+        raise EstimationError(
+            f"the variance factor is unknown ({solution.degrees_of_freedom:g} degrees of freedom); "
+            "leave the uncertainties as claimed"
+        )
+    x, covariance = in_file_axes(solution.network, solution.x, solution.covariance * factor)
+    table = observation_table(solution)
+    tau = scaled and solution.degrees_of_freedom > 1.0
+    tests = observation_tests(solution.fits, level=level, known_sigma=not tau)
+    offset = np.cumsum([0, *(len(f.residual) for f in solution.fits)])
+    at = offset[table.group] + table.row
+    p, statistic = (
+        np.where(table.checked, np.concatenate([[], *parts])[at], np.nan) for parts in (tests.adjusted, tests.statistic)
+    )
+    suspects = np.flatnonzero(p < level)
+    count = int(np.count_nonzero(table.checked))
+    single = single_level(level, count) if count else np.nan
+    limit = np.nan
+    if count:
+        limit = tau_critical(single, solution.degrees_of_freedom) if tau else w_critical(single)
+    degrees = solution.degrees_of_freedom
+    return Findings(
+        solution=solution,
+        x=x,
+        covariance=covariance,
+        factor=factor,
+        scaled=scaled,
+        ellipsoid=ellipsoid(covariance),
+        table=table,
+        test="tau" if tau else "w",
+        statistic=statistic * table.sign,
+        p=p,
+        suspects=suspects[np.argsort(-np.abs(statistic[suspects]), kind="stable")],
+        whole=global_test(solution.variance_factor * degrees, degrees if np.isfinite(degrees) else 0.0, level),
+        level=level,
+        level_single=single,
+        critical=limit,
+    )
