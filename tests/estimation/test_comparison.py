@@ -71,7 +71,7 @@ def test_the_metro_points_move_as_two_other_programs_say(metro):
 
 
 def test_the_large_metro_shifts_are_not_the_significant_ones(metro):
-    """Checked only against ourselves, but for the scatter below: along the tunnel u is 0.75 mm, across it 0.1 to 0.2."""
+    """Checked only against ourselves, but for the scatter: along the tunnel u is 0.75 mm, across it 0.1 to 0.2."""
     found = compare(*metro)
     d = found.deformation
     assert d.before.degrees_of_freedom == 30
@@ -169,8 +169,8 @@ def check_metro_scatter(metro, runs, seed):
     assert abs(alarms / runs - 0.05) < 3.5 * np.sqrt(0.05 * 0.95 / runs)
 
 
-def test_the_claimed_covariance_of_metro_displacements_holds_in_120_runs(metro):
-    check_metro_scatter(metro, 120, 31)
+def test_the_claimed_covariance_of_metro_displacements_holds_in_100_runs(metro):
+    check_metro_scatter(metro, 100, 31)
 
 
 @pytest.mark.slow
@@ -255,12 +255,13 @@ def test_holding_the_fewest_coordinates_anywhere_changes_no_decision(ranging_net
         np.testing.assert_array_equal(d.moved, plain.moved)
         assert not d.held.any()
         assert not other.carried
-        np.testing.assert_allclose(d.displacement, plain.displacement, rtol=0, atol=1e-8)
+        # the given coordinates are 1 cm off: with the datum the axes turn by 0.1 mrad, and 0.3 mm by 30 nm
+        np.testing.assert_allclose(d.displacement, plain.displacement, rtol=0, atol=1e-7)
         np.testing.assert_allclose(d.p[plain.moved], plain.p[plain.moved], rtol=0.05)
-        np.testing.assert_allclose(other.difference, results[0].difference, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(other.difference, results[0].difference, rtol=0, atol=1e-7)
         scale = results[0].difference_covariance.max()
         np.testing.assert_allclose(
-            other.difference_covariance, results[0].difference_covariance, rtol=0, atol=1e-4 * scale
+            other.difference_covariance, results[0].difference_covariance, rtol=0, atol=1e-3 * scale
         )
 
 
@@ -298,7 +299,7 @@ def test_one_by_one_beside_a_frame_a_point_has_the_displacement_of_a_joint_adjus
     assert turned_alike(first, second, turn, found, stations)
     with pytest.raises(EstimationError, match="S77 of the frame: not among the points compared"):
         compare(first, second, frame=["S01", "S77"])
-    with pytest.raises(EstimationError, match="nothing to test|do not hold the datum"):
+    with pytest.raises(EstimationError, match=r"nothing to test|do not hold the datum"):
         compare(first, second, frame=["S01", "S02"])
 
 
@@ -345,7 +346,7 @@ def test_many_points_are_compared_beside_the_points_that_define_the_datum(rangin
 def test_alarms_beside_a_frame_stay_below_the_level(ranging_network):
     rng = np.random.default_rng(48)
     stations = [f"S{i:02d}" for i in range(1, 9)]
-    runs = 150
+    runs = 100
     alarms = sum(compare(*twins(ranging_network, rng), frame=stations).deformation.moved.any() for _ in range(runs))
     assert 0 < alarms / runs < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / runs)
 
@@ -367,7 +368,7 @@ def test_a_point_that_kept_its_name_only_is_set_apart_and_compared_when_asked(ra
 
 def test_what_does_not_fit_together_is_refused_in_one_line(metro, ranging_network):
     first, second = metro
-    with pytest.raises(EstimationError, match="the first epoch holds 201, .* at the second's result; give the epochs"):
+    with pytest.raises(EstimationError, match=r"the first epoch holds 201, .* at the second's result; give the epochs"):
         compare(second, first)
     axes = replace(second, network=replace(second.network, axes=np.eye(3)))
     with pytest.raises(EstimationError, match="the epochs have different axes: x, y, z with"):
@@ -390,6 +391,7 @@ def test_what_does_not_fit_together_is_refused_in_one_line(metro, ranging_networ
     with pytest.raises(EstimationError, match=r"the second epoch holds 201, .* that do not come from the other epoch"):
         compare(first, held_off(np.full((len(second.x), 3), 1e-3)))
     assert compare(first, held_off(np.full((len(second.x), 3), 1e-3)), datum="levelled").carried == ()
+    assert "the second epoch: converged, but the" in "".join(compare(first, held_off(one), datum="levelled").words)
     inflated = [np.full(len(g.observed), 1.3) for g in second.network.groups]
     with pytest.raises(EstimationError, match="not that of its observations' sigmas"):
         compare(first, adjusted(second.network, inflation=inflated))
@@ -402,3 +404,25 @@ def test_the_least_datum_has_every_motion_that_floats():
     for name, motions in (("absolute", []), ("translation", [0, 2]), ("levelled", [5]), ("levelled similarity", [6, 1]),
                           ("rigid", [3]), ("similarity", [3, 6])):  # fmt: skip
         assert epoch_model._least_datum(np.eye(7)[:, motions]) == name
+
+
+def test_the_ranging_engine_gives_the_comparison_that_the_dense_one_gives(ranging_network):
+    """Block elimination, where 205 points make it the choice, against whole normal equations; the frame holds T001."""
+    rng = np.random.default_rng(51)
+    network, true = ranging_network(5, stations=6, targets=199, sigma=2e-5)
+    after = true.copy()
+    after[[2, 30]] += [3e-4, -2e-4, 2e-4]
+    drawn = [measured(network, x.ravel(), rng) for x in (true, after)]
+    frame = [*(f"S{i:02d}" for i in range(1, 7)), "T001", "T002"]
+    for options in ({"frame": frame}, {"rule": "local"}):
+        fast, plain = (
+            compare(*(adjust_network(epoch, engine=engine) for epoch in drawn), **options)
+            for engine in ("ranging", "dense")
+        )
+        d = plain.deformation
+        assert [d.names[i] for i in np.flatnonzero(d.moved)] == ["S03", "T025"]
+        np.testing.assert_array_equal(fast.deformation.moved, d.moved)
+        np.testing.assert_allclose(fast.deformation.displacement, d.displacement, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(fast.deformation.p, d.p, rtol=1e-2, atol=1e-6)
+        scale = plain.difference_covariance.max()
+        np.testing.assert_allclose(fast.difference_covariance, plain.difference_covariance, rtol=0, atol=1e-4 * scale)

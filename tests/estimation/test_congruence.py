@@ -185,5 +185,8 @@ def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turn
     np.testing.assert_allclose(q, onto @ (first[1] + second[1]) @ onto.T, rtol=0, atol=1e-4 * q.max())
     white = np.linalg.solve(np.linalg.cholesky(q[15:, 15:]), np.array(errors).T[15:])
     np.testing.assert_allclose(white @ white.T / runs, np.eye(12), atol=5.0 * np.sqrt(2.0 / runs))
+    other = differences(epochs, "rigid", np.ones(9, dtype=bool))  # aligned on all, seen from five
+    np.testing.assert_allclose(other.seen_from(stable)[0], d, rtol=0, atol=2e-9)
+    assert np.abs(other.d - d).max() > 1e-6
     with pytest.raises(EstimationError, match="2 stable points do not hold a rigid datum"):
         found.seen_from(np.arange(9) < 2)

@@ -13,16 +13,23 @@ import pytest
 from scipy.stats import chi2
 
 from catseye.errors import EstimationError
-from catseye.estimation.deformation import Epochs, VarianceFactor, moved_points
+from catseye.estimation.comparison import compare
 from catseye.estimation.network_adjustment import adjust_network
-from catseye.gateways.network_comparison import Comparison, comparison_object, displacements_csv
+from catseye.gateways.network_comparison import (
+    Comparison,
+    comparison_object,
+    comparison_passages,
+    displacements_csv,
+)
 from catseye.gateways.network_files import input_hashes, write_comparison, write_network
 from catseye.gateways.network_findings import findings
 from catseye.gateways.network_objects import network_json, network_object
+from catseye.gateways.network_summary import treatment_passages
 from catseye.gateways.network_tables import coordinates_csv, observations_csv, parameters_csv
 from catseye.gateways.network_xml import NAMESPACE, network_xml
 from catseye.records.gama import read_gama
 from catseye.records.network_folder import read_network_folder
+from catseye.reduction.networks import adjusted
 
 NETWORKS = Path(__file__).parents[1] / "vectors" / "networks"
 GON = np.pi / 200.0
@@ -277,6 +284,28 @@ def test_a_planted_blunder_is_the_first_suspect_with_its_sign_and_size(solution)
     )
 
 
+def test_what_was_left_out_is_named_by_its_number_in_the_file(solution):
+    network = solution.network
+    group = next(g for g in network.groups if g.kind == "vector")
+    wrong = group.observed.copy()
+    wrong[1] += 0.05  # y here, which the file calls x
+    groups = tuple(replace(g, observed=wrong) if g is group else g for g in network.groups)
+    treated = adjusted(replace(network, groups=groups), reject=True)
+    found = findings(treated.solution)
+    told = network_object(found, treated)
+    assert read_json(network_json(found, treated=treated)) == told
+    assert told["treatment"]["method"] == "rejected"
+    out = told["treatment"]["rejected"]
+    (mine,) = [r for r in told["treatment"]["rejections"] if told["observations"][r["observation"]]["component"] == "x"]
+    row = told["observations"][mine["observation"]]
+    assert mine["observation"] in out
+    assert (row["kind"], row["active"], row["weight"]) == ("vector", False, 0.0)
+    assert mine["estimated_error"] == pytest.approx(0.05, abs=0.01)
+    assert all(r["weight"] == 1.0 for i, r in enumerate(told["observations"]) if i not in out)
+    said = treatment_passages(treated, found)
+    assert f"x of {found.label(mine['observation']).removeprefix('x of ')}" in said[0].text
+
+
 def test_an_observation_that_nothing_checks_says_so_and_claims_nothing(found):
     told = network_object(found)
     far = [row for row in told["observations"] if row["to"] == "far"]
@@ -528,11 +557,9 @@ def compared(tmp_path_factory, solution):
     file.write_text(gkf(seed=6), encoding="utf-8")
     TRUTH["Q,2"] = truth
     second = adjust_network(read_gama(file))
-    names = tuple(n for n in solution.network.points.names if n != "far")
-    rows = [solution.index[n] for n in names]
-    epochs = Epochs(names, solution.x[rows], second.x[rows], solution.block(names), second.block(names))
-    deformation = moved_points(epochs, datum="absolute")
-    return Comparison(findings(solution), findings(second), deformation, VarianceFactor())
+    names = [n for n in solution.network.points.names if n != "far"]
+    moved = compare(solution, second, points=names)
+    return Comparison(findings(solution), findings(second), moved)
 
 
 def test_what_moved_is_told_in_the_axes_of_the_file(compared):
@@ -547,6 +574,12 @@ def test_what_moved_is_told_in_the_axes_of_the_file(compared):
     assert set(told["stable"]) == {"C & D", 'P"1"'}
     assert told["congruence"]["all"]["p"] < 1e-6 < told["congruence"]["stable"]["p"]
     assert told["variance_factor_degrees_of_freedom"] is None
+    i, j = (f.names.index("Q,2") for f in (compared.first, compared.second))
+    plain = compared.second.x[j] - compared.first.x[i]  # A and B are held in both epochs: one datum
+    assert point["difference"] == pytest.approx(plain, abs=1e-9)
+    said = {p.title: p.text for p in comparison_passages(compared)}
+    assert "Q,2" in said["What moved"]
+    assert f"dx {1e3 * point['displacement'][0]:+.3f}" in said["Q,2"]
     rows = {row["point"]: row for row in read_csv(displacements_csv(compared))}
     assert float(rows["Q,2"]["dx_mm"]) == pytest.approx(1e3 * point["displacement"][0], abs=1e-6)
     assert float(rows["Q,2"]["length_mm"]) == pytest.approx(1e3 * np.linalg.norm(point["displacement"]), abs=1e-6)
@@ -558,7 +591,7 @@ def test_a_coordinate_not_compared_is_unknown_not_zero(compared):
         compared.deformation,
         displacement=np.where(np.arange(3) < 2, np.nan, compared.deformation.displacement),
     )
-    partly = replace(compared, deformation=deformation)
+    partly = replace(compared, moved=replace(compared.moved, deformation=deformation))
     point = comparison_object(partly)["points"]["Q,2"]
     assert point["displacement"][:2] == [None, None]
     assert point["length"] == pytest.approx(abs(point["displacement"][2]))

@@ -13,7 +13,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver
 from scipy.stats import chi2
 
-from catseye.estimation.deformation import Epochs, VarianceFactor, moved_points
+from catseye.estimation.comparison import compare
 from catseye.estimation.ellipsoid import PLAN, elevation_view
 from catseye.estimation.network_adjustment import adjust_network
 from catseye.gateways import network_comparison_report as comparison
@@ -256,14 +256,10 @@ def compared(tunnel):
     """The tunnel measured twice, by the same numbers, but 35 went 4 mm along the file's y in between."""
     names = tuple(n for n in tunnel.names if n in ("31", "32", "33", "34", "35", "41", "42", "43", "44", "45"))
     solution = tunnel.solution
-    rows = [solution.index[n] for n in names]
-    second = solution.x[rows].copy()
-    moved = np.zeros(3)
-    moved[1] = 0.004
-    second[names.index("35")] += tunnel.network.axes @ moved
-    q = solution.block(names)
-    deformation = moved_points(Epochs(names, solution.x[rows], second, q, q), datum="levelled")
-    return Comparison(tunnel, tunnel, deformation, VarianceFactor())
+    x = solution.x.copy()
+    x[solution.index["35"]] += tunnel.network.axes @ (0.0, 0.004, 0.0)
+    second = replace(solution, x=x)
+    return Comparison(tunnel, findings(second), compare(solution, second, points=names))
 
 
 def test_the_report_of_two_epochs_names_what_moved_and_how_far(compared):

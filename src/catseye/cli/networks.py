@@ -1,5 +1,6 @@
 """The commands of networks: adjust, plan."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,7 @@ COMPONENTS = "rangers|groups"
 SUFFIXES = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
 
 
-def _one_of(words: str):  # type: ignore[no-untyped-def]
+def _one_of(words: str) -> Callable[[str | None], str | None]:
     def check(value: str | None) -> str | None:
         if value is not None and value not in words.split("|"):
             raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
@@ -138,7 +139,7 @@ def adjust(
         raise EstimationError(f"{network}: {treated[0].solution.status}")
 
 
-def _read(reader, source: Path) -> "Network":  # type: ignore[no-untyped-def]
+def _read(reader: "Callable[[Path], Network]", source: Path) -> "Network":
     if not source.exists():
         raise InputError(f"{source}: missing (expected {SUFFIXES})")
     return reader(source)

@@ -139,7 +139,7 @@ def compare(
 def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:
     a, b = first.network, second.network
     for which, solution in (("first", first), ("second", second)):
-        if solution.status != CONVERGED:
+        if not solution.status.startswith(CONVERGED):
             raise EstimationError(f"the {which} epoch has no answer to compare: {solution.status}")
     if not np.array_equal(a.axes, b.axes) or a.axis_names != b.axis_names:
         raise EstimationError(
@@ -322,4 +322,5 @@ def _words(done: Comparison, rounding: float, same_point: float, same: Sequence[
     )
     estimated = np.isfinite(done.variance_factor.degrees_of_freedom)
     words.append(f"{text}; {'pooled' if estimated else 'covariances a priori'}")
+    words += [f"the {which} epoch: {s.status}" for which, s in (("first", a), ("second", b)) if s.status != CONVERGED]
     return [*words, done.deformation.status]

@@ -21,6 +21,7 @@ TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds who
 LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
 GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
 EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
+EXCHANGE_ALL = 300  # points up to which all pairs are tried
 EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
 
 
@@ -143,7 +144,10 @@ def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution
             total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, len(names))
             number += np.bincount(end[used], minlength=len(names))
     if solution.variance_factor > EXCHANGE_FROM:
+        few = len(names) <= EXCHANGE_ALL
         likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
+        if not few:  # only the worst fitting of them, for the trials take long
+            likely = likely[np.argsort(-total[likely] / number[likely])][:6]
         trials = []
         for i, j in combinations(sorted(int(k) for k in likely), 2):
             xyz, order = network.points.xyz.copy(), [j, i]

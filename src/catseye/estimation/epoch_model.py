@@ -49,7 +49,8 @@ def _rows(solution: NetworkSolution) -> tuple[list[Rows], np.ndarray]:
 def _floating(solution: NetworkSolution) -> Floating:
     """What the observations alone leave floating, whatever coordinates are held."""
     rows, x = _rows(solution)
-    free = np.concatenate([np.ones(solution.x.size, dtype=bool), [p.sigma > 0.0 for p in solution.network.parameters]])
+    held = np.array([p.sigma == 0.0 for p in solution.network.parameters], dtype=bool)
+    free = np.concatenate([np.ones(solution.x.size, dtype=bool), ~held])
     return floating_motions(rows, x, solution.x, free)
 
 
@@ -155,6 +156,7 @@ class EpochModel:
     follow           (3n, k) of the second epoch's coordinates by the k carried ones; unit rows for these themselves
     carried          (k,) which coordinates these are
     rounded          (3n, k) follow where it is not a unit row, times the standard uncertainty of rounding
+    of_carried       (3n, k) m^2, covariance of the first epoch's coordinates with the carried ones
     """
 
     names: tuple[str, ...]
@@ -165,6 +167,7 @@ class EpochModel:
     follow: np.ndarray
     carried: np.ndarray
     rounded: np.ndarray
+    of_carried: np.ndarray
 
     @classmethod
     def of(
@@ -180,15 +183,24 @@ class EpochModel:
             s.q if floating is None else _released(s.q, floating, at)
             for s, floating, at in zip((first, second), held.released, columns, strict=True)
         ]
-        follow = np.zeros((3 * len(names), len(carried)))
+        follow, of_carried = (np.zeros((3 * len(names), len(carried))) for _ in range(2))
         if len(carried):
             follow = _follow(second, columns[1], columns[1][carried])
+            of_carried = q[0].across(columns[0][carried])[columns[0]]
         rounded = held.u * follow
         follow[carried] = np.eye(len(carried))
         x, y = (s.x.ravel()[at] for s, at in zip((first, second), columns, strict=True))
         y = np.where(np.isin(np.arange(len(y)), carried), x, y)
         return cls(
-            names, x.reshape(-1, 3), y.reshape(-1, 3), (q[0], q[1]), (columns[0], columns[1]), follow, carried, rounded
+            names=names,
+            x=x.reshape(-1, 3),
+            y=y.reshape(-1, 3),
+            q=(q[0], q[1]),
+            columns=(columns[0], columns[1]),
+            follow=follow,
+            carried=carried,
+            rounded=rounded,
+            of_carried=of_carried,
         )
 
     def parts(self, rows: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -196,17 +208,12 @@ class EpochModel:
 
         The third is of the first epoch's rows with the second's chosen ones, the fourth the other way round.
         """
-        (q1, q2), (c1, c2) = self.q, self.columns
-        held = q1.within(c1[self.carried])
-        f, g, r, s = self.follow[rows], self.follow[chosen], self.rounded[rows], self.rounded[chosen]
-        second = q2.across(c2[chosen])[c2[rows]] + f @ held @ g.T + r @ s.T
-        from_held = q1.across(c1[self.carried])
-        return (
-            q1.across(c1[chosen])[c1[rows]],
-            second,
-            from_held[c1[rows]] @ g.T,
-            f @ from_held[c1[chosen]].T,
-        )
+        own = []
+        for q, at in zip(self.q, self.columns, strict=True):
+            own.append(q.within(at[rows]) if rows is chosen else q.across(at[chosen])[at[rows]])
+        f, g = self.follow[rows], self.follow[chosen]
+        second = own[1] + f @ self.of_carried[self.carried] @ g.T + self.rounded[rows] @ self.rounded[chosen].T
+        return own[0], second, self.of_carried[rows] @ g.T, f @ self.of_carried[chosen].T
 
     def epochs(self, points: np.ndarray) -> Epochs:
         """Some of the points, those that carry the datum among them, with all their covariances."""
@@ -218,11 +225,11 @@ class EpochModel:
         """(m, 3, 3) m^2, covariance of each point's difference by itself, the second epoch turned (3, 3)."""
         at = 3 * points[:, None] + np.arange(3)
         (q1, q2), (c1, c2) = self.q, self.columns
-        held = q1.within(c1[self.carried])
         f, r = turned @ self.follow[at], turned @ self.rounded[at]
-        cross = q1.across(c1[self.carried])[c1[at]] @ f.transpose(0, 2, 1)
-        own = turned @ q2.blocks(c2[at[:, 0]]) @ turned.T + f @ held @ f.transpose(0, 2, 1) + r @ r.transpose(0, 2, 1)
-        return q1.blocks(c1[at[:, 0]]) + own - cross - cross.transpose(0, 2, 1)
+        cross = self.of_carried[at] @ f.transpose(0, 2, 1)
+        second = turned @ q2.blocks(c2[at[:, 0]]) @ turned.T + r @ r.transpose(0, 2, 1)
+        second = second + f @ self.of_carried[self.carried] @ f.transpose(0, 2, 1)
+        return q1.blocks(c1[at[:, 0]]) + second - cross - cross.transpose(0, 2, 1)
 
 
 def _released(q: Covariance, floating: Floating, columns: np.ndarray) -> Covariance:

@@ -2,9 +2,10 @@
 
 observed = (1 + scale) |target - station| + zero + error, zero and scale of the station held, free or with a prior.
 Every target is eliminated into a dense system of the stations' parameters, so thousands of targets cost milliseconds:
-in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises.
-It is scale-free: rank is judged by directions and by the share of a diagonal that survives the elimination, so metres,
-nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `multilateration_datum`.
+in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises, with the
+normal matrix kept once a step is a thousandth of the one before. It is scale-free: rank is judged by directions and by
+the share of a diagonal that survives the elimination, so metres, nanometre sigmas and kilometres decide alike. Free
+motions are held by inner constraints: see `multilateration_datum`.
 """
 
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ __all__ = ["PointPriors", "RangingNetwork", "RangingSolution", "StationRanges", 
 COMPILED_FROM = 200_000  # ranges: below, importing the compiled kernels costs more than they save
 WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): directions within 1 microradian of a plane show nothing off it
 WORST_NETWORK = 1e-13  # of the reduced matrix, scaled by its diagonal before elimination: below it is roundoff
+KEEP_BELOW = 1e-3  # of the step before: the normal matrix changes no more than that, and is kept
 EPS = float(np.finfo(float).eps)
 
 
@@ -35,8 +37,10 @@ class Blocks(Protocol):
     """Either engine: `NumpyBlocks`, `KernelBlocks`."""
 
     def reduce(self, state: State) -> Reduced: ...
+    def follow(self, state: State, old: Reduced) -> Reduced: ...
     def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray: ...
-    def statistics(self, state: State, inverse: np.ndarray, q: np.ndarray) -> Statistics: ...
+    def felt(self, at: State, own: np.ndarray) -> np.ndarray: ...
+    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +97,8 @@ class RangingSolution:
     standardised: np.ndarray
     detectable: np.ndarray
     _setup: Setup
-    _state: State
+    _at: State
+    _answer: State
     _inverse: np.ndarray
     _gauge: Gauge | None
 
@@ -123,7 +128,7 @@ class RangingSolution:
         """(m,) m, observed minus predicted, of ranges left out as well."""
         problem = self._setup.problem
         rows = np.arange(len(problem.distance))
-        return linearise(problem, self._state, rows, np.ones(len(rows))).misclosure
+        return linearise(problem, self._answer, rows, np.ones(len(rows))).misclosure
 
     @cached_property
     def estimated_error(self) -> np.ndarray:
@@ -146,7 +151,7 @@ class RangingSolution:
             self.detectable,
             float(np.sum((problem.root * self.residual) ** 2)),
         )
-        return ranges, *self._setup.terms.fits(self._state, self.covariance, self.covariance_targets, self.width)
+        return ranges, *self._setup.terms.fits(self._answer, self.covariance, self.covariance_targets, self.width)
 
     def require_converged(self) -> "RangingSolution":
         """This solution, or EstimationError with its status."""
@@ -161,12 +166,12 @@ class RangingSolution:
         """
         if self._gauge is None:
             raise EstimationError(f"no covariance: {self.status if self.status != CONVERGED else 'tests was False'}")
-        problem, state, gauge, p = self._setup.problem, self._state, self._gauge, self.width
+        problem, gauge, p = self._setup.problem, self._gauge, self.width
         s, t = np.asarray(stations, dtype=np.int64), np.asarray(targets, dtype=np.int64)
         place = np.full(len(self.targets), -1)
         place[t] = np.arange(len(t))
         rows = np.flatnonzero(place[problem.target] >= 0)
-        seen = linearise(problem, state, rows, problem.root[rows])
+        seen = linearise(problem, self._at, rows, problem.root[rows])
         y = np.zeros((len(t), len(self.stations), p, 3))
         np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
         y = (y.reshape(len(t), -1, 3) @ self._inverse[t]).transpose(1, 0, 2).reshape(len(self.covariance), -1)
@@ -286,14 +291,15 @@ class _Iteration:
 
     def __init__(self, setup: Setup, blocks: Blocks):
         self.setup, self.blocks, self.problem = setup, blocks, setup.problem
-        self.state = setup.start
+        self.state = self.at = setup.start
+        self.factor: _Factor | None = None
         self.free = np.flatnonzero(self.problem.free_stations.ravel())
         self.taken, self.cost, self.moment = 0, np.nan, 0.0
 
     def run(self, network: RangingNetwork, iterations: int, tests: bool) -> RangingSolution:
         """Iterate to an answer, then its statistics."""
         status, answer = NOT_CONVERGED.format(step=np.inf, iterations=0), None
-        reduced = self._reduce(self.state)
+        reduced, before = self._reduce(self.state), 0.0
         while self.taken < iterations:
             self.taken += 1
             step = self._solve(reduced)
@@ -301,19 +307,27 @@ class _Iteration:
                 status = step
                 break
             if step.size < STEP_IN_SIGMAS + step.noise:
-                self.state, self.cost, answer = self._moved(step, 1.0), max(self.cost - step.gain, 0.0), step
-                status = CONVERGED
+                status, answer = CONVERGED, step
                 break
             status = NOT_CONVERGED.format(step=step.size, iterations=self.taken)
-            following = self._descend(step)
-            if following is None:
+            descent = self._descend(step, reduced, keep=step.size < KEEP_BELOW * before)
+            if descent is None:
                 break
-            reduced = following
+            reduced, before = descent, step.size
         return self._solution(network, status, reduced, answer, tests)
 
     def _reduce(self, state: State) -> Reduced:
+        """Normal equations at a state, whose factor is then to be found."""
         reduced = self.blocks.reduce(state)
         cost, moment = self.setup.terms.add(state, reduced.normal, reduced.before, reduced.right, self.problem.width)
+        self.cost, self.moment, self.at, self.factor = reduced.cost + cost, reduced.moment + moment, state, None
+        return reduced
+
+    def _follow(self, state: State, old: Reduced) -> Reduced:
+        """The right side at a state close to where the normal matrix was built, which is kept with its factor."""
+        reduced = self.blocks.follow(state, old)
+        aside = np.zeros_like(old.normal), np.zeros_like(old.before)
+        cost, moment = self.setup.terms.add(state, *aside, reduced.right, self.problem.width)
         self.cost, self.moment = reduced.cost + cost, reduced.moment + moment
         return reduced
 
@@ -327,13 +341,13 @@ class _Iteration:
         )
         return State(old.stations + by_station[:, :3], old.targets + fraction * step.targets, zero, scale)
 
-    def _descend(self, step: _Step) -> Reduced | None:
-        """Take the step, halved while the cost rises; None if even a thousandth of it does not descend."""
+    def _descend(self, step: _Step, old: Reduced, *, keep: bool) -> Reduced | None:
+        """Take the step, halved while the cost rises, or None; keep: the normal matrix, if the whole step descends."""
         before = self.cost
         noise = 8.0 * EPS * (before * self.moment) ** 0.5 + EPS**2 * self.moment  # of the cost, from roundoff of D
         for halving in range(11):
             trial = self._moved(step, 0.5**halving)
-            reduced = self._reduce(trial)
+            reduced = self._follow(trial, old) if keep and not halving else self._reduce(trial)
             if self.cost <= before * ROUNDING + noise:
                 self.state = trial
                 return reduced
@@ -348,16 +362,17 @@ class _Iteration:
         if refusal is not None:
             return refusal
         motions = self.setup.motions(self.state)
-        null = self._null(motions)
-        factor = self._factorise(reduced, null)
+        null = self._null(motions, self.state)
+        factor = self.factor or self._factorise(reduced, null)
         if isinstance(factor, str):
             return factor
+        self.factor = factor
         first = factor.solve(reduced.right)
         second = self.blocks.back(self.state, reduced, first)
         gain = max(reduced.gain + float(reduced.right @ first), 0.0)
         size = gain
         if motions.shape[1]:
-            conditions = self._conditions(motions)
+            conditions = self._conditions(motions, self.state)
             if isinstance(conditions, str):
                 return conditions
             shift = conditions.restore(first.reshape(len(self.state.stations), -1)[:, :3], second)
@@ -387,12 +402,12 @@ class _Iteration:
             return None
         return status_of.floating_targets(self.problem, self.state, self.setup.names, bad)
 
-    def _null(self, motions: np.ndarray) -> np.ndarray:
+    def _null(self, motions: np.ndarray, state: State) -> np.ndarray:
         """What the free motions do to the stations' parameters: (n, f)."""
         null = np.zeros((*self.problem.free_stations.shape, motions.shape[1]))
-        null[:, :3] = generators(self.state.stations) @ motions
+        null[:, :3] = generators(state.stations) @ motions
         if self.problem.width > 3:
-            null[:, 4] = -(1.0 + self.state.scale)[:, None] * motions[6]
+            null[:, 4] = -(1.0 + state.scale)[:, None] * motions[6]
         return (null * self.problem.free_stations[:, :, None]).reshape(
             self.problem.free_stations.size, motions.shape[1]
         )
@@ -427,41 +442,45 @@ class _Iteration:
         joined = (between.first, between.second) if between is not None else (self.free[:0], self.free[:0])
         return status_of.floating_network(self.problem, self.setup.names, joined, full)
 
-    def _conditions(self, motions: np.ndarray) -> Conditions | str:
-        """Inner constraints at the state, or why they do not hold the free motions."""
+    def _conditions(self, motions: np.ndarray, state: State) -> Conditions | str:
+        """Inner constraints at a state, or why they do not hold the free motions."""
         datum = self.setup.datum
         count = motions.shape[1]
-        if not (datum.marked_stations.any() or datum.marked_targets.any()):
+        if datum.empty:
             words = status_of.described(motions, self.setup.size)
             return status_of.MOTIONS.format(motions=words, count=count)
         free = self.problem.free_stations[:, :3], self.problem.free_targets
-        conditions = datum.conditions(self.state, motions, free)
+        conditions = datum.conditions(state, motions, free)
         _, values, vectors = np.linalg.svd(conditions.response)
         loose = values <= 1e-10 * max(values[0], 1.0)
-        if np.any(loose):
+        if loose.any():
             return status_of.DATUM.format(motions=status_of.described(motions @ vectors[loose].T, self.setup.size))
         return conditions
 
     def _solution(
         self, network: RangingNetwork, status: str, reduced: Reduced, answer: _Step | None, tests: bool
     ) -> RangingSolution:
-        problem, state, n = self.problem, self.state, self.problem.free_stations.size
+        problem, at, n = self.problem, self.at, self.problem.free_stations.size
+        state, pvv = self.state, self.cost
         covariance, gauge, statistics = np.full((n, n), np.nan), None, None
+        if answer is not None:  # the last step; the statistics hold where the normal matrix was built, all consistently
+            state, pvv = self._moved(answer, 1.0), max(self.cost - answer.gain, 0.0)
         conditions = answer.motions.shape[1] if answer is not None else 0
         if answer is not None and tests:
             covariance, gauge = self._covariance(answer, reduced)
-            statistics = self.blocks.statistics(state, reduced.inverse, covariance)
+            statistics = self.blocks.statistics(at, state, reduced.inverse, covariance)
             if len(gauge.points):
-                x = state.targets[gauge.points]
+                x = at.targets[gauge.points]
                 moved = (generators(x) @ gauge.motions) * problem.free_targets[gauge.points][:, :, None]
                 joined = moved @ gauge.drift.transpose(0, 2, 1)
                 statistics.covariance[gauge.points] -= joined + joined.transpose(0, 2, 1)
-        nothing = np.full(len(problem.distance), np.nan)
+        known = statistics
+        statistics = statistics or Statistics.unknown(len(state.targets), len(problem.distance))
         free = int(np.sum(problem.free_stations)) + int(np.sum(problem.free_targets))
-        count = int(np.sum(problem.root > 0.0)) + self.setup.terms.count()
+        count = problem.used + self.setup.terms.count()
         degrees = count - free + conditions
-        if status == CONVERGED and degrees > 0 and self.cost > status_of.BELIEVABLE**2 * degrees:
-            status = status_of.contradiction(problem, state, self.setup.names, statistics) or status
+        if status == CONVERGED and degrees > 0 and pvv > status_of.BELIEVABLE**2 * degrees:
+            status = status_of.contradiction(problem, state, self.setup.names, known) or status
         return RangingSolution(
             network,
             state.stations + self.setup.origin,
@@ -470,15 +489,16 @@ class _Iteration:
             state.scale,
             status,
             self.taken,
-            self.cost,
+            pvv,
             degrees,
             problem.width,
             covariance,
-            statistics.covariance if statistics else np.full((len(state.targets), 3, 3), np.nan),
-            statistics.redundancy if statistics else nothing,
-            statistics.standardised if statistics else nothing,
-            statistics.detectable if statistics else nothing,
+            statistics.covariance,
+            statistics.redundancy,
+            statistics.standardised,
+            statistics.detectable,
             self.setup,
+            at,
             state,
             reduced.inverse,
             gauge,
@@ -491,12 +511,12 @@ class _Iteration:
         response: T = 1 - N R h', Q = T Q0 T' + N R (sum over datum targets of H' V^-1 H) R' N'.
         """
         n, motions = self.problem.free_stations.size, answer.motions
-        q, null = answer.factor.inverse(n), self._null(motions)
+        q, null = answer.factor.inverse(n), self._null(motions, self.at)
         f = motions.shape[1]
         gauge = Gauge(motions, null, np.zeros(0, dtype=np.int64), np.zeros((0, 3, f)))
         if not f:
             return q, gauge
-        conditions = self._conditions(motions)
+        conditions = self._conditions(motions, self.at)
         if isinstance(conditions, str):  # it held them one step before
             raise EstimationError(conditions)
         by_station = np.zeros((*self.problem.free_stations.shape, f))
@@ -505,23 +525,10 @@ class _Iteration:
         if len(conditions.points):
             own = reduced.inverse[conditions.points] @ conditions.at_targets
             spread = np.einsum("kif,kig->fg", conditions.at_targets, own)
-            h = h + self._through(conditions.points, own)
+            everywhere = np.zeros((len(self.at.targets), 3, f))
+            everywhere[conditions.points] = own
+            h = h + self.blocks.felt(self.at, everywhere)
             gauge = Gauge(motions, null, conditions.points, own @ back.T)
         carried, seen = null @ back, h.T @ q
         moved = carried @ seen
         return q - moved - moved.T + carried @ (seen @ h + spread) @ carried.T, gauge
-
-    def _through(self, points: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """V^-1 times conditions on targets, own (k, 3, f), as stations feel it: minus the sum of g a' own, (n, f)."""
-        problem, s = self.problem, len(self.state.stations)
-        place = np.full(len(self.state.targets), -1)
-        place[points] = np.arange(len(points))
-        rows = np.flatnonzero((place[problem.target] >= 0) & (problem.root > 0.0))
-        out = np.zeros((s, problem.width, own.shape[2]))
-        for some in np.array_split(rows, 1 + len(rows) // 200_000):
-            seen = linearise(problem, self.state, some, problem.root[some])
-            felt = np.einsum("ki,kif->kf", seen.a, own[place[seen.target]])
-            for i in range(problem.width):
-                for j in range(own.shape[2]):
-                    out[:, i, j] -= np.bincount(seen.station, seen.g[:, i] * felt[:, j], s)
-        return out.reshape(problem.free_stations.size, own.shape[2])

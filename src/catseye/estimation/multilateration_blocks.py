@@ -7,7 +7,8 @@ Source: [FOERSTNER16] chapter 15, elimination of points from the normal equation
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,8 +24,7 @@ class Problem:
 
     station, target   (m,) index of each range's ends
     distance, sigma   (m,) observed value and claimed standard uncertainty, m
-    root              (m,) square root of the weight in the solution, 1/m: 1 / (sigma inflation), 0 where left out
-    inflated          whether root differs from 1 / sigma
+    inflation         (m,) factor on each sigma, infinite where left out; None: 1
     width             parameters a station: 3, or 5 with zero and scale
     free_stations     (S, width) bool
     free_targets      (T, 3) bool
@@ -36,13 +36,22 @@ class Problem:
     target: np.ndarray
     distance: np.ndarray
     sigma: np.ndarray
-    root: np.ndarray
-    inflated: bool
+    inflation: np.ndarray | None
     width: int
     free_stations: np.ndarray
     free_targets: np.ndarray
     target_weight: np.ndarray | None
     target_value: np.ndarray | None
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """(m,) square root of the weight in the solution, 1/m; 0 where left out."""
+        return 1.0 / (self.sigma if self.inflation is None else self.sigma * self.inflation)
+
+    @property
+    def used(self) -> int:
+        """Number of ranges that take part."""
+        return len(self.sigma) if self.inflation is None else int(np.sum(np.isfinite(self.inflation)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +99,12 @@ class Statistics:
     redundancy: np.ndarray
     standardised: np.ndarray
     detectable: np.ndarray
+
+    @classmethod
+    def unknown(cls, t: int, m: int) -> "Statistics":
+        """Those of t targets and m ranges without an answer: nan; the four arrays of ranges are one."""
+        nothing = np.full(m, np.nan)
+        return cls(np.full((t, 3, 3), np.nan), nothing, nothing, nothing, nothing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +215,33 @@ class NumpyBlocks:
                 cost = np.nan
         return Reduced((normal + normal.T) / 2, before, right, inverse, own, condition, cost, gain, moment)
 
+    def follow(self, state: State, old: Reduced) -> Reduced:
+        """The right side and cost at a state close to that of `old`, whose matrices are kept."""
+        right, own, cost, gain, moment = np.zeros(self._size), np.empty_like(old.own), 0.0, 0.0, 0.0
+        for part, rows in self._chunks():
+            seen = linearise(self.problem, state, rows, self.problem.root[rows])
+            b = self._targets(seen, part, state)[1]
+            own[part] = np.einsum("tij,tj->ti", old.inverse[part], b)
+            short = seen.misclosure - np.einsum("ki,ki->k", seen.a, own[seen.target])
+            for i in range(self.problem.width):
+                right[i :: self.problem.width] += np.bincount(seen.station, seen.g[:, i] * short, self._stations)
+            gain += float(np.sum(own[part] * b))
+            cost += float(seen.misclosure @ seen.misclosure)
+            moment += float(np.sum((self.problem.root[rows] * seen.length) ** 2))
+        return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
+
+    def felt(self, at: State, own: np.ndarray) -> np.ndarray:
+        """Steps of the targets alone, own (T, 3, f), as the stations feel them: minus the sum of g a' own, (n, f)."""
+        f = own.shape[2]
+        out = np.zeros((self._stations, self.problem.width, f))
+        for _, rows in self._chunks():
+            seen = linearise(self.problem, at, rows, self.problem.root[rows])
+            along = np.einsum("ki,kif->kf", seen.a, own[seen.target])
+            for i in range(self.problem.width):
+                for j in range(f):
+                    out[:, i, j] -= np.bincount(seen.station, seen.g[:, i] * along[:, j], self._stations)
+        return out.reshape(self._size, f)
+
     def _targets(self, seen: Rows, part: slice, state: State) -> tuple[np.ndarray, np.ndarray]:
         """V and the right side of some targets, priors included."""
         n, at = part.stop - part.start, seen.target - part.start
@@ -236,23 +278,26 @@ class NumpyBlocks:
             moved[part] = reduced.own[part] - np.einsum("tij,tj->ti", reduced.inverse[part], total)
         return moved
 
-    def statistics(self, state: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
-        """Covariances and tests, from V^-1 of each target and the covariance q (n, n) of the stations' parameters."""
+    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
+        """Covariances and tests, from V^-1 of each target and the covariance q (n, n) of the stations' parameters.
+
+        Directions are those at `at`, where both were found; residuals are those of the answer, one step further.
+        """
         problem, m = self.problem, len(self.problem.distance)
         covariance, h, misclosure = np.empty_like(inverse), np.empty(m), np.empty(m)
         blocks = q.reshape(self._stations, problem.width, self._stations, problem.width)
         for part, rows in self._chunks():
-            used = linearise(problem, state, rows, problem.root[rows])
-            seen = linearise(problem, state, rows, 1.0 / problem.sigma[rows])
+            used = linearise(problem, at, rows, problem.root[rows])
+            seen = linearise(problem, at, rows, 1.0 / problem.sigma[rows])
             y = -self._coupling(used, part) @ inverse[part]  # dx_target = y' dx_stations + ..., (t, n, 3)
             cross = q @ y
             covariance[part] = inverse[part] + y.transpose(0, 2, 1) @ cross
-            at, s = seen.target - part.start, seen.station
-            between = cross.reshape(len(y), self._stations, problem.width, 3)[at, s]
+            t, s = seen.target - part.start, seen.station
+            between = cross.reshape(len(y), self._stations, problem.width, 3)[t, s]
             h[rows] = np.einsum("ki,kij,kj->k", seen.g, blocks[s, :, s, :], seen.g)
             h[rows] += 2.0 * np.einsum("ki,kij,kj->k", seen.g, between, seen.a)
             h[rows] += np.einsum("ki,kij,kj->k", seen.a, covariance[seen.target], seen.a)
-            misclosure[rows] = seen.misclosure
+            misclosure[rows] = linearise(problem, answer, rows, 1.0 / problem.sigma[rows]).misclosure
         return Statistics(covariance, *judged(problem, h, misclosure))
 
 

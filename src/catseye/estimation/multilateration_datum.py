@@ -10,6 +10,7 @@ Source: [FOERSTNER16] chapter 4, gauge constraints and S-transformations.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,9 +31,11 @@ def generators(x: np.ndarray) -> np.ndarray:
     >>> generators(np.array([[1.0, 2.0, 3.0]]))[0, :, 5]  # turn about z
     array([-2., 1., 0.])
     """
-    out = np.empty((len(x), 3, GENERATORS))
-    out[:, :, :3] = np.eye(3)
-    out[:, :, 3:6] = np.einsum("aij,kj->kia", TURNS, x)
+    out = np.zeros((len(x), 3, GENERATORS))
+    out[:, 0, 0] = out[:, 1, 1] = out[:, 2, 2] = 1.0
+    out[:, 0, 4], out[:, 0, 5] = x[:, 2], -x[:, 1]
+    out[:, 1, 5], out[:, 1, 3] = x[:, 0], -x[:, 2]
+    out[:, 2, 3], out[:, 2, 4] = x[:, 1], -x[:, 0]
     out[:, :, 6] = x
     return out
 
@@ -81,8 +84,10 @@ class Conditions:
 
     def restore(self, stations: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """The amounts (f,) of the free motions that, after a step of stations and targets, satisfy the conditions."""
-        ahead = self.value + np.einsum("sif,si->f", self.at_stations, stations)
-        ahead += np.einsum("tif,ti->f", self.at_targets, targets[self.points])
+        count = len(self.value)
+        ahead = self.value + stations.ravel() @ self.at_stations.reshape(-1, count)
+        if len(self.points):
+            ahead += targets[self.points].ravel() @ self.at_targets.reshape(-1, count)
         return -np.linalg.solve(self.response, ahead)
 
 
@@ -97,12 +102,24 @@ class Datum:
 
     def conditions(self, state: State, motions: np.ndarray, free: tuple[np.ndarray, np.ndarray]) -> Conditions:
         """The inner constraints at a state, for free motions (7, f); free: coordinates of stations and of targets."""
-        points = np.flatnonzero(np.any(self.marked_targets, axis=1))
+        points = self.points
         first = _share(state.stations, self.stations, self.marked_stations, motions, free[0])
+        if not len(points):
+            return Conditions(first[0], first[1], points, np.zeros((0, 3, motions.shape[1])), first[2])
         second = _share(
             state.targets[points], self.targets[points], self.marked_targets[points], motions, free[1][points]
         )
         return Conditions(first[0] + second[0], first[1], points, second[1], first[2] + second[2])
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Indices of the targets that take part."""
+        return np.flatnonzero(self.marked_targets.any(axis=1))
+
+    @cached_property
+    def empty(self) -> bool:
+        """Whether nothing takes part."""
+        return not (self.marked_stations.any() or len(self.points))
 
 
 def _share(
@@ -110,11 +127,11 @@ def _share(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value (f,), derivative (k, 3, f) and response (f, f) of the conditions from some points."""
     off = np.where(marked, x - given, 0.0)
-    n = generators(x)
-    value = np.einsum("kia,ki->a", n, off)
-    slope = n * marked[:, :, None]
-    slope[:, :, 3:6] += np.einsum("aji,kj->kia", TURNS, off)  # the generators change with x themselves
-    slope[:, :, 6] += off
-    slope = (slope @ motions) * free[:, :, None]
-    moved = (n @ motions) * free[:, :, None]
-    return motions.T @ value, slope, np.einsum("kif,kig->fg", slope, moved)
+    n = generators(x).reshape(-1, GENERATORS)
+    value = off.ravel() @ n
+    slope = n * marked.reshape(-1, 1)
+    slope[:, 3:6] += (off @ TURNS).transpose(1, 2, 0).reshape(-1, 3)  # the generators change with x themselves
+    slope[:, 6] += off.ravel()
+    loose = free.reshape(-1, 1)
+    slope = (slope @ motions) * loose
+    return value @ motions, slope.reshape(len(x), 3, -1), slope.T @ ((n @ motions) * loose)

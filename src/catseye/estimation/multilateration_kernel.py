@@ -16,12 +16,14 @@ go unnoticed. Views are taken by row and fixed offset: an index that might be ne
 Source: [FOERSTNER16] chapter 15, elimination of points from the normal equations of a bundle.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numba import njit
 
 from catseye.estimation.multilateration_blocks import NONCENTRALITY, UNCHECKED, Problem, Reduced, State, Statistics
 
-LANES = 64
+LANES = 128
 ROWS = 7  # of a slot's scratch: a (3), derivatives by zero and scale (2), misclosure, phi^2
 ASSOCIATIVE = {"reassoc", "contract", "nsz"}  # sums over lanes may be reordered; nan and infinity stay what they are
 SMALLEST = 1e-300  # keeps the direction between coinciding points finite; they are told apart by their distance
@@ -36,12 +38,18 @@ class KernelBlocks:
         if problem.target_weight is not None and problem.target_value is not None:
             self._priors = problem.target_weight, problem.target_value
         self._free = problem.free_targets.astype(float)
-        first, rows, pattern = _by_target(problem.station, problem.target, len(problem.free_targets))
-        order = np.arange(len(pattern)) if np.all(pattern == pattern[0]) else np.argsort(pattern, kind="stable")
-        slots, ends = _slots(problem.station, first, rows, order, len(problem.free_stations))
-        root, index = _fill(problem.station, problem.root, first, rows, order, ends, slots)
-        self._packed = slots, ends, order, _gather(problem.distance, index), root
-        self._index = index
+        stations, t = len(problem.free_stations), len(problem.free_targets)
+        first, rows, pattern = _by_target(problem.station, problem.target, t)
+        order = np.arange(t) if np.all(pattern == pattern[0]) else np.argsort(pattern, kind="stable")
+        if stations < 64 and len(rows) == stations * t and np.all(pattern == np.uint64(2**stations - 1)):
+            blocks = -(-t // LANES)  # every target sees every station once
+            slots, ends = np.tile(np.arange(stations, dtype=np.int32), blocks), np.arange(blocks + 1) * stations
+        else:
+            slots, ends = _slots(problem.station, first, rows, order, stations)
+        inflation = np.zeros(0) if problem.inflation is None else problem.inflation
+        ranges = problem.station, problem.distance, problem.sigma, inflation
+        observed, root, self._index = _fill(*ranges, first, rows, order, ends, slots)
+        self._packed = slots, ends, order, observed, root
 
     def reduce(self, state: State) -> Reduced:
         """See `NumpyBlocks.reduce`."""
@@ -60,6 +68,13 @@ class KernelBlocks:
         )
         return Reduced(normal, before, right, inverse, own, condition, cost, gain, moment)
 
+    def follow(self, state: State, old: Reduced) -> Reduced:
+        """See `NumpyBlocks.follow`."""
+        right, own = np.zeros_like(old.right), np.empty_like(old.own)
+        points = (state.stations, state.targets, state.zero, state.scale)
+        cost, gain, moment = _follow(*self._packed, points, *self._priors, old.inverse, self.problem.width, right, own)
+        return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
+
     def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """See `NumpyBlocks.back`."""
         moved = np.empty((len(self._free), 3))
@@ -67,31 +82,48 @@ class KernelBlocks:
         _back(*self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
         return moved
 
-    def statistics(self, state: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
+    def felt(self, at: State, own: np.ndarray) -> np.ndarray:
+        """See `NumpyBlocks.felt`."""
+        out = np.zeros((own.shape[2], self.problem.free_stations.size))
+        points = (at.stations, at.targets, at.zero, at.scale)
+        _felt(*self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
+        return out.T
+
+    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
         """See `NumpyBlocks.statistics`."""
         m = len(self.problem.distance)
         covariance, out = np.empty((len(self._free), 3, 3)), (np.empty(m), np.empty(m), np.empty(m), np.empty(m))
-        points = (state.stations, state.targets, state.zero, state.scale)
-        claimed = _gather(1.0 / self.problem.sigma, self._index) if self.problem.inflated else self._packed[-1]
+        points = (at.stations, at.targets, at.zero, at.scale)
+        ends = (answer.stations, answer.targets, answer.zero, answer.scale)
+        inflated = self.problem.inflation is not None
+        claimed = _gather(1.0 / self.problem.sigma, self._index) if inflated else self._packed[-1]
         tests = (NONCENTRALITY, UNCHECKED)
-        _statistics(*self._packed, claimed, self._index, points, inverse, q, self.problem.width, tests, covariance, out)
+        layout = (claimed, self._index, self.problem.width)
+        _statistics(*self._packed, *layout, points, ends, inverse, q, tests, covariance, out)
         return Statistics(covariance, *out)
 
 
 @njit(cache=True, error_model="numpy")
 def _by_target(station, target, targets):
     """Rows sorted by target, then station: `first` (t + 1,), `rows` (m,), and a hash of the stations a target sees."""
-    first = np.zeros(targets + 1, np.int64)
-    for t in target:
+    first, pattern = np.zeros(targets + 1, np.int64), np.zeros(targets, np.uint64)
+    rows, ordered = np.empty(len(target), np.int32), True
+    for i in range(len(target)):
+        t, s = target[i], station[i]
         first[t + 1] += 1
+        pattern[t] |= np.uint64(1) << np.uint64(s % 64)
+        rows[i] = i
+        if i > 0 and (target[i - 1] > t or (target[i - 1] == t and station[i - 1] > s)):
+            ordered = False
     for t in range(targets):
         first[t + 1] += first[t]
-    at, rows, pattern = first[:-1].copy(), np.empty(len(target), np.int32), np.zeros(targets, np.uint64)
+    if ordered:
+        return first, rows, pattern
+    at = first[:-1].copy()
     for i in range(len(target)):
         t, s = target[i], station[i]
         j = at[t]
         at[t] += 1
-        pattern[t] = pattern[t] | (np.uint64(1) << np.uint64(s % 64))
         while j > first[t] and station[rows[j - 1]] > s:
             rows[j] = rows[j - 1]
             j -= 1
@@ -129,20 +161,22 @@ def _slots(station, first, rows, order, stations):
 
 
 @njit(cache=True, error_model="numpy")
-def _fill(station, root, first, rows, order, ends, slots):
-    """Root weight and row of the range in every slot and lane: (slots, LANES), 0 and -1 where there is none."""
-    weight, index = np.zeros((len(slots), LANES)), np.full((len(slots), LANES), -1, np.int32)
+def _fill(station, distance, sigma, inflation, first, rows, order, ends, slots):
+    """Distance, root weight and row of the range in every slot and lane: (slots, LANES); 0, 0 and -1 without one."""
+    shape = (len(slots), LANES)
+    observed, weight, index = np.zeros(shape), np.zeros(shape), np.full(shape, -1, np.int32)
     for b in range(len(ends) - 1):
         for lane in range(min(LANES, len(order) - b * LANES)):
             t = order[b * LANES + lane]
             k = ends[b]
             for j in range(first[t], first[t + 1]):
-                while slots[k] != station[rows[j]]:
+                i = rows[j]
+                while slots[k] != station[i]:
                     k += 1
-                weight[k, lane] = root[rows[j]]
-                index[k, lane] = rows[j]
+                observed[k, lane], index[k, lane] = distance[i], i
+                weight[k, lane] = 1.0 / (sigma[i] * inflation[i] if len(inflation) else sigma[i])
                 k += 1
-    return weight, index
+    return observed, weight, index
 
 
 @njit(cache=True, error_model="numpy")
@@ -181,6 +215,16 @@ def _directions(x, at, zero, scale, distance, root, row):
         moment += w * d * w * d
         coincident += w if d == 0.0 else 0.0
     return cost, moment, coincident
+
+
+@njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
+def _misclose(x, at, zero, scale, distance, root, row):
+    """Replace a slot's misclosure by that at other coordinates."""
+    sx, sy, sz = at[0], at[1], at[2]
+    for lane in range(LANES):
+        dx, dy, dz = x[lane] - sx, x[LANES + lane] - sy, x[2 * LANES + lane] - sz
+        d = np.sqrt(dx * dx + dy * dy + dz * dz)
+        row[5 * LANES + lane] = root[lane] * (distance[lane] - (1.0 + scale) * d - zero)
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
@@ -451,6 +495,85 @@ def _reduce(slots, ends, order, distance, root, points, free, prior_weight, prio
     return (np.nan if coincident > 0.0 else cost), gain, moment
 
 
+@njit(cache=True, error_model="numpy")
+def _own_steps(order, b, v, inverse, own, y):
+    """V^-1 b of a block into `own` and by lane into y, from the right sides in rows 6 to 8 of v; returns b' V^-1 b."""
+    gain = 0.0
+    y[:] = 0.0
+    for lane in range(min(LANES, len(order) - b * LANES)):
+        t = order[b * LANES + lane]
+        for i in range(3):
+            step = 0.0
+            for j in range(3):
+                step += inverse[t, i, j] * v[(6 + j) * LANES + lane]
+            own[t, i] = y[i * LANES + lane] = step
+            gain += step * v[(6 + i) * LANES + lane]
+    return gain
+
+
+@njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
+def _short(row, y, at, width, right):
+    """Add the sum over lanes of g (e - a' y) of one slot to its station's right side."""
+    rx = ry = rz = r3 = r4 = 0.0
+    for lane in range(LANES):
+        u, v, w = row[lane], row[LANES + lane], row[2 * LANES + lane]
+        e = row[5 * LANES + lane] - (u * y[lane] + v * y[LANES + lane] + w * y[2 * LANES + lane])
+        rx += u * e
+        ry += v * e
+        rz += w * e
+        r3 += row[3 * LANES + lane] * e
+        r4 += row[4 * LANES + lane] * e
+    right[at] -= rx
+    right[at + 1] -= ry
+    right[at + 2] -= rz
+    if width > 3:
+        right[at + 3] += r3
+        right[at + 4] += r4
+
+
+@njit(cache=True, error_model="numpy")
+def _follow(slots, ends, order, distance, root, points, prior_weight, prior_value, inverse, width, right, own):
+    """Fill right (n,) and own (t, 3) with V^-1 as it was; returns cost, b' V^-1 b, sum of (root D)^2."""
+    stations, targets, zero, scale = points
+    rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
+    x, y, v = np.empty(3 * LANES), np.empty(3 * LANES), np.empty(9 * LANES)
+    cost = gain = moment = 0.0
+    for b in range(len(ends) - 1):
+        low, count = ends[b], ends[b + 1] - ends[b]
+        _place(order, b, targets, x)
+        v[:] = 0.0
+        for k in range(count):
+            s = slots[low + k]
+            one = _directions(x, stations[s], zero[s], scale[s], distance[low + k], root[low + k], rows[k])
+            cost, moment = cost + one[0], moment + one[1]
+            _gather_target(rows[k], v)
+        if len(prior_weight):
+            _add_priors(order, b, targets, prior_weight, prior_value, v)
+        gain += _own_steps(order, b, v, inverse, own, y)
+        for k in range(count):
+            _short(rows[k], y, width * slots[low + k], width, right)
+    return cost, gain, moment
+
+
+@njit(cache=True, error_model="numpy")
+def _felt(slots, ends, order, distance, root, points, own, width, out):
+    """Fill out (f, n) with minus the sums of g a' own, own (f, t, 3)."""
+    stations, targets, zero, scale = points
+    rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
+    x, y = np.empty(3 * LANES), np.empty(3 * LANES)
+    for b in range(len(ends) - 1):
+        low, count = ends[b], ends[b + 1] - ends[b]
+        _place(order, b, targets, x)
+        for k in range(count):
+            s = slots[low + k]
+            _directions(x, stations[s], zero[s], scale[s], distance[low + k], root[low + k], rows[k])
+            rows[k, 5 * LANES : 6 * LANES] = 0.0  # no misclosure: what is left of it is a' own alone
+        for f in range(len(own)):
+            _place(order, b, own[f], y)
+            for k in range(count):
+                _short(rows[k], y, width * slots[low + k], width, out[f])
+
+
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _seen(row, step, width, total):
     """Add a (g . step) of one slot to the sums of its targets."""
@@ -617,40 +740,50 @@ def _predicted(row, f, p, mp, own):
         own[lane] += h
 
 
-@njit(cache=True, error_model="numpy")
-def _judge(index, row, h, claimed, tests, out):
-    """Residual, redundancy, standardised residual and detectable error of the ranges of one slot; see `judged`."""
-    residual, redundancy, standardised, detectable = out
+@njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
+def _judge(row, h, claimed, tests, values):
+    """Residual, redundancy, standardised residual and detectable error of one slot by lane; see `judged`."""
     noncentrality, unchecked = tests
     for lane in range(LANES):
-        i = index[lane]
-        if i < 0:
-            continue
-        square, e, sigma = row[6 * LANES + lane], row[5 * LANES + lane], 1.0 / claimed[lane]
-        redundancy[i] = 1.0 - square * h[lane]
-        if square > 0.0:
-            spread = np.sqrt(max(redundancy[i], unchecked) / square)
-            detectable[i] = noncentrality * sigma / (square * spread)
-        else:
-            spread = np.sqrt(1.0 + h[lane])
-            detectable[i] = noncentrality * sigma * spread
-        residual[i], standardised[i] = e * sigma, e / spread
+        square, e, sigma = row[6 * LANES + lane], row[5 * LANES + lane], 1.0 / max(claimed[lane], SMALLEST)
+        active = square > 0.0
+        redundancy = 1.0 - square * h[lane]
+        spread = np.sqrt(max(redundancy, unchecked) / square if active else 1.0 + h[lane])
+        values[0, lane] = e * sigma
+        values[1, lane] = redundancy
+        values[2, lane] = e / spread
+        values[3, lane] = noncentrality * sigma * (1.0 / (square * spread) if active else spread)
 
 
 @njit(cache=True, error_model="numpy")
-def _statistics(slots, ends, order, distance, root, claimed, index, points, inverse, q, width, tests, covariance, out):
+def _scatter(index, values, out):
+    """The rows of values to their ranges."""
+    residual, redundancy, standardised, detectable = out
+    for lane in range(LANES):
+        i = index[lane]
+        if i >= 0:
+            residual[i], redundancy[i] = values[0, lane], values[1, lane]
+            standardised[i], detectable[i] = values[2, lane], values[3, lane]
+
+
+@njit(cache=True, error_model="numpy")
+def _statistics(
+    slots, ends, order, distance, root, claimed, index, width, points, answer, inverse, q, tests, covariance, out
+):
     """Fill the targets' covariance (t, 3, 3) and the four statistics of the ranges, each (m,)."""
     stations, targets, zero, scale = points
     most = np.max(ends[1:] - ends[:-1])
     rows, f, own = np.empty((most, ROWS * LANES)), np.empty((most, 3 * LANES)), np.empty((most, LANES))
-    x, m, local = np.empty(3 * LANES), np.empty(6 * LANES), np.empty(6 * LANES)
-    p, mp = np.empty(3 * LANES), np.empty(3 * LANES)
+    x, y, m, local = np.empty(3 * LANES), np.empty(3 * LANES), np.empty(6 * LANES), np.empty(6 * LANES)
+    p, mp, values = np.empty(3 * LANES), np.empty(3 * LANES), np.empty((4, LANES))
     for b in range(len(ends) - 1):
         low, count = ends[b], ends[b + 1] - ends[b]
         _place(order, b, targets, x)
+        _place(order, b, answer[1], y)
         for k in range(count):
             s = slots[low + k]
             _directions(x, stations[s], zero[s], scale[s], distance[low + k], claimed[low + k], rows[k])
+            _misclose(y, answer[0][s], answer[2][s], answer[3][s], distance[low + k], claimed[low + k], rows[k])
             _share(root[low + k], claimed[low + k], rows[k])
         _couple(slots, low, count, q, width, rows, f, own)
         m[:] = 0.0
@@ -661,4 +794,5 @@ def _statistics(slots, ends, order, distance, root, claimed, index, points, inve
             _times(local, rows[k], p)
             _times(m, p, mp)
             _predicted(rows[k], f[k], p, mp, own[k])
-            _judge(index[low + k], rows[k], own[k], claimed[low + k], tests, out)
+            _judge(rows[k], own[k], claimed[low + k], tests, values)
+            _scatter(index[low + k], values, out)

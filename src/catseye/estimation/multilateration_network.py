@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -85,8 +86,7 @@ class Setup:
 
     def motions(self, state: State) -> np.ndarray:
         """The free motions (7, f) at a state, see `free_motions`."""
-        at = np.flatnonzero(np.any(self.still, axis=1))
-        s = len(state.stations)
+        at, s = self.points, len(state.stations)
         for some in (at[:ENOUGH], at):  # a few held points nearly always hold everything
             stations, targets = some[some < s], some[some >= s] - s
             points = np.concatenate([state.stations[stations], state.targets[targets]])
@@ -94,6 +94,11 @@ class Setup:
             if not free.shape[1] or len(some) == len(at):
                 break
         return free
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Indices, stations then targets, of points that no free motion may move."""
+        return np.flatnonzero(self.still.any(axis=1))
 
 
 def set_up(network: RangingNetwork, inflation: np.ndarray | None) -> Setup:
@@ -190,13 +195,12 @@ def _ranges(network: RangingNetwork, s: int, t: int, names: Names, inflation: np
         if index.min() < 0 or index.max() >= count:
             i = int(np.flatnonzero((index < 0) | (index >= count))[0])
             raise InputError(f"range {i} names {called} {index[i]}, there are {count}")
-    root = 1.0 / sigma if np.all(sigma > 0.0) else np.full(len(sigma), np.nan)
     if inflation is not None:
         inflation = np.asarray(inflation, dtype=float)
         if inflation.shape != sigma.shape or not np.all(inflation > 0.0):
             raise InputError(f"inflation needs {len(sigma)} positive factors, infinite to leave a range out")
-        root = root / inflation
-    if not (np.isfinite(distance.sum()) and np.isfinite(root.sum()) and np.isfinite(sigma.sum())):
+        inflation = np.require(inflation, float, ["C", "W"])
+    if not (np.isfinite(distance.sum()) and sigma.min() > 0.0 and np.isfinite(sigma.sum())):
         bad = np.flatnonzero(~(np.isfinite(distance) & np.isfinite(sigma) & (sigma > 0.0)))
         i = int(bad[0]) if len(bad) else 0
         raise InputError(
@@ -208,8 +212,7 @@ def _ranges(network: RangingNetwork, s: int, t: int, names: Names, inflation: np
         "target": target,
         "distance": distance,
         "sigma": sigma,
-        "root": root,
-        "inflated": inflation is not None,
+        "inflation": inflation,
     }
 
 
@@ -239,17 +242,19 @@ def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointP
     observed, covariance = np.asarray(prior.observed, dtype=float), np.asarray(prior.covariance, dtype=float)
     if observed.shape != (len(index), 3) or covariance.shape != (len(index), 3, 3):
         raise InputError(f"priors of {len(index)} points have values {observed.shape}, covariances {covariance.shape}")
-    if index.min() < 0 or index.max() >= count or len(np.unique(index)) < len(index):
-        raise InputError(f"priors name points {index.tolist()}: each once, from 0 to {count - 1}")
-    skew = np.abs(covariance - covariance.transpose(0, 2, 1)).max(axis=(1, 2))
-    symmetric = skew <= 1e-9 * np.abs(covariance).max(axis=(1, 2))
-    for k, i in enumerate(index):  # one by one only to name the culprit
-        finite = np.isfinite(observed[k]).all() and np.isfinite(covariance[k]).all() and symmetric[k]
-        if not finite or np.linalg.eigvalsh(covariance[k])[0] <= 0.0:
-            raise InputError(
-                f"the prior of {called(int(i))} needs finite values and a positive definite covariance; "
-                "hold a coordinate that is known exactly"
-            )
+    known, times = np.unique(index, return_counts=True)
+    bad = known[(known < 0) | (known >= count) | (times > 1)]
+    if len(bad):
+        raise InputError(f"priors name point {bad[0]}, there are {count}, each has one prior at most")
+    fine = np.isfinite(observed).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
+    matrices = np.where(fine[:, None, None], covariance, 0.0)
+    skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2))
+    fine &= (skew <= 1e-9 * np.abs(matrices).max(axis=(1, 2))) & (np.linalg.eigvalsh(matrices)[:, 0] > 0.0)
+    if not fine.all():
+        raise InputError(
+            f"the prior of {called(int(index[~fine][0]))} needs finite values and a positive definite covariance; "
+            "hold a coordinate that is known exactly"
+        )
     return PointPriors(index, observed - origin, covariance)
 
 

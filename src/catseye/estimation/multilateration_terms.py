@@ -5,6 +5,7 @@ These touch the stations' parameters alone (or one target's), so they join the n
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -63,6 +64,14 @@ class Terms:
     between: StationRanges | None
     gauges: tuple[Gauges, ...]
 
+    @cached_property
+    def _station_root(self) -> np.ndarray:
+        return _whitening(self.stations)
+
+    @cached_property
+    def _target_root(self) -> np.ndarray:
+        return _whitening(self.targets)
+
     def count(self) -> int:
         """Number of observations."""
         points = sum(3 * len(p.index) for p in (self.stations, self.targets) if p is not None)
@@ -76,7 +85,7 @@ class Terms:
         cost = moment = 0.0
         if self.targets is not None:
             off = self.targets.observed - state.targets[self.targets.index]
-            cost += float(np.sum(off * np.linalg.solve(self.targets.covariance, off[:, :, None])[:, :, 0]))
+            cost += float(np.sum(np.einsum("kij,kj->ki", self._target_root, off) ** 2))
         for columns, jacobian, misclosure in self._dense(state, width):
             share = np.einsum("kri,krj->kij", jacobian, jacobian)
             np.add.at(normal, (columns[:, :, None], columns[:, None, :]), share)
@@ -90,7 +99,7 @@ class Terms:
     def _dense(self, state: State, width: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Columns (k, w), whitened Jacobian (k, r, w) and misclosure (k, r) of each group on stations."""
         if self.stations is not None:
-            root = np.linalg.inv(np.linalg.cholesky(self.stations.covariance))
+            root = self._station_root
             off = self.stations.observed - state.stations[self.stations.index]
             yield self.stations.index[:, None] * width + np.arange(3), root, np.einsum("kij,kj->ki", root, off)
         if self.between is not None:
@@ -127,6 +136,11 @@ class Terms:
             off = self._off(gauge, state)
             fits.append(_fit(gauge.name, off[:, None], gauge.sigma[:, None, None] ** 2, q[at, at][:, None, None]))
         return tuple(fits)
+
+
+def _whitening(priors: PointPriors | None) -> np.ndarray:
+    """(k, 3, 3) inverse Cholesky factors of the priors' covariances."""
+    return np.zeros((0, 3, 3)) if priors is None else np.linalg.inv(np.linalg.cholesky(priors.covariance))
 
 
 def _between(between: StationRanges, state: State, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -21,6 +21,7 @@ from catseye.estimation.network import Network, NetworkSolution
 from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.rows import Rows, variances
 
+FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
 DATUMS = ("free", "fixed")
 PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
 SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order
@@ -62,6 +63,7 @@ def adjust_network(
     start: NetworkSolution | None = None,
     iterations: int = 50,
     tests: bool = True,
+    diagnose: bool = True,
     engine: str | None = None,
 ) -> NetworkSolution:
     """The coordinates of a network with their covariance, and a fit per observation.
@@ -75,6 +77,7 @@ def adjust_network(
     start       an earlier solution of the same network to begin from
     iterations  cap of Gauss-Newton steps of each pass
     tests       False leaves out covariance and test statistics
+    diagnose    False leaves the status at "converged" or "not converged", without looking for the cause
     engine      "dense", "sparse" or "ranging" (pure ranging networks only); the fastest that serves if None
 
     Returns a NetworkSolution whose status says what happened, and where.
@@ -92,17 +95,24 @@ def adjust_network(
             network, active=active, inflation=inflation, start=start, tests=tests, forced=engine is not None
         )
         if solution is not None:
-            return solution
+            return replace(solution, status=diagnosed(solution, _factor_alone)) if tests and diagnose else solution
     problem = _Problem.of(network, start)
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
     sparse = None if engine is None else engine == "sparse"
-    return problem.solve(active, (inflation, alone), iterations, tests, sparse)
+    solution = problem.solve(active, (inflation, alone), iterations, tests, sparse)
+    if tests and diagnose and np.isfinite(solution.covariance).all():
+        return replace(solution, status=diagnosed(solution, _factor_alone))
+    return solution
 
 
 def _factor_alone(network: Network) -> NetworkSolution:
     """A quick trial: coordinates and variance factor, no tests."""
-    trial = adjust_network(network, iterations=15, tests=False)
+    large = len(network.points.names) >= FEWEST_POINTS
+    try:
+        trial = adjust_network(network, iterations=15, tests=False, engine="ranging" if large else None)
+    except EstimationError:  # large, and of another kind: it would take too long to try
+        return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
     degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
     cost = sum(f.pvv for f in trial.fits)
     return replace(trial, variance_factor=cost / max(1.0, degrees))
@@ -222,7 +232,7 @@ class _Problem:
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
         answer = replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
-        return replace(answer, status=diagnosed(answer, _factor_alone)) if tests else answer
+        return answer
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points

@@ -1,7 +1,7 @@
 """Networks of ranges alone, handed to the block elimination of `multilateration` and back."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -62,6 +62,8 @@ def adjusted_as_ranges(
             raise EstimationError("the ranging engine does not weigh coordinates robustly; use another engine")
         return None
     solution = adjust_ranges(problem[0], tests=tests, inflation=given)
+    if solution.status.startswith("contradictory"):  # an answer all the same; `diagnosis` says what and where
+        solution = replace(solution, status=CONVERGED)
     if solution.status != CONVERGED and not forced:
         return None
     return _answer(network, split, solution, problem[1], given)
@@ -177,7 +179,8 @@ def _problem(
     between = None
     if split.between:
         ends = [split.station[joined(n, split.between).astype(int) // 3] for n in ("origin", "target")]
-        between = StationRanges(*ends, joined("observed", split.between), np.sqrt(joined("covariance", split.between)))
+        sigma_between = np.sqrt(joined("covariance", split.between))
+        between = StationRanges(ends[0], ends[1], joined("observed", split.between), sigma_between)
     sigma = np.array([p.sigma for p in network.parameters])
     begin_at = np.array([p.start for p in network.parameters])
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
+from catseye.estimation.datum import motions
 from catseye.estimation.singular import best_linear_estimate
 
 CONVERGED = "converged"
@@ -36,9 +37,7 @@ def motion_columns(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     >>> motion_columns(np.array([[2.0, 0.0, 0.0]]), np.zeros(3))[:, 5]  # turned about z, a point on x moves along y
     array([0., 2., 0.])
     """
-    arm = np.asarray(points, dtype=float) - pivot
-    turn = np.moveaxis(np.cross(np.eye(3), arm[:, None, :]), 1, 2)  # column j is e_j x arm
-    return np.concatenate([np.broadcast_to(np.eye(3), turn.shape), turn, arm[:, :, None]], axis=2).reshape(-1, 7)
+    return motions(np.asarray(points, dtype=float), pivot, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

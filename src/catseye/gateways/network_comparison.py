@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.deformation import CongruenceTest, Deformation, VarianceFactor
+from catseye.estimation.comparison import Comparison as Moved
+from catseye.estimation.congruence import VarianceFactor
+from catseye.estimation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network_findings import Findings, in_file_axes
 from catseye.gateways.network_tables import Formats, cell, table
 from catseye.gateways.objects import plain
+from catseye.gateways.summary import Passage
 
 FORMAT = "catseye-comparison-1"
+NAMED = 8  # points told in sentences
 DISPLACEMENTS: Formats = {
     "point": "",
     **dict.fromkeys(("x_m", "y_m", "z_m"), ".10f"),
@@ -27,15 +31,22 @@ DISPLACEMENTS: Formats = {
 class Comparison:
     """Two epochs and what moved between them.
 
-    first, second      their adjustments
-    deformation        of the common points, in x east, y north, z up
-    variance_factor    that of both epochs together; known (1) or estimated
+    first, second   their adjustments
+    moved           of the common points, in x east, y north, z up
     """
 
     first: Findings
     second: Findings
-    deformation: Deformation
-    variance_factor: VarianceFactor
+    moved: Moved
+
+    @property
+    def deformation(self) -> Deformation:
+        return self.moved.deformation
+
+    @property
+    def variance_factor(self) -> VarianceFactor:
+        """That of both epochs together; known (1) or estimated."""
+        return self.moved.variance_factor
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -56,6 +67,11 @@ class Comparison:
     def u(self) -> np.ndarray:
         """(n, 3) m, standard uncertainties of the displacement."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @cached_property
+    def difference(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) and (n, 3, 3): the plain difference of coordinates and its covariance, in the axes of the file."""
+        return in_file_axes(self.first.network, self.moved.difference, self.moved.difference_covariance)
 
     @cached_property
     def length(self) -> np.ndarray:
@@ -86,6 +102,7 @@ def comparison_object(compared: Comparison) -> dict[str, Any]:
         compared.covariance,
         compared.u,
         compared.length,
+        *compared.difference,
         d.statistic,
         d.p,
         d.p_adjusted,
@@ -93,7 +110,19 @@ def comparison_object(compared: Comparison) -> dict[str, Any]:
         compared.verdicts,
         strict=True,
     )
-    keys = ("displacement", "covariance", "u", "length", "statistic", "p", "p_adjusted", "detectable", "verdict")
+    keys = (
+        "displacement",
+        "covariance",
+        "u",
+        "length",
+        "difference",
+        "difference_covariance",
+        "statistic",
+        "p",
+        "p_adjusted",
+        "detectable",
+        "verdict",
+    )
     return plain(
         {
             "format": FORMAT,
@@ -102,6 +131,11 @@ def comparison_object(compared: Comparison) -> dict[str, Any]:
             "datum": d.datum,
             "level": d.level,
             "power": d.power,
+            "words": list(compared.moved.words),
+            "carried": list(compared.moved.carried),
+            "frame": list(compared.moved.frame),
+            "apart": compared.moved.apart,
+            "homogeneity": compared.moved.homogeneity,
             "variance_factor": factor.value,
             "variance_factor_degrees_of_freedom": factor.degrees_of_freedom,  # null: taken as known
             "congruence": {"all": _test(d.before), "stable": _test(d.after)},
@@ -130,6 +164,30 @@ def _epoch(found: Findings) -> dict[str, Any]:
         "degrees_of_freedom": solution.degrees_of_freedom,
         "suspects": found.suspects,
     }
+
+
+def comparison_passages(compared: Comparison) -> list[Passage]:
+    """What moved and what was assumed, in sentences.
+
+    compared   two epochs
+    """
+    d = compared.deformation
+    told = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
+    for i, (name, word) in enumerate(zip(d.names, compared.verdicts, strict=True)):
+        if word == "moved" and len(told) <= NAMED:
+            parts = ", ".join(
+                f"d{axis} {value / MILLIMETRE:+.3f} (u {u / MILLIMETRE:.3f})"
+                for axis, value, u in zip(
+                    compared.first.network.axis_names, compared.displacement[i], compared.u[i], strict=True
+                )
+                if np.isfinite(value)
+            )
+            told.append(Passage(name, f"{parts} mm; by chance p = {d.p[i]:.2g}."))
+    count = compared.verdicts.count("moved")
+    if count > NAMED:
+        told.append(Passage("And more", f"{count - NAMED} more points moved."))
+    words = [word for word in compared.moved.words if word != d.status]
+    return told + ([Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else [])
 
 
 def displacements_csv(compared: Comparison) -> Iterator[str]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
 from catseye.gateways.figures import BAD, FAINT, INK, STYLE, _nice, _svg
-from catseye.gateways.network_comparison import Comparison
+from catseye.gateways.network_comparison import Comparison, comparison_passages
 from catseye.gateways.network_figures import (
     Drawn,
     file_ticks,
@@ -80,7 +80,18 @@ def _summary(compared: Comparison) -> str:
             f" The test of all points finds a displacement of the usual point from "
             f"{quantity(float(np.median(seen)), 'm')} on, in the direction seen worst, with probability {d.power:g}."
         )
-    return section("summary", CONTENTS["summary"], paragraph(text), f'<div class="cards">{"".join(cards)}</div>')
+    words = "".join(
+        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>"
+        for p in comparison_passages(compared)
+        if p.title == "Assumed"
+    )
+    return section(
+        "summary",
+        CONTENTS["summary"],
+        paragraph(text),
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{words}</dl>" if words else "",
+    )
 
 
 def _chance(p: float, level: float) -> str:

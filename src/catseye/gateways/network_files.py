@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catseye.gateways.network_comparison import FORMAT as COMPARISON
 from catseye.gateways.network_comparison import Comparison, comparison_object, displacements_csv
@@ -14,6 +14,9 @@ from catseye.gateways.network_tables import coordinates_csv, observations_csv, p
 from catseye.gateways.network_xml import network_xml
 from catseye.gateways.objects import json_page, versions
 from catseye.gateways.output import PROVENANCE
+
+if TYPE_CHECKING:
+    from catseye.reduction.networks import Adjusted
 
 Progress = Callable[[str, int, int], None]  # what is being done, steps done, steps in all
 Files = dict[str, Callable[[], Iterable[str]]]  # pieces of text by the file's name
@@ -29,7 +32,12 @@ def input_hashes(source: Path) -> dict[str, str]:
 
 
 def write_network(
-    found: Findings, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    found: Findings,
+    directory: Path,
+    inputs: Mapping[str, str],
+    progress: Progress | None = None,
+    *,
+    treated: "Adjusted | None" = None,
 ) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others.
 
@@ -37,10 +45,11 @@ def write_network(
     directory   exists, and is ours to fill: see `output.whole_directory`
     inputs      SHA-256 of each file read, by its name, see `input_hashes`
     progress    told of each file
+    treated     how observations were treated, where that was asked for
     """
     when = datetime.now(UTC)
     made = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(found)}
-    _write(_files(found, when, inputs, ""), directory, {**made, **_origin(when, inputs)}, progress)
+    _write(_files(found, when, inputs, treated=treated), directory, {**made, **_origin(when, inputs)}, progress)
 
 
 def write_comparison(
@@ -60,8 +69,8 @@ def write_comparison(
         "displacements.csv": lambda: displacements_csv(compared),
         "comparison.json": lambda: [json_page(comparison_object(compared))],
         "report.html": lambda: [comparison_report(compared, when, inputs)],
-        **_files(compared.first, when, inputs, "epoch-1-"),
-        **_files(compared.second, when, inputs, "epoch-2-"),
+        **_files(compared.first, when, inputs, prefix="epoch-1-"),
+        **_files(compared.second, when, inputs, prefix="epoch-2-"),
     }
     d = compared.deformation
     settings = {
@@ -83,16 +92,23 @@ def _origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
     return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
 
 
-def _files(found: Findings, when: datetime, inputs: Mapping[str, str], prefix: str) -> Files:
+def _files(
+    found: Findings,
+    when: datetime,
+    inputs: Mapping[str, str],
+    *,
+    prefix: str = "",
+    treated: "Adjusted | None" = None,
+) -> Files:
     from catseye.gateways.network_report import network_report  # matplotlib is heavy
 
     files: Files = {
         "coordinates.csv": lambda: coordinates_csv(found),
         "observations.csv": lambda: observations_csv(found),
         "parameters.csv": lambda: parameters_csv(found),
-        "adjustment.json": lambda: network_json(found, lines=True),
+        "adjustment.json": lambda: network_json(found, lines=True, treated=treated),
         "adjustment.xml": lambda: network_xml(found),
-        "report.html": lambda: [network_report(found, when, inputs, prefix=prefix)],
+        "report.html": lambda: [network_report(found, when, inputs, prefix=prefix, treated=treated)],
     }
     return {prefix + name: pieces for name, pieces in files.items()}
 

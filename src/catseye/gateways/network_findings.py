@@ -1,6 +1,7 @@
 """What the ways out tell of an adjusted network, computed once, in the axes of its own file."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -262,6 +263,25 @@ class Findings:
         for end in self.table.ends[self.table.active].T:
             count += np.bincount(end[end >= 0], minlength=len(count))
         return count
+
+    @cached_property
+    def _row_of(self) -> np.ndarray:
+        """Row of the table of each observation, counted through the groups."""
+        row = np.empty(len(self.table), dtype=int)
+        row[self._start[self.table.group] + self.table.row] = np.arange(len(self.table))
+        return row
+
+    @cached_property
+    def _start(self) -> np.ndarray:
+        return np.cumsum([0, *(len(f.residual) for f in self.solution.fits)])
+
+    def row_of(self, group: int, row: int) -> int:
+        """Row of the table where a row of a group stands."""
+        return int(self._row_of[self._start[group] + row])
+
+    def in_table(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """One (m,) array a group, in the order of the table."""
+        return np.concatenate([[], *parts])[self._start[self.table.group] + self.table.row]
 
     def label(self, row: int) -> str:
         """What an observation of the table is called: its kind, its points, its place in the file."""

@@ -5,7 +5,7 @@ Written in pieces of some thousand rows, so that a million observations need no 
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,14 +13,18 @@ from catseye.estimation.adjustment import NONCENTRALITY
 from catseye.gateways.network_findings import MEASURES, ROLES, Findings
 from catseye.gateways.objects import plain
 
+if TYPE_CHECKING:
+    from catseye.reduction.networks import Adjusted
+
 FORMAT = "catseye-adjustment-1"
 PIECE = 5_000  # rows of a piece
 
 
-def network_object(found: Findings) -> dict[str, Any]:
+def network_object(found: Findings, treated: "Adjusted | None" = None) -> dict[str, Any]:
     """An adjusted network as `catseye adjust --json` gives it, whole.
 
-    found   what is told of a solution
+    found     what is told of a solution
+    treated   how its observations were treated, where that was asked for
 
     Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test at 0.1 % with
     power 80 %; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of tests. `from`, `to`,
@@ -28,15 +32,21 @@ def network_object(found: Findings) -> dict[str, Any]:
     z up.
     """
     points = {name: value for low in _starts(len(found.names)) for name, value in _points(found, low)}
-    observations = [row for low in _starts(len(found.table)) for row in _observations(found, low)]
-    return {**_head(found), "points": points, "observations": observations}
+    observations = [
+        dict(zip(columns, values, strict=True))
+        for low in _starts(len(found.table))
+        if (columns := _observations(found, low, treated))
+        for values in zip(*columns.values(), strict=True)
+    ]
+    return {**_head(found, treated), "points": points, "observations": observations}
 
 
-def network_json(found: Findings, *, lines: bool = False) -> Iterator[str]:
+def network_json(found: Findings, *, lines: bool = False, treated: "Adjusted | None" = None) -> Iterator[str]:
     """The text of `network_object` in pieces.
 
-    found   what is told of a solution
-    lines   a line for each entry, for reading; else all on one line, for programs
+    found     what is told of a solution
+    treated   how its observations were treated, where that was asked for
+    lines     a line for each entry, for reading; else all on one line, for programs
 
     >>> from itertools import chain
     >>> list(chain(_joined(iter([["a", "b"], ["c"]]), ", ")))
@@ -44,16 +54,17 @@ def network_json(found: Findings, *, lines: bool = False) -> Iterator[str]:
     """
     end, deep = ("\n", "    ") if lines else ("", "")
     comma = f",{end}{deep}" if lines else ", "
-    head = (",\n  " if lines else ", ").join(f"{json.dumps(k)}: {_text(v)}" for k, v in _head(found).items())
+    head = (",\n  " if lines else ", ").join(f"{json.dumps(k)}: {_text(v)}" for k, v in _head(found, treated).items())
     yield f'{{{end}{"  " if lines else ""}{head},{end or " "}{"  " if lines else ""}"points": {{{end}{deep}'
     points = ([f"{json.dumps(k)}: {_text(v)}" for k, v in _points(found, low)] for low in _starts(len(found.names)))
     yield from _joined(points, comma)
     yield f'{end}{"  " if lines else ""}}},{end or " "}{"  " if lines else ""}"observations": [{end}{deep}'
-    yield from _joined(([_text(o) for o in _observations(found, low)] for low in _starts(len(found.table))), comma)
+    yield from _joined((_row_texts(_observations(found, low, treated)) for low in _starts(len(found.table))), comma)
     yield f"{end}{'  ' if lines else ''}]{end}}}{end}"
 
 
 _text = json.JSONEncoder(allow_nan=False).encode
+_quoted = json.encoder.encode_basestring_ascii
 
 
 def _joined(pieces: Iterator[list[str]], comma: str) -> Iterator[str]:
@@ -67,7 +78,7 @@ def _starts(count: int) -> range:
     return range(0, count, PIECE)
 
 
-def _head(found: Findings) -> dict[str, Any]:
+def _head(found: Findings, treated: "Adjusted | None") -> dict[str, Any]:
     """All but the points and the observations."""
     solution, whole = found.solution, found.whole
     degrees = solution.degrees_of_freedom
@@ -101,6 +112,7 @@ def _head(found: Findings) -> dict[str, Any]:
                 "value": found.critical,
                 "noncentrality": NONCENTRALITY,
             },
+            "treatment": None if treated is None else _treatment(found, treated),
             "suspects": found.suspects,
             "unchecked": np.flatnonzero(found.table.active & ~found.table.checked),
             "parameters": {
@@ -109,6 +121,36 @@ def _head(found: Findings) -> dict[str, Any]:
             },
         }
     )
+
+
+def _treatment(found: Findings, treated: "Adjusted") -> dict[str, Any]:
+    """What was left out or weighed down, by rows of the observations; and estimated components of variance."""
+    sign, components = found.table.sign, treated.components
+    rejections = []
+    for rejection in treated.rejections:
+        row = found.row_of(rejection.group, rejection.row)
+        rejections.append(
+            {
+                "observation": row,
+                "statistic": sign[row] * rejection.statistic,
+                "estimated_error": sign[row] * rejection.estimated_error,
+                "margin": rejection.margin,
+                "rival": None if rejection.rival is None else found.row_of(*rejection.rival),
+            }
+        )
+    return {
+        "method": treated.treatment,
+        "rejected": np.flatnonzero(found.in_table(treated.rejected)),
+        "undecided": np.flatnonzero(found.in_table(treated.undecided)),
+        "rejections": rejections,
+        "variance_components": None
+        if components is None
+        else {
+            name: {"value": value, "u": u}
+            for name, value, u in zip(components.names, components.values, components.u, strict=True)
+        },
+        "notes": list(treated.notes),
+    }
 
 
 def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -144,8 +186,8 @@ def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
         )
 
 
-def _observations(found: Findings, low: int) -> Iterator[dict[str, Any]]:
-    """Objects of the observations from row `low` on, a piece of them."""
+def _observations(found: Findings, low: int, treated: "Adjusted | None") -> dict[str, list[Any]]:
+    """Columns of the observations from row `low` on, a piece of them."""
     table, part = found.table, slice(low, low + PIECE)
     names = [*found.names, None]  # the last one for none, which is -1
     columns: dict[str, list[Any]] = {"kind": [table.kinds[k] for k in table.kind[part].tolist()]}
@@ -158,12 +200,30 @@ def _observations(found: Findings, low: int) -> Iterator[dict[str, Any]]:
     columns |= {name: _numbers(getattr(table, name)[part]) for name in MEASURES}
     columns |= {"test": _numbers(found.statistic[part]), "p": _numbers(found.p[part])}
     columns |= {"active": table.active[part].tolist(), "checked": table.checked[part].tolist()}
+    if treated is not None:
+        columns["weight"] = _numbers(found.in_table(treated.weights)[part])
     groups, places = [g.name for g in found.network.groups], found.network.places
     at = list(zip(table.group[part].tolist(), table.row[part].tolist(), strict=True))
     columns["group"] = [groups[g] for g, _ in at]
     columns["place"] = [places[g][r] if places and places[g] else None for g, r in at]
-    keys = tuple(columns)
-    return (dict(zip(keys, values, strict=True)) for values in zip(*columns.values(), strict=True))
+    return columns
+
+
+def _row_texts(columns: dict[str, list[Any]]) -> list[str]:
+    """The rows of columns as JSON objects, a template filled: three times as fast as an object each."""
+    codes, texts = zip(*(_column_texts(values) for values in columns.values()), strict=True)
+    template = "{" + ", ".join(f"{json.dumps(key)}: {code}" for key, code in zip(columns, codes, strict=True)) + "}"
+    return [template % row for row in zip(*texts, strict=True)]
+
+
+def _column_texts(values: list[Any]) -> tuple[str, list[Any]]:
+    """How a column of numbers, truths or texts, with None, is written in JSON, and what is put there."""
+    types = set(map(type, values))
+    if types == {float}:
+        return "%r", values
+    if types == {bool}:
+        return "%s", ["true" if value else "false" for value in values]
+    return "%s", ["null" if v is None else repr(v) if isinstance(v, float) else _quoted(v) for v in values]
 
 
 def _numbers(values: np.ndarray) -> list[Any]:

@@ -3,15 +3,19 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.network_figures import Drawn, network_figures
 from catseye.gateways.network_findings import Findings
-from catseye.gateways.network_summary import passages, quantity, verdict
+from catseye.gateways.network_summary import passages, quantity, treatment_passages, verdict
 from catseye.gateways.objects import versions
 from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
+
+if TYPE_CHECKING:
+    from catseye.reduction.networks import Adjusted
 
 CONTENTS = {
     "summary": "Summary",
@@ -28,13 +32,21 @@ WEAKEST = 200  # points listed of more than that
 UNCHECKED = 100  # unchecked observations named
 
 
-def network_report(found: Findings, when: datetime, inputs: Mapping[str, str], *, prefix: str = "") -> str:
+def network_report(
+    found: Findings,
+    when: datetime,
+    inputs: Mapping[str, str],
+    *,
+    prefix: str = "",
+    treated: "Adjusted | None" = None,
+) -> str:
     """The whole page.
 
     found    what is told of a solution
     when     UTC
     inputs   SHA-256 of each file read, by its name
     prefix   of the names of the tables beside the report
+    treated  how observations were treated, where that was asked for
     """
     drawn = network_figures(found)
     name = found.network.source or "network"
@@ -48,7 +60,7 @@ def network_report(found: Findings, when: datetime, inputs: Mapping[str, str], *
     )
     body = [
         header,
-        _summary(found),
+        _summary(found, treated),
         _network(drawn),
         _observations(found, drawn, f"{prefix}observations.csv"),
         _reliability(found, drawn),
@@ -61,7 +73,7 @@ def network_report(found: Findings, when: datetime, inputs: Mapping[str, str], *
     return page(f"catseye: {name}", "\n".join(body))
 
 
-def _summary(found: Findings) -> str:
+def _summary(found: Findings, treated: "Adjusted | None") -> str:
     axis = found.ellipsoid.semi_axes[:, 0]
     known = axis[np.isfinite(axis) & (axis > 0.0)]
     good, text = verdict(found)
@@ -69,14 +81,15 @@ def _summary(found: Findings) -> str:
     if len(known):
         usual, worst = quantity(float(np.median(known)), "m"), quantity(float(known.max()), "m")
         cards.insert(1, card("Points known to", usual, f"longest axis of the usual ellipsoid; worst {worst}"))
-    told = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(found)[1:])
+    told = [*passages(found)[1:], *([] if treated is None else treatment_passages(treated, found))]
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in told)
     own = found.network.description.strip()
     return section(
         "summary",
         CONTENTS["summary"],
         paragraph(text, "" if good else "bad"),
         f'<div class="cards">{"".join(cards)}</div>',
-        f"<dl>{told}</dl>",
+        f"<dl>{words}</dl>",
         folded("The file's own words", *(paragraph(part) for part in own.split("\n\n"))) if own else "",
     )
 

@@ -1,11 +1,16 @@
 """An adjusted network told in sentences: is it good, what is worst, what floats."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.reliability import TOO_LARGE, TOO_SMALL
 from catseye.gateways.network_findings import Findings
 from catseye.gateways.summary import Passage
+
+if TYPE_CHECKING:
+    from catseye.reduction.networks import Adjusted
 
 NAMED = 5  # names in a sentence at most
 WEAK = 5.0  # times the usual uncertainty: such a point is named
@@ -84,10 +89,50 @@ def passages(found: Findings) -> list[Passage]:
     if found.answered:
         told += [
             Passage("The points", _points(found)),
-            Passage("The observations", _observations(found)),
+            Passage("The fit", _observations(found)),
             Passage("The checks", _checks(found)),
         ]
     return told
+
+
+def treatment_passages(treated: "Adjusted", found: Findings) -> list[Passage]:
+    """What was left out or weighed down, and which uncertainties the observations themselves ask for.
+
+    treated   how observations were treated
+    found     what is told of the solution
+    """
+    told = []
+    rejected, undecided = (np.flatnonzero(found.in_table(part)) for part in (treated.rejected, treated.undecided))
+    if treated.treatment != "plain":
+        how = (
+            "Left out"
+            if treated.treatment == "rejected"
+            else f"Robust weights ({treated.treatment}); given next to none"
+        )
+        text = f"{how}: {_listed([found.label(int(i)) for i in rejected[:NAMED]], len(rejected)) or 'no observation'}."
+        if len(undecided):
+            names = _listed([found.label(int(i)) for i in undecided[:NAMED]], len(undecided))
+            text += f" Contradicted by others, and nothing says which is wrong: {names}."
+        told.append(Passage("The treatment", text))
+    if treated.components is not None:
+        told.append(Passage("The claims", _claims(treated)))
+    return told + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
+
+
+def _claims(treated: "Adjusted") -> str:
+    """Estimated components of variance; those of rangers are squares of a constant, m, and of a ratio."""
+    components = treated.components
+    assert components is not None
+    roots, u = components.roots()
+    words = []
+    for name, variance, root, u_root in zip(components.names, components.values, roots, u, strict=True):
+        if "^2 of " not in name:
+            words.append(f"{name} {variance:.3g} times the claimed variance")
+            continue
+        scale, unit = (1e6, "µm") if name.startswith("constant") else (1e6, "ppm")
+        spread = f" (u {u_root * scale:.2g})" if np.isfinite(u_root) else ""
+        words.append(f"{name.replace('^2 of', ' of').replace('  ', ' ')} {root * scale:.3g} {unit}{spread}")
+    return f"The observations themselves ask for: {_listed(words)}."
 
 
 def _network(found: Findings) -> str:

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Iterator, Sequence
+from math import isfinite
 
 import numpy as np
 
@@ -138,18 +139,20 @@ def table(formats: Formats, count: int, columns: Callable[[slice], Sequence[Colu
     """
     yield ",".join(formats) + "\n"
     for low in range(0, count, PIECE):
-        texts = [_texts(c, f) for c, f in zip(columns(slice(low, low + PIECE)), formats.values(), strict=True)]
-        yield "".join([",".join(row) + "\n" for row in zip(*texts, strict=True)])
+        part = columns(slice(low, low + PIECE))
+        codes, texts = zip(*(_column(c, f) for c, f in zip(part, formats.values(), strict=True)), strict=True)
+        template = ",".join(codes) + "\n"
+        yield "".join([template % row for row in zip(*texts, strict=True)])
 
 
-def _texts(column: Column, form: str) -> Sequence[str]:
-    """Texts as they are; numbers as the format says, empty where not finite."""
+def _column(column: Column, form: str) -> tuple[str, Sequence]:
+    """The template of a column's cells and what is put there: texts as they are, empty where a number is not finite."""
     if not isinstance(column, np.ndarray):
-        return column
-    texts = [format(value, form) for value in column.tolist()]
-    if form == "d":
-        return texts
-    return [text if finite else "" for text, finite in zip(texts, np.isfinite(column).tolist(), strict=True)]
+        return "%s", column
+    values = column.tolist()
+    if form == "d" or np.isfinite(column).all():
+        return f"%{form}", values
+    return "%s", [format(value, form) if isfinite(value) else "" for value in values]
 
 
 def cell(text: str) -> str:

@@ -45,6 +45,14 @@ SUMMARY = (
     ("vectors", "d"),
     ("azimuths", "azimuth"),
 )
+ROLES = {
+    "": "<from>%s</from><to>%s</to>",
+    "angle": "<from>%s</from><left>%s</left><right>%s</right>",
+    "id": "<id>%s</id>",
+}
+SHORT = "<obs>%.10f</obs><adj>%.10f</adj><stdev>%.6f</stdev><qrr>%.9g</qrr><f>%.3f</f>"
+TESTED = f"{SHORT}<std-residual>%.3f</std-residual>"
+BODIES = {5: SHORT, 6: TESTED, 8: f"{TESTED}<err-obs>%.6f</err-obs><err-adj>%.6f</err-adj>"}  # by how many numbers
 TURNING = ("direction", "angle", "azimuth")
 DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
   approximate coordinates are the file's, or where it has none the adjusted ones;
@@ -237,63 +245,54 @@ def _observations(found: Findings, turn: np.ndarray) -> Iterator[str]:
     table = found.table
     written = np.abs(turn.T @ found.network.axes).argmax(axis=0)  # where the file's axes stand in those written
     letter = {name: "xyz"[int(k)] for name, k in zip(found.network.axis_names, written, strict=True)}
-    sign = np.where(table.component == "", 1.0, table.sign) if turn is not found.network.axes else 1.0
-    turned = np.array([TAGS.get(kind) in TURNING for kind in table.kinds], dtype=bool)
-    tags = [TAGS.get(kind) for kind in table.kinds]
-    shown = np.flatnonzero(table.active & np.array([tag is not None for tag in tags], dtype=bool)[table.kind])
-    share = _adjusted_share(found)
+    known = np.array([kind in TAGS for kind in table.kinds], dtype=bool)
+    shown = np.flatnonzero(table.active & known[table.kind])
     names = [_text(name) for name in found.names]
-    scale = np.sqrt(found.factor)
-    limit = _confidence_scale(found)
-    angular = table.unit == "rad"
-    value, fine = np.where(angular, GON, 1.0), np.where(angular, CC, MILLIMETRE)
-    observed, adjusted = sign * table.observed / value, sign * (table.observed - table.residual) / value
-    round_about = turned[table.kind]
-    adjusted = np.where(round_about, adjusted % 400.0, adjusted)
-    sigma, v = table.u / fine, -sign * table.residual / fine
-    alone = np.array([g.covariance.ndim == 1 for g in found.network.groups], dtype=bool)[table.group]
-    columns = (table.kind, observed, adjusted, sigma, v, share, alone)
+    numbers, length = _numbers(found, table.sign if turn is not found.network.axes else np.ones(len(table)))
     for low in range(0, len(shown), PIECE):
         part = shown[low : low + PIECE]
         lines = []
-        for i, kind, *numbers in zip(part.tolist(), *(c[part].tolist() for c in columns), strict=True):
-            tag = str(tags[kind]) + letter.get(str(table.component[i]), "")
-            lines.append(
-                f"<{tag}>{_ends(found, i, tag, names)}{_numbers(*numbers, scale=scale, limit=limit)}</{tag}>\n"
-            )
+        columns = (c[part].tolist() for c in (table.kind, table.component, length, table.ends, numbers))
+        for kind, component, count, at, row in zip(*columns, strict=True):
+            tag = TAGS[table.kinds[kind]] + letter.get(component, "")
+            roles = ROLES.get("id" if tag.startswith("coordinate") else tag, ROLES[""])
+            ends = [names[i] for i in at[: roles.count("%s")]]
+            lines.append(f"<{tag}>{roles}{BODIES[count]}</{tag}>\n" % (*ends, *row[:count]))
         yield "".join(lines)
 
 
-def _numbers(
-    observed: float, adjusted: float, sigma: float, v: float, share: float, alone: bool, *, scale: float, limit: float
-) -> str:
-    """What gama-local writes of an observation.
+def _numbers(found: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What gama-local writes of the observations, (m, 8), and how many of it (m,): those in the bodies' order.
 
-    sigma, v   mm or cc; v is adjusted less observed
-    share      of the observed variance that the adjusted observation has
-    alone      not correlated with others
-    scale      root of the variance factor applied
-    limit      studentised residual from which the error is given also of a weakly checked observation
+    sign   (m,) turns components into the axes that are written
+
+    The error is given of what is checked well, or stands out, and is not correlated with others.
     """
-    control = 100.0 * abs(1.0 - share**0.5)
-    text = (
-        f"<obs>{observed:.10f}</obs><adj>{adjusted:.10f}</adj><stdev>{scale * sigma * share**0.5:.6f}</stdev>"
-        f"<qrr>{(1.0 - share) * sigma**2:.9g}</qrr><f>{control:.3f}</f>"
+    table, share, scale = found.table, _adjusted_share(found), np.sqrt(found.factor)
+    angular = table.unit == "rad"
+    value, fine = np.where(angular, GON, 1.0), np.where(angular, CC, MILLIMETRE)
+    observed, adjusted = sign * table.observed / value, sign * (table.observed - table.residual) / value
+    turning = np.array([TAGS.get(kind) in TURNING for kind in table.kinds], dtype=bool)[table.kind]
+    sigma, v = table.u / fine, -sign * table.residual / fine
+    qrr, control = (1.0 - share) * sigma**2, 100.0 * np.abs(1.0 - np.sqrt(share))
+    with np.errstate(invalid="ignore", divide="ignore"):  # without a check it is not shown
+        studentised, error = np.abs(v) / (scale * np.sqrt(qrr)), v / (1.0 - share)
+    alone = np.array([g.covariance.ndim == 1 for g in found.network.groups], dtype=bool)[table.group]
+    full = alone & ((control >= 5.0) | (studentised > _confidence_scale(found)))
+    told = np.stack(
+        [
+            observed,
+            np.where(turning, adjusted % 400.0, adjusted),
+            scale * sigma * np.sqrt(share),
+            qrr,
+            control,
+            studentised,
+            error,
+            error - v,
+        ],
+        axis=1,
     )
-    if control < 0.1:
-        return text
-    studentised = abs(v) / (scale * sigma * (1.0 - share) ** 0.5)
-    text += f"<std-residual>{studentised:.3f}</std-residual>"
-    if alone and (control >= 5.0 or studentised > limit):
-        error = v / (1.0 - share)
-        text += f"<err-obs>{error:.6f}</err-obs><err-adj>{error - v:.6f}</err-adj>"
-    return text
-
-
-def _ends(found: Findings, row: int, tag: str, names: list[str]) -> str:
-    ends = [names[i] for i in found.table.ends[row] if i >= 0]
-    roles = ("id",) if tag.startswith("coordinate") else ("from", "left", "right") if tag == "angle" else ("from", "to")
-    return "".join(f"<{role}>{end}</{role}>" for role, end in zip(roles, ends, strict=True))
+    return told, np.where(control < 0.1, 5, np.where(full, 8, 6))
 
 
 def _adjusted_share(found: Findings) -> np.ndarray:

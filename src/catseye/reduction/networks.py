@@ -13,6 +13,7 @@ from catseye.estimation.monte_carlo import Disturbance, Scatter, scatter
 from catseye.estimation.network import Network, NetworkSolution, points_of
 from catseye.estimation.network_adjustment import adjust_network, with_datum
 from catseye.estimation.observations import Distances
+from catseye.estimation.ranging_engine import RangingCovariance
 from catseye.estimation.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
 from catseye.estimation.variance_components import Components, GroupFactors, RowModel, variance_components
 
@@ -71,22 +72,21 @@ def adjusted(
     if components not in (None, "rangers", "groups"):
         raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
     network, found_names = _placed(with_datum(network, datum))
-    plain = replace(adjust_network(network), approximate=found_names)
+    treated = reject or robust is not None or components is not None
+    plain = replace(adjust_network(network, diagnose=not treated), approximate=found_names)
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
     result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
-    if not (reject or robust or components):
+    if not treated or not np.isfinite(plain.covariance).all():
         return result
-    if not plain.status.startswith(CONVERGED):
-        return result
-    count = 0
+    count, engine = 0, _engine(plain)
 
     def solve(inflation: Sequence[np.ndarray]) -> tuple[Fit, ...]:
         nonlocal count
         count += 1
         if progress is not None:
             progress("adjusting", count, 0)
-        return adjust_network(network, inflation=inflation, alone=True).fits
+        return adjust_network(network, inflation=inflation, alone=True, diagnose=False, engine=engine).fits
 
     if robust is not None:
         found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
@@ -140,6 +140,11 @@ def _placed(network: Network) -> tuple[Network, tuple[str, ...]]:
     return replace(network, points=points, parameters=parameters), begin.found
 
 
+def _engine(solution: NetworkSolution) -> str | None:
+    """The engine for many solutions on the way: the ranging one where it served, without falling back to another."""
+    return "ranging" if isinstance(solution.q, RangingCovariance) else None
+
+
 def _final(
     network: Network, inflation: Sequence[np.ndarray], found: tuple[str, ...], *, alone: bool
 ) -> NetworkSolution:
@@ -149,7 +154,7 @@ def _final(
 def _with_components(network: Network, result: Adjusted, by: str, progress: Progress | None) -> Adjusted:
     """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
-    count = 0
+    count, engine = 0, _engine(result.solution)
 
     def scaled(scales: Sequence[np.ndarray]) -> tuple[Fit, ...]:
         nonlocal count
@@ -157,7 +162,7 @@ def _with_components(network: Network, result: Adjusted, by: str, progress: Prog
         if progress is not None:
             progress("estimating components", count, 0)
         used = scales if out is None else [s * o for s, o in zip(scales, out, strict=True)]
-        return adjust_network(network, inflation=used).fits
+        return adjust_network(network, inflation=used, diagnose=False, engine=engine).fits
 
     sizes = tuple(len(g.observed) for g in network.groups)
     if by == "groups":

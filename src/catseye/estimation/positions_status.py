@@ -1,0 +1,38 @@
+"""What became of a target whose position was sought, as a value and in words."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """What became of one target; only FOUND and CONTRADICTING come with coordinates."""
+
+    FOUND = 0
+    CONTRADICTING = 1
+    TOO_FEW = 2
+    COLLINEAR = 3
+    NOT_HELD = 4
+    DISJOINT = 5
+    AMBIGUOUS = 6
+    AT_STATION = 7
+    NOT_CONVERGED = 8
+    REFUSED = 9
+
+
+TEXTS = {
+    Status.FOUND: "found",
+    Status.CONTRADICTING: "its {ranges} ranges contradict each other: residuals are {ratio:.3g} times their sigma "
+    "(limit 10); one of them or a station is grossly wrong",
+    Status.TOO_FEW: "seen by {ranges} ranges only: three are needed; measure from another station",
+    Status.COLLINEAR: "the stations that see it stand on one line: it may be anywhere on a circle about that line; "
+    "measure from a station off the line",
+    Status.NOT_HELD: "its ranges do not hold it in one direction: it lies in one plane with the stations that see it, "
+    "or too far from them for their spread; measure from a station off that plane",
+    Status.DISJOINT: "its {ranges} ranges do not meet in a point: they miss each other by {ratio:.3g} times their "
+    "sigma (limit 5) or, in closed form, by `misclosure`; a range is too short, or a station or target is confused",
+    Status.AMBIGUOUS: "the stations that see it stand in one plane and its two mirror images fit alike; "
+    "give a point on its side of the plane (`near`), or a range from off the plane",
+    Status.AT_STATION: "it stands within four sigma of a station, where a range has no direction; leave that range out",
+    Status.NOT_CONVERGED: "not converged after {iterations} steps, residuals {ratio:.3g} times their sigma; "
+    "check its ranges and the stations",
+    Status.REFUSED: "a range of it is negative or infinite, or the sigma of a range is not positive and finite",
+}
