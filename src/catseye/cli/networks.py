@@ -131,7 +131,7 @@ def adjust(
         if later is not None:
             _compared(found, sources, points, level, out, json, quiet, progress)
             return
-        _write_adjusted(found[0], network, out, progress)
+        _write_adjusted(treated[0], found[0], network, out, progress)
     finally:
         progress.clear()
     _tell_adjusted(treated[0], found[0], json, quiet, out)
@@ -145,14 +145,16 @@ def _read(reader: "Callable[[Path], Network]", source: Path) -> "Network":
     return reader(source)
 
 
-def _write_adjusted(found: "Findings", source: Path, out: Path | None, progress: ProgressLine) -> None:
+def _write_adjusted(
+    treated: "Adjusted", found: "Findings", source: Path, out: Path | None, progress: ProgressLine
+) -> None:
     if out is None:
         return
     from catseye.gateways.network_files import input_hashes, write_network
     from catseye.gateways.output import whole_directory
 
     with whole_directory(out, source) as directory:
-        write_network(found, directory, input_hashes(source), progress)
+        write_network(found, directory, input_hashes(source), progress, treated=treated)
 
 
 def _tell_adjusted(treated: "Adjusted", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:

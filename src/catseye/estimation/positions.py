@@ -115,8 +115,8 @@ def positions(
     t, m = targets.d.shape
     if compiled is None:
         compiled = targets.d.size >= COMPILED_FROM
-    whole_numbers = (np.empty(t, dtype=kind) for kind in (np.int8, np.int32, np.int32))
-    out = Positions(np.empty((t, 3)), np.empty((t, 3, 3)), *whole_numbers, np.empty(t))
+    status, ranges, iterations = (np.empty(t, dtype=kind) for kind in (np.int8, np.int32, np.int32))
+    out = Positions(np.empty((t, 3)), np.empty((t, 3, 3)), status, ranges, iterations, np.empty(t))
     origin = s.mean(axis=0)
     s = s - origin
     if targets.near is not None:
