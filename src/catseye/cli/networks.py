@@ -131,10 +131,12 @@ def adjust(
         if later is not None:
             _compared(found, sources, points, level, out, json, quiet, progress)
             return
-        _write_adjusted(treated[0], found[0], network, out, progress)
+        if found[0].answered:
+            _write_adjusted(treated[0], found[0], network, out, progress)
     finally:
         progress.clear()
-    _tell_adjusted(treated[0], found[0], json, quiet, out)
+    if json or found[0].answered:
+        _tell_adjusted(treated[0], found[0], json, quiet, out)
     if not found[0].answered:
         raise EstimationError(f"{network}: {treated[0].solution.status}")
 

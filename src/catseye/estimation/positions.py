@@ -166,7 +166,8 @@ def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Ch
 
     frame = np.concatenate([whole.centre, whole.axes[0], whole.inverse])
     site = kernel.Site(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)
-    limits = kernel.Limits(FLAT, SIGNIFICANT, descent.ENOUGH, descent.SINGULAR, descent.BENT, descent.CONTRADICTION)
+    d = descent
+    limits = kernel.Limits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
 
     def fast(chunk: _Chunk, part: Positions) -> np.ndarray:
         good = np.empty(len(chunk.d), dtype=bool)

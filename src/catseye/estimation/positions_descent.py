@@ -14,7 +14,7 @@ CONTRADICTION = 10.0  # root mean square residual in sigmas, per degree of freed
 MISSED = 5.0  # the same, per range, where the target's height is not held
 ROUNDING, NOTHING = 1.0 + 1e-12, 1e-6  # of a sum of squares: a growth below these is no step uphill
 OFF = 1e-3  # of the ranges: a start at least so high, for in the plane itself nothing says which way is up
-CAP = 100  # evaluations; from the closed form one or two are usual
+CAP, CAP_UNDAMPED = 100, 8  # evaluations; from the closed form one or two are usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Ranges:
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Ends of descents; `bend` is what BENT limits, `ended` False at the cap or where only damping held it."""
+    """Ends of descents; `bend` is what BENT limits, `ended` False where a step undamped would not settle."""
 
     x: np.ndarray
     covariance: np.ndarray
@@ -58,9 +58,10 @@ class Descent:
 def least_squares_positions(r: Ranges, start: Starts) -> tuple[Descent, np.ndarray]:
     """Ends (k) and status (k,) of targets that three ranges or more may hold.
 
-    Both mirror images are tried where the one that the start tells does not go smoothly.
+    Undamped steps come first: uphill and down again they pass narrow valleys where damped ones creep. Where they do not
+    go smoothly, damped ones go from both mirror images.
     """
-    found = descend(r, start.foot + (start.sign * start.height)[:, None] * start.normal)
+    found = descend(r, start.foot + (start.sign * start.height)[:, None] * start.normal, damped=False)
     good = found.ended & (found.bend < BENT) & (found.pvv <= np.where(r.count > 3, _most(r.count), 1.0))
     rest = np.flatnonzero(~good | (start.sign * start.height == 0.0))
     status = np.full(len(r.d), Status.FOUND, dtype=np.int8)
@@ -142,41 +143,41 @@ def _inverse(n: np.ndarray, damping: np.ndarray | float = 0.0) -> tuple[np.ndarr
 SQUARE = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where the six upper entries go
 
 
-def descend(r: Ranges, start: np.ndarray) -> Descent:
-    """Gauss-Newton from start (k, 3), damped after Levenberg and Marquardt where a step would go uphill."""
+def _step(a: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The step (3, k) from normal equations and their inverses, what it gains, and the square of the step after it.
+
+    That is foreseen from the curvature: (p + q)^2 <= 2 p^2 + 2 q^2 with p of the step and q of the residuals.
+    """
+    step = np.stack([np.sum(q[row] * a[6:9], axis=0) for row in SQUARE])
+    square = np.sum(step * step, axis=0)
+    foreseen = a[10] * square * (square / 2 + 2.0 * a[9] * (q[0] + q[3] + q[5]))
+    return step, np.sum(step * a[6:9], axis=0), foreseen
+
+
+def descend(r: Ranges, start: np.ndarray, *, damped: bool = True) -> Descent:
+    """Gauss-Newton from start (k, 3), damped (or not) after Levenberg and Marquardt where a step would go uphill."""
     k, s = len(r.d), r.stations
-    out = Descent(
-        start.copy(),
-        np.full((k, 3, 3), np.nan),
-        np.full(k, np.nan),
-        np.zeros(k, int),
-        np.full(k, np.inf),
-        np.zeros(k, bool),
-    )
+    out = Descent(start.copy(), np.empty((k, 3, 3)), np.empty(k), np.zeros(k, int), np.empty(k), np.zeros(k, bool))
     lanes, x, damping = np.arange(k), np.ascontiguousarray(start.T), np.zeros(k)
     d, root = np.ascontiguousarray(r.d.T), np.ascontiguousarray(1.0 / r.u.T)
     a = _normal(s, d, root, x)
-    for taken in range(1, CAP + 1):
+    cap = CAP if damped else CAP_UNDAMPED
+    for taken in range(1, cap + 1):
         q, regular = _inverse(a, damping)
-        step = np.stack([np.sum(q[row] * a[6:9], axis=0) for row in SQUARE])
-        square = np.sum(step * step, axis=0)
-        gain = np.sum(step * a[6:9], axis=0)
-        foreseen = a[10] * square * (square / 2 + 2.0 * a[9] * (q[0] + q[3] + q[5]))  # (p + q)^2 <= 2 p^2 + 2 q^2
-        free = damping == 0.0
-        done = regular & np.where(free, foreseen < ENOUGH**2, gain < NOTHING**2)
-        trial = np.where(regular, x + step, x)
-        leaving = done | (taken == CAP)
+        step, gain, foreseen = _step(a, q)
+        done = regular & np.where(damping == 0.0, foreseen < ENOUGH**2, gain < NOTHING**2)
+        leaving = done | (taken == cap) | ~(regular | damped)
         if leaving.any():
-            _leave(out, lanes[leaving], a[:, leaving], trial[:, leaving], gain[leaving], taken)
-            out.ended[lanes[done & free]] = True
+            _leave(out, lanes[leaving], a[:, leaving], x[:, leaving], taken)
             stay = ~leaving
             lanes, damping, regular = lanes[stay], damping[stay], regular[stay]
-            x, trial, a, d = x[:, stay], trial[:, stay], a[:, stay], d[:, stay]
+            x, step, a, d = x[:, stay], step[:, stay], a[:, stay], d[:, stay]
             root = root[:, stay] if root.shape[1] > 1 else root
             if not len(lanes):
                 break
+        trial = np.where(regular, x + step, x)
         b = _normal(s, d, root, trial)
-        better = regular & (b[9] <= a[9] * ROUNDING + NOTHING)
+        better = regular & ((b[9] <= a[9] * ROUNDING + NOTHING) | (not damped))
         trace = a[0] + a[3] + a[5]
         damping = np.where(better, np.where(damping > 1e-8 * trace, damping / 10, 0.0), damping * 10)
         damping = np.where(better, damping, np.maximum(damping, 1e-4 * trace))
@@ -184,9 +185,12 @@ def descend(r: Ranges, start: np.ndarray) -> Descent:
     return out
 
 
-def _leave(out: Descent, lanes: np.ndarray, a: np.ndarray, x: np.ndarray, gain: np.ndarray, taken: int) -> None:
-    """What is known of lanes at the end of their descent."""
+def _leave(out: Descent, lanes: np.ndarray, a: np.ndarray, x: np.ndarray, taken: int) -> None:
+    """What is known of lanes at the end of their descent; the last step is never damped, if it is worth taking."""
     q, regular = _inverse(a)
-    out.x[lanes], out.covariance[lanes] = x.T, q[SQUARE].transpose(2, 0, 1)
-    out.pvv[lanes], out.iterations[lanes] = np.maximum(a[9] - np.where(regular, gain, 0.0), 0.0), taken
+    step, gain, foreseen = _step(a, q)
+    ended = regular & (foreseen < ENOUGH**2)
+    out.x[lanes], out.covariance[lanes] = np.where(ended, x + step, x).T, q[SQUARE].transpose(2, 0, 1)
+    out.pvv[lanes], out.iterations[lanes] = np.maximum(a[9] - np.where(ended, gain, 0.0), 0.0), taken
     out.bend[lanes] = np.where(regular, np.sqrt(a[10]) * (q[0] + q[3] + q[5]) / 2, np.inf)
+    out.ended[lanes] = ended

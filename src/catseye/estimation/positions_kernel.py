@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 LANES = 32  # targets a block: what fits the registers' width several times and the first cache with all its ranges
-CAP = 8  # evaluations; from the closed form one or two are usual
 SWEEPS = 4  # of Jacobi's rotations; three nearly always leave nothing off the diagonal
 DIAGONAL = 1e-11  # of the trace: what may stay off the diagonal; its axes then start well within a nanometre
 
@@ -48,6 +47,7 @@ class Limits(NamedTuple):
     singular: float
     bent: float
     contradiction: float
+    cap: int
 
 
 class Answers(NamedTuple):
@@ -340,7 +340,7 @@ def locate(measured, site, limits, answers):
         for j in range(lanes):
             answers.good[first + j], answers.ranges[first + j] = False, int(count[j])
         waiting, taken = True, 0
-        while waiting and taken < CAP:
+        while waiting and taken < limits.cap:
             taken += 1
             _evaluate(ranges, root, site.stations, at, a)
             _step(a, at, q, tally, limits.singular, clear)
