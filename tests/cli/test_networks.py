@@ -131,7 +131,7 @@ def test_a_blunder_is_named_and_not_removed_unless_asked(answered, tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda p, r: (p, [line for line in r if not line.split(",")[1] == "T2" or line[:2] in ("S0", "S1")]),
+        (lambda p, r: (p, [line for line in r if line.split(",")[1] != "T2" or line[:2] in ("S0", "S1")]),
          "T2 (2 observations) floats"),
         (lambda p, r: ([line.replace("datum", "free") for line in p], r), "the network floats"),
         (lambda p, r: ([*p, p[0]], r), "S0"),

@@ -13,7 +13,7 @@ from scipy.stats import chi2, kstest
 from catseye.errors import EstimationError, InputError
 from catseye.estimation import positions as module
 from catseye.estimation.positions import Status, positions
-from catseye.estimation.positions_descent import CAP
+from catseye.estimation.positions_descent import CAP, Ranges, descend
 
 NETWORK = Path(__file__).parents[1] / "vectors" / "networks" / "ranging-18x500"
 UP = np.array([0.0, 0.0, 1.0])
@@ -220,6 +220,117 @@ def test_compiled_and_plain_forms_give_the_same():
             atol=1e-4,
         )
         np.testing.assert_allclose(fast.pvv, plain.pvv, rtol=1e-6)
+
+
+def counted(monkeypatch):
+    """How many targets the compiled form has left to the plain one, as a list that grows."""
+    left, plain = [], module._plain
+    monkeypatch.setattr(module, "_plain", lambda s, chunk, **kept: (left.append(len(chunk.d)), plain(s, chunk, **kept)))
+    return left
+
+
+@pytest.mark.parametrize("missing", [0.1, 1 / 3, 0.6])
+def test_the_compiled_form_itself_finds_targets_from_any_subset(missing, monkeypatch):
+    """Figures flat, deep and tilted: what it leaves to the plain form is one in a hundred at most, or has no answer."""
+    for flat in (0.02, 0.3, 1.0):
+        stations, _, d = hall(19, 700, flat=flat)
+        rng = np.random.default_rng(20)
+        stations = stations @ rotation(rng).T
+        d[rng.random(d.shape) < missing] = np.nan
+        for u in (np.full(18, 5e-5), np.where(np.isnan(d), np.nan, rng.uniform(3e-5, 9e-5, d.shape))):
+            plain = positions(stations, d, u, compiled=False)
+            left = counted(monkeypatch)
+            fast = positions(stations, d, u, compiled=True)
+            monkeypatch.undo()
+            assert sum(left) <= 7 + np.sum(plain.status != Status.FOUND)
+            assert fast.status.tolist() == plain.status.tolist()
+            assert fast.ranges.tolist() == plain.ranges.tolist()
+            same = np.abs(fast.x - plain.x) <= 1e-5 * np.sqrt(np.einsum("tii->ti", plain.covariance)) + 1e-11
+            assert same[plain.status == Status.FOUND].all()
+
+
+def test_the_compiled_form_takes_the_near_image_of_the_stations_that_each_target_is_seen_from(monkeypatch):
+    """Three ranges each: every subset has a plane of its own, and which side of it is near is its own matter."""
+    stations, targets, d = hall(21, 400, s=6, flat=0.4, sigma=0.0)
+    rng = np.random.default_rng(22)
+    for row in d:
+        row[rng.permutation(6)[3:]] = np.nan
+    left = counted(monkeypatch)
+    got = positions(stations, d, np.full(6, 1e-5), near=targets, compiled=True)
+    found = got.status == Status.FOUND
+    assert found.mean() > 0.95
+    assert sum(left) <= np.sum(~found) + 8
+    assert (apart(got.x[found], targets[found]) < 1e-6).all()
+    mirrored = positions(stations, d, np.full(6, 1e-5), compiled=True)
+    assert (mirrored.status[found] == Status.AMBIGUOUS).all()
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_no_target_is_found_on_the_side_that_near_excludes(compiled):
+    """Coplanar stations, sigmas from 10 um to 10 m, targets a hand or a house above them: a descent may pass below."""
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        s = int(rng.integers(3, 7))
+        stations, u = rng.uniform(-60, 60, (s, 3)) * [1, 1, 0], 10 ** rng.uniform(-5, 1, s)
+        x = np.concatenate([rng.uniform(-60, 60, (400, 2)), 10 ** rng.uniform(-1.5, 2, (400, 1))], axis=1)
+        d = np.abs(apart(x[:, None], stations) + u * rng.normal(size=(400, s)))
+        got = positions(stations, d, u, near=x, compiled=compiled)
+        assert not (got.x[got.status == Status.FOUND, 2] <= 0.0).any()
+
+
+def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly():
+    """Sigmas over six decades, noise beyond them, figures flat and thin, ranges missing: the same status and place."""
+    rng = np.random.default_rng(23)
+    for k in range(60):
+        s = int(rng.integers(4, 9))
+        stations = rng.uniform(-60, 60, (s, 3)) * [1, 10 ** rng.uniform(-2, 0), 10 ** rng.uniform(-5, 0)]
+        u = 10 ** rng.uniform(-5, 1.3, s) if k % 2 else np.full(s, 10 ** rng.uniform(-5, 1))
+        x = rng.uniform(-80, 80, (100, 3))
+        d = np.abs(apart(x[:, None], stations) + u * rng.normal(size=(100, s)) * 10 ** rng.uniform(-1, 1))
+        d[rng.random(d.shape) < 0.1] = np.nan
+        plain, fast = (positions(stations, d, u, near=x if k % 3 else None, compiled=c) for c in (False, True))
+        assert fast.status.tolist() == plain.status.tolist()
+        answered = plain.status <= Status.CONTRADICTING
+        sigma = np.sqrt(np.trace(plain.covariance[answered], axis1=1, axis2=2))
+        assert (apart(fast.x[answered], plain.x[answered]) <= 1e-3 * sigma).all()
+
+
+def test_undamped_steps_pass_a_narrow_valley_where_damped_ones_creep():
+    """Three good ranges, three a million times worse that spoil the start by metres: still scipy's minimum."""
+    rng = np.random.default_rng(24)
+    stations, targets, _ = hall(24, 200, s=6, flat=0.3)
+    u = np.array([1e-5, 1e-5, 1e-5, 10.0, 10.0, 10.0])
+    d = apart(targets[:, None], stations) + u * rng.normal(size=(200, 6))
+    got = positions(stations, d, u, near=targets)
+    assert (got.status == Status.FOUND).mean() > 0.9
+    for t in np.flatnonzero(got.status == Status.FOUND)[:20]:
+        x, _, pvv = by_scipy(stations, d[t], u, got.x[t])
+        assert apart(x, got.x[t]) < 1e-3 * np.sqrt(np.trace(got.covariance[t]))
+        assert got.pvv[t] == pytest.approx(pvv, rel=1e-4, abs=1e-4)
+
+
+def test_a_damped_descent_that_settles_has_ended_however_it_came_there():
+    stations, targets, d = hall(25, 300, s=5, flat=0.3, sigma=0.0)
+    u = np.array([[1e-4, 1e-4, 0.1, 0.1, 0.1]])
+    r = Ranges(stations, d, u, np.full(300, 5))
+    start = targets + np.random.default_rng(26).uniform(-30, 30, (300, 3))
+    got = descend(r, start)
+    there = apart(got.x, targets) < 1e-6
+    assert there.mean() > 0.8
+    assert got.ended[there].all()
+    assert (got.iterations[there] > 10).any()  # some were damped on the way
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_bad_range_that_hides_the_height_from_the_start_does_not_hide_it_from_the_answer(compiled):
+    """Its 12 m of error put the closed start into the plane, where nothing says which way is up; its sigma is 10 m."""
+    stations = np.array([[-60.0, -60, 0], [60, -60, 0], [60, 60, 0], [-60, 60, 0], [5, 10, 0]])
+    x = np.array([[12.0, 7, 9.0]])
+    d = apart(x[:, None], stations)
+    d[0, 0] -= 12.0
+    u = np.array([10.0, 1e-4, 1e-4, 1e-4, 1e-4])
+    got = positions(stations, d, u, near=np.array([0.0, 0, 5]), compiled=compiled).require_found()
+    np.testing.assert_allclose(got.x, x, atol=1e-6)
 
 
 @pytest.mark.parametrize("compiled", [False, True])

@@ -199,8 +199,8 @@ class _Nothing:
     def across(self, columns: np.ndarray) -> np.ndarray:
         return np.full((self.size, len(columns)), self.value)
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.full(len(columns), self.value)
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        return np.full(columns.shape, self.value)
 
     def within(self, columns: np.ndarray) -> np.ndarray:
         return np.full((len(columns), len(columns)), self.value)
@@ -240,8 +240,9 @@ def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
     wide = rows.spread(jacobian)
     seen = np.where(on[:, None], wide, 0.0)
     weighted, pv, own = rows.weigh(seen), rows.weigh(v), rows.own_weight()
-    visible = np.maximum(own - rows.forms(q, weighted, weighted), 1e-12 * own)  # without a check it stays finite
-    redundancy[:] = 1.0 - rows.forms(q, weighted, seen)
+    spread = rows.products(q, weighted)
+    visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
+    redundancy[:] = 1.0 - np.sum(spread * seen, axis=1)
     standardised[:] = pv / np.sqrt(visible)
     error[:] = pv / visible
     detectable[:] = NONCENTRALITY / np.sqrt(visible)
@@ -250,7 +251,7 @@ def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
         gain, expected = rows.prediction(out)
         rest = wide[out] - gain @ seen if gain is not None else wide[out]
         surprise = residual[out] - gain @ v if gain is not None else residual[out]
-        expected = expected + rows.forms(q, rest, rest, out)
+        expected = expected + np.sum(rows.products(q, rest, out) * rest, axis=1)
         redundancy[out] = 1.0
         standardised[out] = surprise / np.sqrt(expected)
         error[out] = surprise

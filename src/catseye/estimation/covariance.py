@@ -22,8 +22,8 @@ class Covariance(Protocol):
         """(n, k) of all parameters with some."""
         ...
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """sum over i, j of a_i Q_ij b_j for each row of columns, a, b (m, w), which meet in one observation."""
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """sum over j of Q_ij a_j for each row of columns, a (m, w), which meet in one observation: (m, w), -1 skipped."""
         ...
 
     def within(self, columns: np.ndarray) -> np.ndarray:
@@ -54,14 +54,14 @@ class Dense:
     def within(self, columns: np.ndarray) -> np.ndarray:
         return self.full[np.ix_(columns, columns)]
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        at = np.maximum(columns, 0)
-        result = np.empty(len(at))
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        at, a = np.maximum(columns, 0), np.where(columns < 0, 0.0, a)
+        result = np.empty(at.shape)
         step = max(1, 2_000_000 // max(1, at.shape[1] ** 2))
         for low in range(0, len(at), step):
             part = slice(low, low + step)
             inside = self.full[at[part, :, None], at[part, None, :]]
-            result[part] = np.einsum("mi,mij,mj->m", a[part], inside, b[part], optimize=True)
+            result[part] = (inside @ a[part, :, None])[:, :, 0]
         return result
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
@@ -125,22 +125,18 @@ class Sparse:
     def within(self, columns: np.ndarray) -> np.ndarray:
         return self.across(columns)[columns]
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        from catseye.estimation.sparse_kernel import forms
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        from catseye.estimation.sparse_kernel import products
 
         z, diagonal = self._selected
         at = np.where(columns < 0, -1, self.place[columns])
         scale = np.where(at < 0, 0.0, self.scale[at])
-        return forms(self.lp, self.li, z, diagonal, at, a * scale, b * scale)
+        return scale * products(self.lp, self.li, z, diagonal, at, a * scale)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         at = first[:, None] + np.arange(3)
-        result = np.empty((len(first), 3, 3))
-        for i in range(3):
-            for j in range(3):
-                unit = np.eye(3)
-                result[:, i, j] = self.forms(at, np.tile(unit[i], (len(at), 1)), np.tile(unit[j], (len(at), 1)))
-        return result
+        units = [np.tile(row, (len(at), 1)) for row in np.eye(3)]
+        return np.stack([self.products(at, unit) for unit in units], axis=2)
 
     def diagonal(self) -> np.ndarray:
         result = np.zeros(self.size)
@@ -178,12 +174,12 @@ class Transformed:
         cross = t @ b.T
         return self.inner.within(columns) - cross - cross.T + t @ self.c @ t.T
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        a, b = np.where(columns < 0, 0.0, a), np.where(columns < 0, 0.0, b)
-        at, bt = (np.einsum("mw,mwd->md", v, self.t[columns]) for v in (a, b))
-        ab, bb = (np.einsum("mw,mwd->md", v, self.b[columns]) for v in (a, b))
-        low_rank = np.sum(at * bb + ab * bt, axis=1) - np.einsum("md,de,me->m", at, self.c, bt)
-        return self.inner.forms(columns, a, b) - low_rank
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        a = np.where(columns < 0, 0.0, a)
+        t, b = self.t[columns], self.b[columns]
+        at, ab = (np.einsum("mw,mwd->md", a, part) for part in (t, b))
+        low_rank = np.einsum("mwd,md->mw", t, ab - at @ self.c) + np.einsum("mwd,md->mw", b, at)
+        return self.inner.products(columns, a) - low_rank
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         at = first[:, None] + np.arange(3)

@@ -11,8 +11,8 @@ the claim. With E_rs = g_r' Q_rs g_s, F_r = sum_s E_rs phi_s^2 a_s, M = sum_r ph
 target's covariance is V^-1 + V^-1 M V^-1, and the variance of a predicted range, in units of its claimed variance,
 E_rr - 2 F_r.p_r + a_r.p_r + p_r' M p_r: of a range that was left out (phi = 0) as well.
 
-All of it stands in one file because the cache of compiled code looks at no other: a constant changed elsewhere would
-go unnoticed. Views are taken by row and fixed offset: an index that might be negative costs the vector unit.
+All of it stands in one file because the cache of compiled code looks at no other: what changes elsewhere would go
+unnoticed. Views are taken by row and fixed offset: an index that might be negative costs the vector unit.
 Source: [FOERSTNER16] chapter 15, elimination of points from the normal equations of a bundle.
 """
 
@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from catseye.estimation.multilateration_blocks import NONCENTRALITY, UNCHECKED, Problem, Reduced, State, Statistics
+from catseye.estimation.multilateration_layout_kernel import by_target, fill, gather, slots_of
 
 LANES = 128
 ROWS = 7  # of a slot's scratch: a (3), derivatives by zero and scale (2), misclosure, phi^2
@@ -39,16 +40,16 @@ class KernelBlocks:
             self._priors = problem.target_weight, problem.target_value
         self._free = problem.free_targets.astype(float)
         stations, t = len(problem.free_stations), len(problem.free_targets)
-        first, rows, pattern = _by_target(problem.station, problem.target, t)
+        first, rows, pattern = by_target(problem.station, problem.target, t)
         order = np.arange(t) if np.all(pattern == pattern[0]) else np.argsort(pattern, kind="stable")
         if stations < 64 and len(rows) == stations * t and np.all(pattern == np.uint64(2**stations - 1)):
             blocks = -(-t // LANES)  # every target sees every station once
             slots, ends = np.tile(np.arange(stations, dtype=np.int32), blocks), np.arange(blocks + 1) * stations
         else:
-            slots, ends = _slots(problem.station, first, rows, order, stations)
+            slots, ends = slots_of(problem.station, first, rows, order, stations, LANES)
         inflation = np.zeros(0) if problem.inflation is None else problem.inflation
         ranges = problem.station, problem.distance, problem.sigma, inflation
-        observed, root, self._index = _fill(*ranges, first, rows, order, ends, slots)
+        observed, root, self._index = fill(*ranges, first, rows, order, ends, slots, LANES)
         self._packed = slots, ends, order, observed, root
 
     def reduce(self, state: State) -> Reduced:
@@ -96,98 +97,11 @@ class KernelBlocks:
         points = (at.stations, at.targets, at.zero, at.scale)
         ends = (answer.stations, answer.targets, answer.zero, answer.scale)
         inflated = self.problem.inflation is not None
-        claimed = _gather(1.0 / self.problem.sigma, self._index) if inflated else self._packed[-1]
+        claimed = gather(1.0 / self.problem.sigma, self._index) if inflated else self._packed[-1]
         tests = (NONCENTRALITY, UNCHECKED)
         layout = (claimed, self._index, self.problem.width)
         _statistics(*self._packed, *layout, points, ends, inverse, q, tests, covariance, out)
         return Statistics(covariance, *out)
-
-
-@njit(cache=True, error_model="numpy")
-def _by_target(station, target, targets):
-    """Rows sorted by target, then station: `first` (t + 1,), `rows` (m,), and a hash of the stations a target sees."""
-    first, pattern = np.zeros(targets + 1, np.int64), np.zeros(targets, np.uint64)
-    rows, ordered = np.empty(len(target), np.int32), True
-    for i in range(len(target)):
-        t, s = target[i], station[i]
-        first[t + 1] += 1
-        pattern[t] |= np.uint64(1) << np.uint64(s % 64)
-        rows[i] = i
-        if i > 0 and (target[i - 1] > t or (target[i - 1] == t and station[i - 1] > s)):
-            ordered = False
-    for t in range(targets):
-        first[t + 1] += first[t]
-    if ordered:
-        return first, rows, pattern
-    at = first[:-1].copy()
-    for i in range(len(target)):
-        t, s = target[i], station[i]
-        j = at[t]
-        at[t] += 1
-        while j > first[t] and station[rows[j - 1]] > s:
-            rows[j] = rows[j - 1]
-            j -= 1
-        rows[j] = i
-    return first, rows, pattern
-
-
-@njit(cache=True, error_model="numpy")
-def _repeats(station, rows, low, high, most):
-    """Raise most[s] to the number of times that the target of rows[low:high] sees station s."""
-    count = 0
-    for j in range(low, high):
-        s = station[rows[j]]
-        count = count + 1 if j > low and station[rows[j - 1]] == s else 1
-        most[s] = max(most[s], count)
-
-
-@njit(cache=True, error_model="numpy")
-def _slots(station, first, rows, order, stations):
-    """The station of every slot, and where the slots of each block end."""
-    blocks = (len(order) + LANES - 1) // LANES
-    ends = np.zeros(blocks + 1, np.int64)
-    slots = np.empty(len(rows) + 1, np.int32)  # never more slots than ranges
-    most, n = np.zeros(stations, np.int64), 0
-    for b in range(blocks):
-        most[:] = 0
-        for t in order[b * LANES : (b + 1) * LANES]:
-            _repeats(station, rows, first[t], first[t + 1], most)
-        for s in range(stations):
-            for _ in range(most[s]):
-                slots[n] = s
-                n += 1
-        ends[b + 1] = n
-    return slots[:n].copy(), ends
-
-
-@njit(cache=True, error_model="numpy")
-def _fill(station, distance, sigma, inflation, first, rows, order, ends, slots):
-    """Distance, root weight and row of the range in every slot and lane: (slots, LANES); 0, 0 and -1 without one."""
-    shape = (len(slots), LANES)
-    observed, weight, index = np.zeros(shape), np.zeros(shape), np.full(shape, -1, np.int32)
-    for b in range(len(ends) - 1):
-        for lane in range(min(LANES, len(order) - b * LANES)):
-            t = order[b * LANES + lane]
-            k = ends[b]
-            for j in range(first[t], first[t + 1]):
-                i = rows[j]
-                while slots[k] != station[i]:
-                    k += 1
-                observed[k, lane], index[k, lane] = distance[i], i
-                weight[k, lane] = 1.0 / (sigma[i] * inflation[i] if len(inflation) else sigma[i])
-                k += 1
-    return observed, weight, index
-
-
-@njit(cache=True, error_model="numpy")
-def _gather(values, index):
-    """values[index], zero where the index is -1."""
-    out = np.zeros(index.shape)
-    for k in range(index.shape[0]):
-        for lane in range(index.shape[1]):
-            if index[k, lane] >= 0:
-                out[k, lane] = values[index[k, lane]]
-    return out
 
 
 @njit(cache=True, error_model="numpy")

@@ -63,15 +63,18 @@ def least_squares_positions(r: Ranges, start: Starts) -> tuple[Descent, np.ndarr
     """
     found = descend(r, start.foot + (start.sign * start.height)[:, None] * start.normal, damped=False)
     good = found.ended & (found.bend < BENT) & (found.pvv <= np.where(r.count > 3, _most(r.count), 1.0))
-    rest = np.flatnonzero(~good | (start.sign * start.height == 0.0))
+    good &= start.sign * start.height * _over(found, start) > 0.0  # not over to the other image
+    rest = np.flatnonzero(~good)
     status = np.full(len(r.d), Status.FOUND, dtype=np.int8)
     if len(rest):
-        r = r.of(rest)
-        height = np.maximum(start.height[rest], OFF * np.sqrt(np.sum(r.d * r.d, axis=1) / r.count))
-        foot, up = start.foot[rest], height[:, None] * start.normal[rest]
-        best, status[rest] = _judge(r, descend(r, foot + up), descend(r, foot - up), start.side[rest])
+        best, status[rest] = _better_image(r.of(rest), start.of(rest))
         found.put(rest, best)
     return found, status
+
+
+def _over(found: Descent, start: Starts) -> np.ndarray:
+    """Heights (k,) of the ends over the stations' plane."""
+    return np.sum((found.x - start.foot) * start.normal, axis=1)
 
 
 def _most(count: np.ndarray) -> np.ndarray:
@@ -79,16 +82,19 @@ def _most(count: np.ndarray) -> np.ndarray:
     return CONTRADICTION**2 * (count - 3.0)
 
 
-def _judge(r: Ranges, one: Descent, two: Descent, side: np.ndarray) -> tuple[Descent, np.ndarray]:
-    """The better of two images, one on the side of the normal, and its status."""
+def _better_image(r: Ranges, start: Starts) -> tuple[Descent, np.ndarray]:
+    """Damped descents from both images, and of them the one that the ranges, or else the side, tell, with its status."""
+    up = np.maximum(start.height, OFF * np.sqrt(np.sum(r.d * r.d, axis=1) / r.count))[:, None] * start.normal
+    one, two = descend(r, start.foot + up), descend(r, start.foot - up)
     gap = two.pvv - one.pvv
     decided = np.abs(gap) > SIGNIFICANT**2  # a difference of pvv is the square of sigmas
     spread = np.sqrt(np.maximum(np.trace(one.covariance, axis1=1, axis2=2), 0.0))
     same = np.linalg.norm(one.x - two.x, axis=1) <= 1e-3 * spread
-    first = np.where(decided, gap > 0.0, side >= 0.0)
+    upper = _over(one, start) >= _over(two, start)  # a descent may pass over to the other side
+    first = np.where(decided, gap > 0.0, upper == (start.side >= 0.0))
     best, other = one.where(first, two), two.where(first, one)
     status, second = _verdict(r, best), _verdict(r, other)
-    open_ = ~decided & ~same & (side == 0.0) & (status <= Status.CONTRADICTING)
+    open_ = ~decided & ~same & (start.side == 0.0) & (status <= Status.CONTRADICTING)
     status = np.where(open_, np.where(second <= Status.CONTRADICTING, Status.AMBIGUOUS, second), status)
     return best, status
 

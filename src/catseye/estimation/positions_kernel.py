@@ -233,18 +233,20 @@ def _own_figure(ranges, spread, root, stations, count, flat, figure, m, z, clear
 
 @_inlined
 def _closed_start(figure, z, count, near, significant, x, clear):
-    """The closed form of `positions_start.starts`; z: coordinates along the axes, sum of y, variance of the third."""
+    """The closed form of `positions_start.starts`; z: coordinates along the axes, sum of y, variance of the third,
+    which the height then replaces."""
     for j in range(LANES):
         square = -2.0 * z[3, j] / count[j] - z[0, j] * z[0, j] - z[1, j] * z[1, j]
         told = z[2, j] * z[2, j] > significant * significant * z[4, j]
         side = (near[0, j] - figure[0, 0, j]) * figure[3, 0, j] + (near[1, j] - figure[0, 1, j]) * figure[3, 1, j]
         side += (near[2, j] - figure[0, 2, j]) * figure[3, 2, j]
-        sign = math.copysign(1.0, z[2, j] if told else side)
+        sign = math.copysign(1.0, z[2, j] if told else -side)
         lateral = z[0, j] * z[0, j] * figure[4, 0, j] + z[1, j] * z[1, j] * figure[4, 1, j]
         own = z[2, j] * z[2, j]
         spread = told and (square < 0.25 * own or own * figure[4, 2, j] < 1.0 / count[j] + lateral)
         h = sign * (abs(z[2, j]) if spread else math.sqrt(max(square, 0.0)))
         clear[j] = clear[j] and h != 0.0 and (told or abs(side) > 0.0)
+        z[4, j] = h
         for c in range(3):
             x[c, j] = figure[0, c, j] + z[0, j] * figure[1, c, j] + z[1, j] * figure[2, c, j] + h * figure[3, c, j]
 
@@ -303,6 +305,14 @@ def _step(a, x, q, tally, singular, clear):
 
 
 @_inlined
+def _same_side(x, figure, height, j):
+    """Whether lane j still is on the side of the stations' plane where it started: not over to the other image."""
+    over = (x[0, j] - figure[0, 0, j]) * figure[3, 0, j] + (x[1, j] - figure[0, 1, j]) * figure[3, 1, j]
+    over += (x[2, j] - figure[0, 2, j]) * figure[3, 2, j]
+    return over * height > 0.0
+
+
+@_inlined
 def _leave(answers, t, j, at, q, origin):
     """Lane j of a block is the answer of target t."""
     x, c = answers.x, answers.covariance
@@ -354,5 +364,6 @@ def locate(measured, site, limits, answers):
                 _leave(answers, first + j, j, at, q, site.origin)
                 answers.pvv[first + j], answers.iterations[first + j] = tally[1, j], taken
                 most = limits.contradiction**2 * (count[j] - 3.0) if count[j] > 3.0 else 1.0
-                answers.good[first + j] = tally[2, j] < limits.bent * limits.bent and tally[1, j] <= most
+                held = tally[2, j] < limits.bent * limits.bent and tally[1, j] <= most
+                answers.good[first + j] = held and _same_side(at, figure, z[4, j], j)
                 clear[j] = False  # it has its answer: what more its block needs does not move it

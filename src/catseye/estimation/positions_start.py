@@ -68,6 +68,10 @@ class Starts:
     sign: np.ndarray
     side: np.ndarray
 
+    def of(self, lanes: np.ndarray) -> "Starts":
+        """Those of some of the targets."""
+        return Starts(self.foot[lanes], self.height[lanes], self.normal[lanes], self.sign[lanes], self.side[lanes])
+
 
 def starts(planes: Planes, which: np.ndarray, d: np.ndarray, u: np.ndarray, *, near: np.ndarray | None) -> Starts:
     """The closed form for targets of patterns `which` (k,), d and u as in `positions_descent.Ranges`, near (1 or k, 3).

@@ -358,8 +358,31 @@ class RangingCovariance:
         return self.within(np.arange(len(self._own)))
 
     def across(self, columns: np.ndarray) -> np.ndarray:
-        both = np.concatenate([np.arange(len(self._own)), columns])
-        return self.within(both)[: len(self._own), len(self._own) :]
+        """(n, k), a few columns at a time: targets follow the stations, and have a part of their own."""
+        own, n = self._own, len(self._own)
+        result = np.empty((n, len(columns)))
+        stations, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
+        joint = self.within(np.concatenate([stations, columns]))
+        by_station = joint[: len(stations), len(stations) :]  # (stations' parameters, columns)
+        result[stations] = by_station
+        y = _response(self.solution, np.arange(len(self.solution.targets)))
+        whole = np.zeros((len(self.solution.covariance), len(columns)))
+        whole[own[stations]] = by_station
+        moved = np.einsum("tni,nk->tik", y, whole, optimize=True)
+        gauge, mine = self.solution._gauge, own[columns] < 0
+        target, axis = self.target[columns // 3 * mine], columns % 3
+        for k in np.flatnonzero(mine):
+            moved[target[k], :, k] += self.solution._inverse[target[k]][:, axis[k]]
+        if gauge is not None and len(gauge.points):
+            drift = np.zeros((len(self.solution.targets), 3, gauge.null.shape[1]))
+            drift[gauge.points] = gauge.drift
+            follow = np.zeros((len(columns), gauge.null.shape[1]))  # of each column with the amounts of the motions
+            for k in range(len(columns)):
+                felt = y[target[k]][:, axis[k]] if mine[k] else np.eye(len(whole))[own[columns[k]]]
+                follow[k] = felt @ gauge.null
+            moved -= drift @ follow.T
+        result[late] = moved[self.target[late // 3], late % 3]
+        return result
 
     def within(self, columns: np.ndarray) -> np.ndarray:
         own = self._own[columns]
@@ -371,30 +394,30 @@ class RangingCovariance:
         at[own < 0] = len(parameters) + 3 * np.searchsorted(targets, self.target[late // 3]) + late % 3
         return joint[np.ix_(at, at)]
 
-    def forms(self, columns: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Rows of one station's parameters and one target's coordinates, or of either alone."""
-        at = np.maximum(columns, 0)
+        at, a = np.maximum(columns, 0), np.where(columns < 0, 0.0, a)
         own = self._own[at]
-        a, b = np.where(columns < 0, 0.0, a), np.where(columns < 0, 0.0, b)
-        from_station = own >= 0
-        q = self.solution.covariance
-        inside = np.where(from_station, own, 0)
-        a1, b1 = np.where(from_station, a, 0.0), np.where(from_station, b, 0.0)
-        result = np.einsum("mi,mij,mj->m", a1, q[inside[:, :, None], inside[:, None, :]], b1)
-        a2, b2 = np.where(from_station, 0.0, a), np.where(from_station, 0.0, b)
-        late = ~from_station & (columns >= 0)
+        station = own >= 0
+        inside = np.where(station, own, 0)
+        a1 = np.where(station, a, 0.0)[:, :, None]
+        result = np.where(
+            station, (self.solution.covariance[inside[:, :, None], inside[:, None, :]] @ a1)[:, :, 0], 0.0
+        )
+        late = ~station & (columns >= 0)
         rows = np.flatnonzero(late.any(axis=1))
-        points = np.where(late[rows], at[rows] // 3, 0)
-        target = np.max(np.where(late[rows], self.target[points], -1), axis=1)
-        axis = at[rows] % 3
-        side = [np.zeros((len(rows), 3)) for _ in range(2)]
-        for vector, part in zip(side, (a2[rows], b2[rows]), strict=True):
-            np.add.at(vector, (np.arange(len(rows))[:, None], axis), part)
-        block = self.solution.covariance_targets[target]
-        result[rows] += np.einsum("mi,mij,mj->m", side[0], block, side[1])
-        cross = np.take_along_axis(self._across_targets[target], inside[rows][:, :, None], axis=1)  # (k, w, 3)
-        result[rows] += np.einsum("mi,mij,mj->m", a1[rows], cross, side[1])
-        result[rows] += np.einsum("mi,mij,mj->m", b1[rows], cross, side[0])
+        late = late[rows]
+        target = np.max(np.where(late, self.target[np.where(late, at[rows] // 3, 0)], -1), axis=1)
+        axis = np.where(late, at[rows] % 3, 0)
+        # (k, w, 3) covariance of a row's parameters with its target
+        across = np.take_along_axis(self._across_targets[target], inside[rows][:, :, None], axis=1)
+        within = np.take_along_axis(self.solution.covariance_targets[target], axis[:, :, None], axis=1)
+        a2 = np.zeros((len(rows), 3))
+        np.add.at(a2, (np.arange(len(rows))[:, None], axis), np.where(late, a[rows], 0.0))
+        mine = np.where(late[:, :, None], within, np.where(station[rows][:, :, None], across, 0.0))
+        result[rows] += (mine @ a2[:, :, None])[:, :, 0]
+        felt = (a1[rows].transpose(0, 2, 1) @ np.where(station[rows][:, :, None], across, 0.0))[:, 0]
+        result[rows] += np.where(late, np.take_along_axis(felt, axis, axis=1), 0.0)
         return result
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
@@ -419,10 +442,10 @@ def _response(solution: RangingSolution, targets: np.ndarray) -> np.ndarray:
     place = np.full(len(solution.targets), -1)
     place[targets] = np.arange(len(targets))
     rows = np.flatnonzero(place[problem.target] >= 0)
-    seen = linearise(problem, solution._state, rows, problem.root[rows])
+    seen = linearise(problem, solution._at, rows, problem.root[rows])
     y = np.zeros((len(targets), len(solution.stations), p, 3))
     np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
-    return y.reshape(len(targets), -1, 3) @ solution._inverse[targets]
+    return y.reshape(len(targets), len(solution.covariance), 3) @ solution._inverse[targets]
 
 
 def _joint(solution: RangingSolution, parameters: np.ndarray, targets: np.ndarray) -> np.ndarray:

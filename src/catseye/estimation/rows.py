@@ -141,12 +141,12 @@ class Rows:
             return np.broadcast_to(self.columns, (m, len(self.columns)))
         return self.columns if len(self.columns) == m else np.repeat(self.columns, self.factor.shape[1], axis=0)
 
-    def forms(self, q: Covariance, a: np.ndarray, b: np.ndarray, chosen: np.ndarray | None = None) -> np.ndarray:
-        """a Q b' for each row of a, b; of the rows `chosen`, all if None."""
+    def products(self, q: Covariance, a: np.ndarray, chosen: np.ndarray | None = None) -> np.ndarray:
+        """Q a' for each row of a, over `self.columns` or its row; of the rows `chosen`, all if None."""
         if self.columns.ndim == 1:
-            return np.sum((a @ q.within(self.columns)) * b, axis=1)
+            return a @ q.within(self.columns)
         columns = self.row_columns()
-        return q.forms(columns if chosen is None else columns[chosen], a, b)
+        return q.products(columns if chosen is None else columns[chosen], a)
 
     def weigh(self, a: np.ndarray) -> np.ndarray:
         """C^-1 a for (m,) or (m, k), over the active rows."""

@@ -127,15 +127,15 @@ def entry(lp, li, z, diagonal, i, j):
 
 
 @njit(cache=True, error_model="numpy")
-def forms(lp, li, z, diagonal, columns, a, b):
-    """sum over i, j of a_i Q_ij b_j for each row of columns, a, b (m, w); -1 among the columns is skipped."""
+def products(lp, li, z, diagonal, columns, a):
+    """sum over j of Q_ij a_j for each row of columns, a (m, w); -1 among the columns is skipped."""
     m, w = columns.shape
-    result = np.zeros(m)
+    result = np.zeros((m, w))
     for row in range(m):
-        for p in range(w):
-            if columns[row, p] < 0 or a[row, p] == 0.0:
+        for q in range(w):
+            if columns[row, q] < 0 or a[row, q] == 0.0:
                 continue
-            for q in range(w):
-                if columns[row, q] >= 0 and b[row, q] != 0.0:
-                    result[row] += a[row, p] * b[row, q] * entry(lp, li, z, diagonal, columns[row, p], columns[row, q])
+            for p in range(w):
+                if columns[row, p] >= 0:
+                    result[row, p] += a[row, q] * entry(lp, li, z, diagonal, columns[row, p], columns[row, q])
     return result

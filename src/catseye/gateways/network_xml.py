@@ -305,6 +305,6 @@ def _adjusted_share(found: Findings) -> np.ndarray:
             _, jacobian = group.predict(x)
             columns = np.broadcast_to(group.columns, jacobian.shape)
             mine = table.group == g
-            forms = solution.q.forms(columns, jacobian, jacobian)[table.row[mine]]
+            forms = np.sum(solution.q.products(columns, jacobian) * jacobian, axis=1)[table.row[mine]]
             share[mine] = forms / solution.fits[g].sigma[table.row[mine]] ** 2
     return np.clip(share, 0.0, 1.0)  # rounding
