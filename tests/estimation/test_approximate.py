@@ -121,7 +121,7 @@ class Survey:
 
     def found(self, *unknown, within=0.02):
         """Everything is found, near the truth, and the orientations with it."""
-        xyz, parameters, found, missing = approximate(self.network(*unknown))
+        xyz, parameters, found, missing = approximate(self.network(*unknown))[:4]
         assert missing == {}
         assert sorted(found) == sorted(unknown)
         np.testing.assert_allclose(xyz, self.true, rtol=0.0, atol=within)
@@ -241,7 +241,7 @@ def test_one_known_point_and_an_azimuth_hold_a_free_network():
 def test_a_network_with_nothing_given_keeps_its_shape():
     places = {"S": (60, -20, 31), "T": (0, 40, 20), "p": (100, 20, 33), "q": (40, 70, 28), "r": (10, -60, 25)}
     survey = Survey(places, seed=1).station("S", "T", "p", "q").station("T", "S", "r", "p", "q")
-    xyz, _, found, missing = approximate(survey.network(*places))
+    xyz, _, found, missing = approximate(survey.network(*places))[:4]
     assert missing == {}
     assert sorted(found) == sorted(places)
     level = xyz[:, 2] - survey.true[:, 2]
@@ -266,7 +266,7 @@ def test_a_ranging_network_with_nothing_known_keeps_its_shape(s, t, seed):
     survey = Survey(stations | targets, seed=seed)
     for name in stations:
         survey.ranges(name, *targets)
-    xyz, _, found, missing = approximate(survey.network(*survey.names))
+    xyz, _, found, missing = approximate(survey.network(*survey.names))[:4]
     assert missing == {}
     assert len(found) == s + t
     np.testing.assert_allclose(distances(xyz), distances(survey.true), atol=0.05)
@@ -289,7 +289,7 @@ def test_stations_that_range_each_other_give_the_figure_at_once():
     names = list(stations)
     for k, name in enumerate(names):
         survey.ranges(name, *names[k + 1 :], *targets)
-    xyz, _, _, missing = approximate(survey.network(*survey.names))
+    xyz, _, _, missing = approximate(survey.network(*survey.names))[:4]
     assert missing == {}
     np.testing.assert_allclose(distances(xyz), distances(survey.true), atol=0.05)
 
@@ -312,7 +312,7 @@ def test_known_points_metres_off_still_give_starts_metres_off():
         survey.station(name, *targets)
     given = survey.true + survey.rng.normal(size=survey.true.shape) * 1.5
     unknown = [f"P{k}" for k in range(0, 20, 2)] + ["S4"]
-    xyz, _, found, missing = approximate(survey.network(*unknown, given=given))
+    xyz, _, found, missing = approximate(survey.network(*unknown, given=given))[:4]
     assert missing == {}
     assert sorted(found) == sorted(unknown)
     assert np.abs(xyz - survey.true).max() < 8.0
@@ -427,7 +427,7 @@ def test_a_body_is_posed_on_its_placed_points_and_places_the_rest(frame):
         survey.groups.append(FramePoints("f", local.ravel(), covariance, at, pose, start, own))
     else:
         survey.groups.append(RigidBodies("b", local.ravel(), covariance, at, pose, start))
-    xyz, parameters, found, missing = approximate(survey.network("p0", "p1", "p2", "p3"))
+    xyz, parameters, found, missing = approximate(survey.network("p0", "p1", "p2", "p3"))[:4]
     assert missing == {}
     assert len(found) == 4
     np.testing.assert_allclose(xyz, survey.true, atol=0.01)
@@ -464,3 +464,86 @@ def test_the_set_ups_in_the_metro_tunnel_are_found_to_five_centimetres(tunnel, a
     for name in answer.found:
         expected = network.axes @ table[name]
         assert np.abs(answer.xyz[network.points.names.index(name)] - expected).max() < 0.05
+
+
+class TestWhatIsAssumed:
+    def test_the_whole_of_a_ranging_network_with_nothing_known(self):
+        stations, targets = field(8, 20, 1)
+        survey = Survey(stations | targets, seed=1)
+        for name in stations:
+            survey.ranges(name, *targets)
+        answer = approximate(survey.network(*survey.names))
+        assert answer.assumed == tuple(survey.names)
+        assert answer.assumption.endswith("of S0, S1, S2, S3 and 24 more")
+
+    def test_a_level_network_with_nothing_known_or_one_point_alone(self):
+        places = {"S": (60, -20, 31), "T": (0, 40, 20), "p": (100, 20, 33), "q": (40, 70, 28)}
+        survey = Survey(places, seed=1).station("S", "T", "p", "q").station("T", "S", "p", "q")
+        assert approximate(survey.network(*places)).assumed == tuple(places)
+        one = approximate(survey.network("T", "p", "q"))
+        assert one.missing == {}
+        assert one.assumed == ("T", "p", "q")
+
+    def test_an_azimuth_and_a_known_point_leave_nothing_to_assume(self):
+        places = {"A": (10, 20, 30), "S": (60, -20, 31), "p": (100, 20, 33), "q": (40, 70, 28)}
+        survey = Survey(places, seed=1).station("S", "A", "p", "q").azimuths("p", "q")
+        answer = approximate(survey.network("S", "p", "q"))
+        assert answer.found == ("S", "p", "q")
+        assert answer.assumed == ()
+        assert answer.assumption == ""
+
+    @pytest.mark.parametrize("height", [0.0, 20.0])
+    def test_the_sides_of_targets_that_stations_in_one_plane_see_but_not_of_those_given(self, height):
+        stations, targets = field(9, 20, 2, height=height)
+        survey = Survey(stations | targets, seed=2)
+        for name in stations:
+            survey.ranges(name, *targets)
+        known = ["S0", "S1", "S2", "S3", "P0"]
+        answer = approximate(survey.network(*[n for n in survey.names if n not in known]))
+        assert answer.missing == {}
+        np.testing.assert_allclose(answer.xyz, survey.true, rtol=0.0, atol=0.5)  # flat stations, heights are weak
+        assert answer.assumed == (tuple(n for n in targets if n != "P0") if height == 0.0 else ())
+
+
+def test_four_stations_in_one_plane_leave_two_positions():
+    survey = Survey({"A": (0, 0, 0), "B": (120, 10, 0), "C": (60, 110, 0.0), "D": (-30, 90, 0), "P": (40, 50, 20)})
+    for name in "ABCD":
+        survey.ranges(name, "P")
+    assert "two positions fit" in survey.missing("P")["P"]
+
+
+def test_a_level_plane_of_known_height_gives_a_height():
+    survey = Survey(POINT).azimuths("A", "P").levels("A", "P")
+    held, one = np.array([-1]), np.full(1, 1e-6)
+    survey.groups.append(LevelPlanes("level", np.array([121.0]), one, survey.at("P"), held, np.array([1.0])))
+    survey.found("P")
+
+
+def test_an_unknown_zero_of_the_rangers_of_thirty_sigma_bends_the_figure_less_than_it_would_take_to_refuse_it():
+    stations, targets = field(10, 30, 1)
+    survey = Survey(stations | targets, seed=1)
+    zero = survey.parameter(0.03, unit="m", start=0.0)
+    for name in stations:
+        survey.ranges(name, *targets, nuisance=np.full((30, 1), zero))
+        survey.groups[-1].observed[:] += 0.03
+    answer = approximate(survey.network(*survey.names))
+    assert answer.missing == {}
+    np.testing.assert_allclose(distances(answer.xyz), distances(survey.true), atol=1.0)
+
+
+def test_a_figure_of_ranges_that_too_few_placed_points_hold_says_how_many():
+    stations, targets = field(8, 12, 1)
+    survey = Survey(stations | targets | {"Z": (500, 500, 0)}, seed=1)
+    for name in stations:
+        survey.ranges(name, *targets)
+    why = survey.missing(*[n for n in survey.names if n not in ("S0", "Z")])
+    assert "of 20 points that ranges tie together 1 are placed, 3 are needed" in why["P3"]
+
+
+def test_a_local_network_that_shares_one_point_with_the_placed_ones_is_not_turned_at_will():
+    places = KNOWN | {"p": (10, 10, 101), "q": (20, -10, 99), "S": (15, 3, 100)}
+    survey = Survey(places).station("S", "A", "p", "q")
+    why = survey.missing("S", "p", "q")
+    assert set(why) == {"S", "p", "q"}
+    survey = Survey(places).station("S", "p", "q")
+    assert set(survey.missing("S", "p", "q")) == {"S", "p", "q"}

@@ -278,6 +278,19 @@ def test_no_target_is_found_on_the_side_that_near_excludes(compiled):
         assert not (got.x[got.status == Status.FOUND, 2] <= 0.0).any()
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_step_across_the_stations_plane_is_no_answer_on_the_other_side(compiled):
+    """Metre noise, targets far aside: undamped steps cross the plane; who is found stays where `near` has it."""
+    rng = np.random.default_rng(77)
+    for _ in range(60):
+        s = int(rng.integers(4, 7))
+        stations, u = rng.uniform(-60, 60, (s, 3)) * [1, 1, 1e-4], np.full(s, 10 ** rng.uniform(-1, 1))
+        x = np.concatenate([rng.uniform(-60, 60, (400, 2)) * 4, 10 ** rng.uniform(-1, 2, (400, 1))], axis=1)
+        d = np.abs(apart(x[:, None], stations) + u * rng.normal(size=(400, s)))
+        got = positions(stations, d, u, near=x + 100 * UP, compiled=compiled)
+        assert not (got.x[got.status == Status.FOUND, 2] < -0.01).any()
+
+
 def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly():
     """Sigmas over six decades, noise beyond them, figures flat and thin, ranges missing: the same status and place."""
     rng = np.random.default_rng(23)

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.linalg import orthogonal_procrustes
 
 from catseye.errors import ValidityError
-from catseye.estimation.unfolding import UNFOLDED, _match_means, classical_scaling, locate, unfold
+from catseye.estimation.unfolding import UNFOLDED, classical_scaling, locate, unfold
+from catseye.estimation.unfolding_factors import match_means
 
 SIGMA = 1e-3  # m, on figures of 100 m
 
@@ -231,7 +232,7 @@ def test_the_upgrade_descends_to_the_true_map_from_one_that_is_a_tenth_off():
     v = (targets - b) @ a[0]
     additive = squares + 2 * u @ v.T
     means = (u, v, additive.mean(axis=1), additive.mean(axis=0))
-    found, offset, cost = _match_means(a * 1.1, b[None] * 0.9, means)
+    found, offset, cost = match_means(a * 1.1, b[None] * 0.9, means)
     assert cost[0] < 1e-12
     np.testing.assert_allclose(np.abs(found), np.abs(a), atol=1e-5)
     np.testing.assert_allclose(np.abs(offset[0]), np.abs(b), atol=1e-5)
@@ -240,3 +241,34 @@ def test_the_upgrade_descends_to_the_true_map_from_one_that_is_a_tenth_off():
 @pytest.mark.slow
 def test_eighteen_stations_and_two_thousand_targets_come_out_with_a_third_of_the_ranges_missing():
     check(*scene(18, 2209, 9), 9, missing=0.33, within=0.03)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_target_that_three_stations_see_joins_the_side_of_the_others(seed):
+    """Stations within 0.3 m of a plane tell the side of targets that all of them see, not of one that three see."""
+    stations, targets = scene(10, 40, seed, height=0.3)
+    ranges = measured(stations, targets, seed)
+    ranges[[0, 1, 4, 5, 6, 7, 9], 11] = np.nan
+    found = unfold(ranges, SIGMA)
+    assert found.status == UNFOLDED
+    assert found.side_assumed[10 + 11]
+    assert not found.side_assumed[10:21].any()
+    assert np.all(found.targets[:, 2] > 0.0)
+    assert apart(np.vstack([found.stations, found.targets]), np.vstack([stations, targets])) < 0.5
+
+
+def test_many_points_are_located_block_by_block_as_one_by_one():
+    stations, targets = scene(12, 2000, 3)
+    ranges = measured(stations, targets, 3).T
+    xyz, rms = locate(stations, ranges)
+    assert ranges.size > 20_000
+    for k in (0, 1665, 1666, 1667, 1999):  # about the seam
+        one = locate(stations, ranges[k][None])
+        np.testing.assert_allclose(xyz[k], one[0][0], rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(rms[k], one[1][0], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(xyz[:, 0], targets, rtol=0.0, atol=0.02)
+
+
+def test_five_stations_in_a_plane_with_five_targets_off_it_are_told_the_number_needed():
+    found = unfold(measured(*scene(5, 5, 3, height=0.0), 3), SIGMA)
+    assert "5 stations or 5 targets lie in one plane, where at least 6 are needed" in found.status

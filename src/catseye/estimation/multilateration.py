@@ -3,9 +3,9 @@
 observed = (1 + scale) |target - station| + zero + error, zero and scale of the station held, free or with a prior.
 Every target is eliminated into a dense system of the stations' parameters, so thousands of targets cost milliseconds:
 in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises, with the
-normal matrix kept once a step is a thousandth of the one before. It is scale-free: rank is judged by directions and by
-the share of a diagonal that survives the elimination, so metres, nanometre sigmas and kilometres decide alike. Free
-motions are held by inner constraints: see `multilateration_datum`.
+normal matrix of a large network kept once a step is a thousandth of the one before (covariances to 1e-6 of their own).
+It is scale-free: rank is judged by directions and by the share of a diagonal that survives the elimination, so metres,
+nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `multilateration_datum`.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,8 @@ __all__ = ["PointPriors", "RangingNetwork", "RangingSolution", "StationRanges", 
 COMPILED_FROM = 200_000  # ranges: below, importing the compiled kernels costs more than they save
 WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): directions within 1 microradian of a plane show nothing off it
 WORST_NETWORK = 1e-13  # of the reduced matrix, scaled by its diagonal before elimination: below it is roundoff
-KEEP_BELOW = 1e-3  # of the step before: the normal matrix changes no more than that, and is kept
+KEEP_BELOW = 1e-3  # of the step before: the normal matrix changes less than that by far, and may be kept
+KEEP_FROM = 20_000  # ranges: below, building it anew costs too little to give up its last digits
 EPS = float(np.finfo(float).eps)
 
 
@@ -143,6 +144,7 @@ class _Iteration:
         self.setup, self.blocks, self.problem = setup, blocks, setup.problem
         self.state = self.at = setup.start
         self.factor: _Factor | None = None
+        self.thrifty = len(self.problem.distance) >= KEEP_FROM
         self.free = np.flatnonzero(self.problem.free_stations.ravel())
         self.taken, self.cost, self.moment = 0, np.nan, 0.0
 
@@ -160,7 +162,7 @@ class _Iteration:
                 status, answer = CONVERGED, step
                 break
             status = NOT_CONVERGED.format(step=step.size, iterations=self.taken)
-            descent = self._descend(step, reduced, keep=step.size < KEEP_BELOW * before)
+            descent = self._descend(step, reduced, keep=self.thrifty and step.size < KEEP_BELOW * before)
             if descent is None:
                 break
             reduced, before = descent, step.size

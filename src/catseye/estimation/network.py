@@ -91,6 +91,7 @@ class NetworkSolution:
     degrees_of_freedom   observations less parameters plus the datum's conditions
     datum                in words, how the free directions are held
     approximate          names of the points whose approximate coordinates were found, not given
+    assumed              names of those placed on a side that nothing decides
     q                    covariance of the whole parameter vector, for what is not above
     """
 
@@ -106,6 +107,7 @@ class NetworkSolution:
     degrees_of_freedom: float
     datum: str
     approximate: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
     q: Covariance = field(kw_only=True)
 
     @cached_property

@@ -133,6 +133,7 @@ class _Problem:
     groups: list[Observations]
     found: tuple[str, ...]
     missing: dict[str, str]
+    assumed: tuple[str, ...]
 
     @classmethod
     def of(cls, network: Network, start: NetworkSolution | None) -> "_Problem":
@@ -140,12 +141,16 @@ class _Problem:
         values = np.array([p.start for p in parameters])
         found: tuple[str, ...] = ()
         missing: dict[str, str] = {}
+        assumed: tuple[str, ...] = ()
         if start is not None:
-            xyz, values, found = np.where(points.fixed, points.xyz, start.x), start.parameters, start.approximate
+            xyz, values = np.where(points.fixed, points.xyz, start.x), start.parameters
+            found, assumed = start.approximate, start.assumed
         else:
             from catseye.estimation.approximate import approximate
 
-            xyz, values, found, missing = approximate(network)
+            begin = approximate(network)
+            xyz, values, found = begin.xyz, begin.parameters, begin.found
+            missing, assumed = begin.missing, begin.assumed
         sigma = np.array([p.sigma for p in parameters])
         offset = 3 * len(points.names)
         known = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
@@ -154,7 +159,7 @@ class _Problem:
             observed = np.array([parameters[k].start for k in known])
             groups.append(Linear("priors", observed, sigma[known] ** 2, offset + known, np.eye(len(known))))
         free = np.concatenate([~points.fixed.ravel(), sigma > 0.0])
-        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing)
+        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed)
 
     @property
     def names(self) -> list[str]:
@@ -260,6 +265,7 @@ class _Problem:
             degrees_of_freedom=degrees,
             datum=datum,
             approximate=self.found,
+            assumed=self.assumed,
             q=q,
         )
 

@@ -240,7 +240,7 @@ def _closed_start(figure, z, count, near, significant, x, clear):
         told = z[2, j] * z[2, j] > significant * significant * z[4, j]
         side = (near[0, j] - figure[0, 0, j]) * figure[3, 0, j] + (near[1, j] - figure[0, 1, j]) * figure[3, 1, j]
         side += (near[2, j] - figure[0, 2, j]) * figure[3, 2, j]
-        sign = math.copysign(1.0, z[2, j] if told else -side)
+        sign = math.copysign(1.0, z[2, j] if told else side)
         lateral = z[0, j] * z[0, j] * figure[4, 0, j] + z[1, j] * z[1, j] * figure[4, 1, j]
         own = z[2, j] * z[2, j]
         spread = told and (square < 0.25 * own or own * figure[4, 2, j] < 1.0 / count[j] + lateral)

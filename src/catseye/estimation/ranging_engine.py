@@ -149,12 +149,12 @@ def _split(network: Network) -> tuple[str, _Split | None]:
 
 def _problem(
     network: Network, split: _Split, start: NetworkSolution | None
-) -> tuple[RangingNetwork, tuple[str, ...]] | str:
-    """The ranging network and the names of points that were placed; or why it cannot start."""
+) -> tuple[RangingNetwork, tuple[tuple[str, ...], tuple[str, ...]]] | str:
+    """The ranging network and the names of points placed, and of those assumed; or why it cannot start."""
     points, groups = network.points, network.groups
-    found: tuple[str, ...] = ()
+    placed_by: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     if start is not None:
-        found = start.approximate
+        placed_by = start.approximate, start.assumed
     xyz = points.xyz
     if not np.isfinite(xyz).all() or start is not None:
         if start is None:
@@ -163,7 +163,7 @@ def _problem(
             begin = approximate(network)
             if begin.missing:
                 return f"no approximate coordinates of {next(iter(begin.missing))}"
-            placed, found = begin.xyz, begin.found
+            placed, placed_by = begin.xyz, (begin.found, begin.assumed)
         else:
             placed = start.x
         known = np.isfinite(xyz)
@@ -207,7 +207,7 @@ def _problem(
         between=between,
         station_names=[points.names[i] for i in on_station],
         target_names=[points.names[i] for i in on_target],
-    ), found
+    ), placed_by
 
 
 def _priors(network: Network, split: _Split, role: np.ndarray) -> PointPriors | None:
@@ -246,7 +246,11 @@ def _inflation(
 
 
 def _answer(
-    network: Network, split: _Split, solution: RangingSolution, found: tuple[str, ...], inflation: np.ndarray
+    network: Network,
+    split: _Split,
+    solution: RangingSolution,
+    placed_by: tuple[tuple[str, ...], tuple[str, ...]],
+    inflation: np.ndarray,
 ) -> NetworkSolution:
     count = len(network.points.names)
     s, t = split.station >= 0, split.target >= 0
@@ -275,7 +279,8 @@ def _answer(
         variance_factor=solution.variance_factor,
         degrees_of_freedom=float(solution.degrees_of_freedom),
         datum="; ".join(words) or "held by observations and priors",
-        approximate=found,
+        approximate=placed_by[0],
+        assumed=placed_by[1],
         q=RangingCovariance(solution, split.station, split.target, split.zero, split.scale),
     )
 
@@ -371,7 +376,7 @@ class RangingCovariance:
         moved = np.einsum("tni,nk->tik", y, whole, optimize=True)
         gauge, mine = self.solution._gauge, own[columns] < 0
         target, axis = self.target[columns // 3 * mine], columns % 3
-        for k in np.flatnonzero(mine):
+        for k in np.flatnonzero(mine).tolist():
             moved[target[k], :, k] += self.solution._inverse[target[k]][:, axis[k]]
         if gauge is not None and len(gauge.points):
             drift = np.zeros((len(self.solution.targets), 3, gauge.null.shape[1]))

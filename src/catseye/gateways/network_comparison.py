@@ -22,6 +22,7 @@ DISPLACEMENTS: Formats = {
     "point": "",
     **dict.fromkeys(("x_m", "y_m", "z_m"), ".10f"),
     **dict.fromkeys(("dx_mm", "dy_mm", "dz_mm", "length_mm", "u_dx_mm", "u_dy_mm", "u_dz_mm"), ".6f"),
+    **dict.fromkeys(("plain_dx_mm", "plain_dy_mm", "plain_dz_mm"), ".6f"),
     **dict.fromkeys(("statistic", "p", "p_adjusted", "detectable_mm"), ".6g"),
     "verdict": "",
 }
@@ -206,6 +207,7 @@ def displacements_csv(compared: Comparison) -> Iterator[str]:
             *(compared.displacement[part].T / MILLIMETRE),
             compared.length[part] / MILLIMETRE,
             *(compared.u[part].T / MILLIMETRE),
+            *(compared.difference[0][part].T / MILLIMETRE),
             d.statistic[part],
             d.p[part],
             d.p_adjusted[part],

@@ -110,6 +110,7 @@ def _displacements(compared: Comparison) -> str:
             *(_cell(v, "+.3f") for v in mm[0][i]),
             _cell(compared.length[i] / MILLIMETRE, ".3f"),
             " / ".join(_cell(v, ".3f") for v in mm[1][i]),
+            " / ".join(_cell(v, "+.3f") for v in compared.difference[0][i] / MILLIMETRE),
             _cell(d.statistic[i], ".2f"),
             _cell(d.p[i], ".2g"),
             _cell(d.p_adjusted[i], ".2g"),
@@ -117,7 +118,7 @@ def _displacements(compared: Comparison) -> str:
         )
         for i in order
     ]
-    columns = ("point", "", *(f"d{n} (mm)" for n in names), "length (mm)", "u (mm)")
+    columns = ("point", "", *(f"d{n} (mm)" for n in names), "length (mm)", "u (mm)", "plain difference (mm)")
     return section(
         "displacements",
         CONTENTS["displacements"],
@@ -125,9 +126,10 @@ def _displacements(compared: Comparison) -> str:
         paragraph(
             "Most significant first. p is the chance of such a displacement or a larger one of a point that did not "
             "move; p of all is corrected for the number of points; the last column is the smallest displacement that "
-            "the test of all points finds."
+            "the test of all points finds. Displacements are the best estimate if the stable points did not move; the "
+            "plain difference is that of the coordinates."
         ),
-        table((*columns, "statistic", "p", "p of all", "detectable (mm)"), rows, "ttnnnnnnnnn"),
+        table((*columns, "statistic", "p", "p of all", "detectable (mm)"), rows, "ttnnnnnnnnnn"),
     )
 
 

@@ -147,6 +147,8 @@ def _network(found: Findings) -> str:
         text += f" Datum: {solution.datum}."
     if solution.approximate:
         text += f" Approximate coordinates were found, not given, for {_listed(solution.approximate)}."
+    if solution.assumed:
+        text += f" Nothing says on which side these lie; it was assumed: {_listed(solution.assumed)}."
     lonely = [found.names[i] for i in np.flatnonzero(found.seen == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 

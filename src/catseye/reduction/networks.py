@@ -20,6 +20,7 @@ from catseye.estimation.variance_components import Components, GroupFactors, Row
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 
 Progress = Callable[[str, int, int], None]
+Placed = tuple[tuple[str, ...], tuple[str, ...]]  # names of points that were placed, and of those on an assumed side
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +72,9 @@ def adjusted(
         raise EstimationError(f"robust method {robust!r} is not known (expected one of {', '.join(WEIGHTS)})")
     if components not in (None, "rangers", "groups"):
         raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
-    network, found_names = _placed(with_datum(network, datum))
+    network, placed = _placed(with_datum(network, datum))
     treated = reject or robust is not None or components is not None
-    plain = replace(adjust_network(network, diagnose=not treated), approximate=found_names)
+    plain = replace(adjust_network(network, diagnose=not treated), approximate=placed[0], assumed=placed[1])
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
     result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
@@ -91,7 +92,7 @@ def adjusted(
     if robust is not None:
         found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
         inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
-        solution = _final(network, inflation, found_names, alone=True)
+        solution = _final(network, inflation, placed, alone=True)
         notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
         result = replace(
             result,
@@ -109,7 +110,7 @@ def adjusted(
             np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
             for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
         ]
-        solution = _final(network, inflation, found_names, alone=True)
+        solution = _final(network, inflation, placed, alone=True)
         result = replace(
             result,
             solution=solution,
@@ -130,14 +131,14 @@ def _places(network: Network) -> list[np.ndarray]:
     return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
-def _placed(network: Network) -> tuple[Network, tuple[str, ...]]:
-    """The network with approximate coordinates for points that have none, found once, and the names of these."""
+def _placed(network: Network) -> tuple[Network, Placed]:
+    """The network with places found once for points that have none, and who these are."""
     if np.isfinite(network.points.xyz).all():
-        return network, ()
+        return network, ((), ())
     begin = approximate(network)
     parameters = tuple(replace(p, start=float(v)) for p, v in zip(network.parameters, begin.parameters, strict=True))
     points = replace(network.points, xyz=begin.xyz, datum=network.points.datum & np.isfinite(network.points.xyz))
-    return replace(network, points=points, parameters=parameters), begin.found
+    return replace(network, points=points, parameters=parameters), (begin.found, begin.assumed)
 
 
 def _engine(solution: NetworkSolution) -> str | None:
@@ -145,14 +146,13 @@ def _engine(solution: NetworkSolution) -> str | None:
     return "ranging" if isinstance(solution.q, RangingCovariance) else None
 
 
-def _final(
-    network: Network, inflation: Sequence[np.ndarray], found: tuple[str, ...], *, alone: bool
-) -> NetworkSolution:
-    return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=found)
+def _final(network: Network, inflation: Sequence[np.ndarray], placed: Placed, *, alone: bool) -> NetworkSolution:
+    return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=placed[0], assumed=placed[1])
 
 
 def _with_components(network: Network, result: Adjusted, by: str, progress: Progress | None) -> Adjusted:
     """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
+    placed = (result.solution.approximate, result.solution.assumed)
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
     count, engine = 0, _engine(result.solution)
 
@@ -173,7 +173,7 @@ def _with_components(network: Network, result: Adjusted, by: str, progress: Prog
     inflation = model.scales(found.values)
     if out is not None:
         inflation = [s * o for s, o in zip(inflation, out, strict=True)]
-    solution = _final(network, inflation, result.solution.approximate, alone=False)
+    solution = _final(network, inflation, placed, alone=False)
     notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
     return replace(result, solution=solution, components=found, notes=notes)
 
