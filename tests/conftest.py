@@ -56,7 +56,7 @@ def ranging_network():
             3 * pairs[:, 0],
             3 * pairs[:, 1],
         )
-        names = tuple([f"S{i + 1:02d}" for i in range(stations)] + [f"T{i + 1:03d}" for i in range(targets)])
+        names = (*(f"S{i + 1:02d}" for i in range(stations)), *(f"T{i + 1:03d}" for i in range(targets)))
         given = true + off * size / 100.0 * rng.standard_normal(true.shape)
         datum = np.zeros(true.shape, dtype=bool)
         datum[:stations] = True

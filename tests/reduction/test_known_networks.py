@@ -1,4 +1,4 @@
-"""Networks with answers from elsewhere: a textbook, two established programs, an independent solver; see SOURCE there."""
+"""Networks with answers from elsewhere: a textbook, established programs, an independent solver; see SOURCE."""
 
 import csv
 from pathlib import Path

@@ -23,7 +23,7 @@ class Covariance(Protocol):
         ...
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """sum over j of Q_ij a_j for each row of columns, a (m, w), which meet in one observation: (m, w), -1 skipped."""
+        """(m, w) sum over j of Q_ij a_j for each row of columns, a (m, w), which meet in one observation."""
         ...
 
     def within(self, columns: np.ndarray) -> np.ndarray:

@@ -236,8 +236,7 @@ class _Problem:
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
-        answer = replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
-        return answer
+        return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points
