@@ -279,16 +279,22 @@ def test_no_target_is_found_on_the_side_that_near_excludes(compiled):
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_a_step_across_the_stations_plane_is_no_answer_on_the_other_side(compiled):
-    """Metre noise, targets far aside: undamped steps cross the plane; who is found stays where `near` has it."""
-    rng = np.random.default_rng(77)
-    for _ in range(60):
-        s = int(rng.integers(4, 7))
-        stations, u = rng.uniform(-60, 60, (s, 3)) * [1, 1, 1e-4], np.full(s, 10 ** rng.uniform(-1, 1))
-        x = np.concatenate([rng.uniform(-60, 60, (400, 2)) * 4, 10 ** rng.uniform(-1, 2, (400, 1))], axis=1)
-        d = np.abs(apart(x[:, None], stations) + u * rng.normal(size=(400, s)))
-        got = positions(stations, d, u, near=x + 100 * UP, compiled=compiled)
-        assert not (got.x[got.status == Status.FOUND, 2] < -0.01).any()
+def test_a_step_across_the_stations_plane_does_not_end_at_the_worse_image(compiled):
+    """Three times the noise claimed, found by search: undamped steps end below with pvv 226, the best is 97 above."""
+    stations = np.array(
+        [
+            [-29.745, 31.301, 0.061], [43.602, 44.082, 0.481], [14.473, 20.559, -0.428],
+            [-3.905, 40.047, -0.38], [-33.859, -58.165, 0.434], [-12.349, -1.896, -0.013],
+        ]
+    )  # fmt: skip
+    u = np.array([6e-05, 0.0039, 0.20887, 0.05915, 6e-05, 0.00046])
+    d = np.array([[40.9651, 62.29732, 26.68963, 38.45977, 67.68974, 11.19749]])
+    x = np.array([-1.76, 1.42, 1.51])  # where the ranges were drawn from
+    got = positions(stations, d, u, near=x, compiled=compiled).require_found()
+    best, _, pvv = by_scipy(stations, d[0], u, x)
+    assert got.pvv[0] == pytest.approx(pvv, rel=1e-4)
+    np.testing.assert_allclose(got.x[0], best, atol=1e-6)
+    assert got.x[0, 2] > 1.4
 
 
 def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly():

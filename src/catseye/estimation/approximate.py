@@ -95,7 +95,7 @@ def approximate(network: Network) -> Approximation:
     search = _search(network if unknown.any() else _lengths_and_directions_of(network), values)
     replaced = np.zeros(n, dtype=bool)
     if disagreeing(search.rows, search.xyz, movable).any():
-        search, replaced = placed_anew(_search(network, values), movable, points.datum.any(axis=1))
+        search, replaced = placed_anew(_search(network, values), movable, np.array(points.datum.any(axis=1)))
     if unknown.any():
         place_all(search)
     search.orient_sets()

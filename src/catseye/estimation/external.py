@@ -5,6 +5,8 @@ import numpy as np
 from catseye.estimation.network import NetworkSolution
 from catseye.estimation.rows import Rows
 
+BATCH = 50_000  # observations at a time, so that memory stays bounded
+
 
 def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
     """How far an error of the detectable size moves the point it moves most, of those the observation names.
@@ -25,15 +27,25 @@ def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
             continue
         rows = Rows.of(group, fit.active)
         seen = np.where(fit.active[:, None], rows.spread(group.predict(x)[1]), 0.0)
-        moved = rows.products(solution.q, rows.weigh(seen)) * fit.detectable_error[:, None]
-        columns = rows.row_columns()
+        weighted, columns = rows.weigh(seen), rows.row_columns()
         largest = np.zeros(len(columns))
-        for end in ends:
-            squares = np.zeros(len(columns))
-            for axis in range(3):
-                here = (columns == (end + axis)[:, None]) & (end >= 0)[:, None]
-                first = here & (np.cumsum(here, axis=1) == 1)  # a column that repeats holds the same product
-                squares += np.sum(np.where(first, moved, 0.0), axis=1) ** 2
-            largest = np.maximum(largest, squares)
-        result.append(np.where(fit.active, np.sqrt(largest), np.nan))
+        step = BATCH if rows.columns.ndim == 2 else max(1, len(columns))
+        for low in range(0, len(columns), step):
+            part = np.arange(low, min(low + step, len(columns)))
+            moved = rows.products(solution.q, weighted[part], part)
+            largest[part] = _largest(moved, columns[part], [end[part] for end in ends])
+        result.append(np.where(fit.active, largest * fit.detectable_error, np.nan))
     return tuple(result)
+
+
+def _largest(moved: np.ndarray, columns: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
+    """The largest of the lengths (m,) by which points at `ends` are moved, of the products `moved` over `columns`."""
+    largest = np.zeros(len(columns))
+    for end in ends:
+        squares = np.zeros(len(columns))
+        for axis in range(3):
+            here = (columns == (end + axis)[:, None]) & (end >= 0)[:, None]
+            first = here & (np.cumsum(here, axis=1) == 1)  # a column that repeats holds the same product
+            squares += np.sum(np.where(first, moved, 0.0), axis=1) ** 2
+        largest = np.maximum(largest, squares)
+    return np.sqrt(largest)

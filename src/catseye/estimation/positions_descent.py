@@ -83,7 +83,7 @@ def _most(count: np.ndarray) -> np.ndarray:
 
 
 def _better_image(r: Ranges, start: Starts) -> tuple[Descent, np.ndarray]:
-    """Damped descents from both images, and of them the one that the ranges, or else the side, tell, with its status."""
+    """Damped descents from both images; of them the one that the ranges, or else the side, tell, and its status."""
     up = np.maximum(start.height, OFF * np.sqrt(np.sum(r.d * r.d, axis=1) / r.count))[:, None] * start.normal
     one, two = descend(r, start.foot + up), descend(r, start.foot - up)
     gap = two.pvv - one.pvv

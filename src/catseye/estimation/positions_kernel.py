@@ -307,8 +307,9 @@ def _step(a, x, q, tally, singular, clear):
 @_inlined
 def _same_side(x, figure, height, j):
     """Whether lane j still is on the side of the stations' plane where it started: not over to the other image."""
-    over = (x[0, j] - figure[0, 0, j]) * figure[3, 0, j] + (x[1, j] - figure[0, 1, j]) * figure[3, 1, j]
-    over += (x[2, j] - figure[0, 2, j]) * figure[3, 2, j]
+    over = 0.0
+    for c in range(3):
+        over += (x[c, j] - figure[0, c, j]) * figure[3, c, j]
     return over * height > 0.0
 
 

@@ -12,6 +12,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, NONCENTRALITY
 from catseye.estimation.diagnosis import label
 from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, point_uncertainty
+from catseye.estimation.external import effects_at_ends
 from catseye.estimation.network import Network, NetworkSolution, points_of
 from catseye.estimation.reliability import (
     GlobalTest,
@@ -26,7 +27,17 @@ from catseye.estimation.reliability import (
 
 ROLES = ("from", "to", "third", "fourth")
 STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the kinds that are measured from a station
-MEASURES = ("observed", "u", "residual", "standardised", "redundancy", "mdb", "estimated_error", "bias_to_noise")
+MEASURES = (
+    "observed",
+    "u",
+    "residual",
+    "standardised",
+    "redundancy",
+    "mdb",
+    "estimated_error",
+    "bias_to_noise",
+    "effect",
+)
 NUMBER = re.compile(r"\d+")
 COMPONENTS = ("x", "y", "z")
 
@@ -46,6 +57,7 @@ class ObservationTable:
     checked           (m,) bool: other observations would show an error in it
     bias_to_noise     (m,) how many standard uncertainties of any result an error just not detectable moves it, at most;
                       nan where unknown, as within correlated groups
+    effect            (m,) m, how far an error of the size of mdb moves the named point that it moves most, or nan
     observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `Fit`; mdb is its
                       detectable_error; the last three are nan where nothing checks the observation, and all four
                       where there is no answer
@@ -69,6 +81,7 @@ class ObservationTable:
     mdb: np.ndarray
     estimated_error: np.ndarray
     bias_to_noise: np.ndarray
+    effect: np.ndarray
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -91,7 +104,8 @@ def observation_table(solution: NetworkSolution) -> ObservationTable:
     """
     network = solution.network
     kinds: dict[str, int] = {}
-    parts = [_part(solution, g, kinds) for g in range(len(network.groups))]
+    effects = effects_at_ends(solution)
+    parts = [_part(solution, g, kinds, effects[g]) for g in range(len(network.groups))]
     order = _file_order(network)
     joined = {
         name: np.concatenate([part[name] for part in parts])[order] if parts else np.zeros(0) for name in _COLUMNS
@@ -104,8 +118,8 @@ def observation_table(solution: NetworkSolution) -> ObservationTable:
 _COLUMNS = tuple(ObservationTable.__dataclass_fields__)[1:]
 
 
-def _part(solution: NetworkSolution, g: int, kinds: dict[str, int]) -> dict[str, np.ndarray]:
-    """The columns of one group; `kinds` gains its kinds."""
+def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns of one group, the effects of undetected errors known; `kinds` gains its kinds."""
     group, fit = solution.network.groups[g], solution.fits[g]
     m = len(fit.residual)
     own = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else each row has its own
@@ -139,6 +153,7 @@ def _part(solution: NetworkSolution, g: int, kinds: dict[str, int]) -> dict[str,
         "mdb": np.abs(tested) * fit.detectable_error,
         "estimated_error": tested * fit.estimated_error,
         "bias_to_noise": np.where(shown & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
+        "effect": np.where(shown, effect, np.nan),
     }
 
 
