@@ -41,7 +41,7 @@ def ranging_network():
         rng = np.random.default_rng(seed)
         angle = 2 * np.pi * np.arange(stations) / stations
         ring = np.stack([np.cos(angle), np.sin(angle), 0.3 * rng.uniform(-1, 1, stations)], axis=1)
-        cloud = rng.uniform(-0.5, 0.5, (targets, 3)) + [0.0, 0.0, 0.5]
+        cloud = rng.uniform(-0.5, 0.5, (targets, 3)) + np.array([0.0, 0.0, 0.5])
         true = size * np.concatenate([ring, cloud])
         if flat:
             true[:, 2] = 0.0

@@ -256,3 +256,18 @@ def test_zeros_and_scales_are_found_with_their_uncertainty(ranging_network):
     off = solution.parameters - np.concatenate([zero, scale])
     assert np.abs(off / solution.u_parameters).max() < 4.0
     assert solution.u_parameters.max() < 1e-4
+
+
+@pytest.mark.parametrize("engine", ["dense", "ranging"])
+def test_a_network_with_nothing_known_calibrates_itself(ranging_network, engine):
+    """The National Physical Laboratory's way: stations and targets unknown, the network's shape from ranges alone."""
+    network, true = ranging_network(20, stations=8, targets=25)
+    unknown = replace(network, points=replace(network.points, xyz=np.full_like(true, np.nan), datum=true > np.inf))
+    assert adjust_network(unknown, engine="dense").status.startswith("rank deficient: the network floats")
+    solution = adjust_network(unknown, engine=engine, datum="free")
+    assert solution.status == "converged"
+    known = adjust_network(network, engine="dense")
+    np.testing.assert_allclose(solution.fits[0].residual, known.fits[0].residual, atol=1e-7)
+    apart = [np.linalg.norm(s.x[:, None] - s.x[None], axis=2) for s in (solution, known)]
+    np.testing.assert_allclose(apart[0], apart[1], atol=1e-7)
+    assert solution.degrees_of_freedom == known.degrees_of_freedom

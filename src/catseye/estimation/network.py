@@ -92,6 +92,8 @@ class NetworkSolution:
     datum                in words, how the free directions are held
     approximate          names of the points whose approximate coordinates were found, not given
     assumed              names of those placed on a side that nothing decides
+    replaced             names of those whose given coordinates the observations contradict grossly: the iteration began
+                         where they put them instead
     q                    covariance of the whole parameter vector, for what is not above
     """
 
@@ -108,6 +110,7 @@ class NetworkSolution:
     datum: str
     approximate: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
+    replaced: tuple[str, ...] = ()
     q: Covariance = field(kw_only=True)
 
     @cached_property

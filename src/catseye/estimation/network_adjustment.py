@@ -35,8 +35,9 @@ NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
 def with_datum(network: Network, datum: str | None) -> Network:
     """The network with its datum as asked.
 
-    datum   None: as the file marks it. "free": nothing held, inner constraints on the points marked fixed or datum,
-            on all points with given coordinates where none is. "fixed": what is marked either way is held.
+    datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
+            constraints on the points marked fixed or datum; where none is, on all with given coordinates; where
+            nothing is given, on all
     """
     if datum is None:
         return network
@@ -50,6 +51,8 @@ def with_datum(network: Network, datum: str | None) -> Network:
             raise EstimationError("datum 'fixed': no point of the network is marked fixed or datum; mark some")
         return replace(network, points=replace(points, fixed=marked, datum=nothing))
     chosen = marked if marked.any() else np.isfinite(points.xyz)
+    if not chosen.any():
+        chosen = np.ones_like(marked)
     return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
@@ -84,7 +87,7 @@ def adjust_network(
 
     Source: [FOERSTNER16] chapter 4; datum by S-transformation, [BAARDA73].
     """
-    network = with_datum(network, datum)
+    network = _with_reference(with_datum(network, datum))
     if inflation is not None:
         kept = [np.isfinite(f) for f in inflation]
         active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
@@ -104,6 +107,19 @@ def adjust_network(
     if tests and diagnose and np.isfinite(solution.covariance).all():
         return replace(solution, status=diagnosed(solution, _factor_alone))
     return solution
+
+
+def _with_reference(network: Network) -> Network:
+    """The network, with the places found for its points as their coordinates where not one is given.
+
+    The inner constraints then refer to these; where the network lies is a convention in any case.
+    """
+    points = network.points
+    if np.isfinite(points.xyz).any() or not points.datum.any():
+        return network
+    from catseye.estimation.approximate import approximate
+
+    return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
 
 def _factor_alone(network: Network) -> NetworkSolution:
@@ -134,6 +150,7 @@ class _Problem:
     found: tuple[str, ...]
     missing: dict[str, str]
     assumed: tuple[str, ...]
+    replaced: tuple[str, ...]
 
     @classmethod
     def of(cls, network: Network, start: NetworkSolution | None) -> "_Problem":
@@ -142,15 +159,16 @@ class _Problem:
         found: tuple[str, ...] = ()
         missing: dict[str, str] = {}
         assumed: tuple[str, ...] = ()
+        replaced: tuple[str, ...] = ()
         if start is not None:
             xyz, values = np.where(points.fixed, points.xyz, start.x), start.parameters
-            found, assumed = start.approximate, start.assumed
+            found, assumed, replaced = start.approximate, start.assumed, start.replaced
         else:
             from catseye.estimation.approximate import approximate
 
             begin = approximate(network)
             xyz, values, found = begin.xyz, begin.parameters, begin.found
-            missing, assumed = begin.missing, begin.assumed
+            missing, assumed, replaced = begin.missing, begin.assumed, begin.replaced
         sigma = np.array([p.sigma for p in parameters])
         offset = 3 * len(points.names)
         known = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
@@ -159,7 +177,7 @@ class _Problem:
             observed = np.array([parameters[k].start for k in known])
             groups.append(Linear("priors", observed, sigma[known] ** 2, offset + known, np.eye(len(known))))
         free = np.concatenate([~points.fixed.ravel(), sigma > 0.0])
-        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed)
+        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
 
     @property
     def names(self) -> list[str]:
@@ -265,6 +283,7 @@ class _Problem:
             datum=datum,
             approximate=self.found,
             assumed=self.assumed,
+            replaced=self.replaced,
             q=q,
         )
 

@@ -1,25 +1,15 @@
 """Figures of a reduction as SVG text, drawn without a display."""
 
-import io
-import logging
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from matplotlib.collections import EllipseCollection, LineCollection
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
-from catseye.gateways.interruption import deferred
+from catseye.gateways.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.gateways.tables import kind_of
 from catseye.reduction.epoch import Reduction
 
-logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it announces its font cache on stderr
-with deferred():  # its first import writes that cache under a lock file
-    import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.collections import EllipseCollection, LineCollection
-    from matplotlib.figure import Figure
-
-INK, FAINT, GRID, BAD = "#22303c", "#6b7883", "#e3e8ec", "#c8323c"
 COLOURS = {
     "ground ranger": "#1f5a99",
     "feed-arm ranger": "#d9641e",
@@ -30,35 +20,7 @@ COLOURS = {
     "benchmark": "#b08a1e",
 }
 MARKERS = {"ground ranger": "^", "feed-arm ranger": "s", "structure": "D", "benchmark": "o"}
-SERIES = ("#1f5a99", "#d9641e", "#1e8e74", "#8a5fa8", "#b08a1e", "#6f8fa8")
 LOOSE = 1.0 * MILLIMETRE  # u of a coordinate beyond which the ranges do not hold it and no ellipsoid is drawn
-STYLE: Any = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.titlesize": 10.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.titlepad": 8.0,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.7,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "text.color": INK,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "catseye",
-}
 
 
 def figures(reduction: Reduction) -> dict[str, str]:
@@ -77,19 +39,7 @@ def figures(reduction: Reduction) -> dict[str, str]:
         }
         if reduction.surface is not None:
             drawn["dish"] = _dish(reduction)
-        return {name: _svg(figure) for name, figure in drawn.items() if figure is not None}
-
-
-def _svg(figure: Figure) -> str:
-    stream = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
-    return stream.getvalue()
-
-
-def _nice(value: float) -> float:
-    """The number 1, 2 or 5 times a power of ten that is nearest below."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step <= value / power * (1 + 1e-9)))
+        return {name: svg(figure) for name, figure in drawn.items() if figure is not None}
 
 
 def _view(reduction: Reduction, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +75,7 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
     if not len(held):
         return
     usual = float(np.median(sigma[held, 1]))
-    scale = _nice(share * extent / usual) if usual > 0.0 else 1.0
+    scale = nice(share * extent / usual) if usual > 0.0 else 1.0
     angle = np.degrees(np.arctan2(vectors[held, 1, 1], vectors[held, 0, 1]))
     outline = EllipseCollection(
         2 * scale * sigma[held, 1], 2 * scale * sigma[held, 0], angle, units="xy", offsets=where[held],
@@ -133,7 +83,7 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
         edgecolors=[COLOURS.get(kinds[r], INK) for r in held], linewidths=0.7, zorder=2,
     )  # fmt: skip
     ax.add_collection(outline)
-    reference = _nice(usual)
+    reference = nice(usual)
     ax.set_title(
         f"ellipsoids (1σ) enlarged {scale:,.0f} times: {reference / MILLIMETRE:g} mm is drawn as "
         f"{reference * scale:.3g} m".replace(",", "\u2009"),

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.figures import BAD, FAINT, INK, STYLE, _nice, _svg
+from catseye.gateways.drawing import BAD, FAINT, INK, STYLE, nice, svg
 from catseye.gateways.network_comparison import Comparison, comparison_passages
 from catseye.gateways.network_figures import (
     Drawn,
@@ -159,7 +159,7 @@ def comparison_figures(compared: Comparison) -> dict[str, Drawn]:
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         drawn = {"plan": _view(compared, None), "elevation": _view(compared, looking(compared.first))}
-        return {name: Drawn(_svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
 
 
 def _view(compared: Comparison, bearing: float | None) -> tuple[Figure, str]:
@@ -175,9 +175,9 @@ def _view(compared: Comparison, bearing: float | None) -> tuple[Figure, str]:
     shown = ellipse(spread)
     longest = np.fmax(np.hypot(*shift.T), factor * shown.major)
     longest = longest[np.isfinite(longest) & (longest > 0.0)]
-    scale = _nice(SHARE * size / float(np.max(longest))) if len(longest) else np.nan
+    scale = nice(SHARE * size / float(np.max(longest))) if len(longest) else np.nan
     figure, ax = view_frame(0.5 * (low + high), high - low + (0.16 + 2.0 * SHARE) * size)
-    scale_bar(ax, _nice(0.2 * size), scale, "displacements and ellipses")
+    scale_bar(ax, nice(0.2 * size), scale, "displacements and ellipses")
     common = np.zeros(len(flat), dtype=bool)
     common[compared.rows] = True
     if not common.all():

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
-from catseye.gateways.figures import BAD, FAINT, GRID, INK, SERIES, STYLE, _nice, _svg
+from catseye.gateways.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
 from catseye.gateways.network_findings import Findings
 
 STATION, TARGET, HELD, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
@@ -45,7 +45,7 @@ def network_figures(found: Findings) -> dict[str, Drawn]:
         drawn = {"plan": _view(found, None), "elevation": _view(found, looking(found))}
         if np.isfinite(found.table.standardised).any():
             drawn |= {"residuals": _residuals(found), "redundancy": _redundancy(found)}
-        return {name: Drawn(_svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
 
 
 def looking(found: Findings) -> float:
@@ -75,7 +75,7 @@ def enlargement(found: Findings) -> float:
     if not len(known):
         return np.nan
     share = SHARE / (1.0 + np.sqrt(len(known) / 150.0))
-    return _nice(share * max(float(np.ptp(found.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
+    return nice(share * max(float(np.ptp(found.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
 
 
 def _view(found: Findings, bearing: float | None) -> tuple[Figure, str]:
@@ -92,7 +92,7 @@ def _view(found: Findings, bearing: float | None) -> tuple[Figure, str]:
     lines = _lines(ax, found, flat)
     scale = enlargement(found)
     loose, ellipses = _ellipses(ax, found, flat, ellipse(projected(solution.covariance * found.factor, axes)), scale)
-    scale_bar(ax, _nice(0.2 * size), scale)
+    scale_bar(ax, nice(0.2 * size), scale)
     _marks(ax, found, flat, loose)
     point_names(ax, found, flat)
     if bearing is None:

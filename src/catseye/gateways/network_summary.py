@@ -149,6 +149,9 @@ def _network(found: Findings) -> str:
         text += f" Approximate coordinates were found, not given, for {_listed(solution.approximate)}."
     if solution.assumed:
         text += f" Nothing says on which side these lie; it was assumed: {_listed(solution.assumed)}."
+    if solution.replaced:
+        named = _listed(solution.replaced)
+        text += f" Given coordinates that the observations contradict grossly were no start: {named}."
     lonely = [found.names[i] for i in np.flatnonzero(found.seen == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 

@@ -135,9 +135,11 @@ def _placed(network: Network) -> tuple[Network, Placed]:
     """The network with places found once for points that have none, and who these are."""
     if np.isfinite(network.points.xyz).all():
         return network, ((), ())
-    begin = approximate(network)
+    begin, nothing = approximate(network), not np.isfinite(network.points.xyz).any()
     parameters = tuple(replace(p, start=float(v)) for p, v in zip(network.parameters, begin.parameters, strict=True))
-    points = replace(network.points, xyz=begin.xyz, datum=network.points.datum & np.isfinite(network.points.xyz))
+    points = replace(
+        network.points, xyz=begin.xyz, datum=network.points.datum & (np.isfinite(network.points.xyz) | nothing)
+    )
     return replace(network, points=points, parameters=parameters), (begin.found, begin.assumed)
 
 
