@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from catseye.estimation.approximate import approximate
-from catseye.estimation.approximate_given import disagreeing
-from catseye.estimation.approximate_sightings import sightings
+from catseye.estimation.approximate.given import disagreeing
+from catseye.estimation.approximate.sightings import sightings
 from catseye.estimation.network import Network, Parameter, Points
 from catseye.estimation.network_adjustment import adjust_network
 from catseye.estimation.observations import Directions, Distances, HorizontalDistances, ZenithAngles

@@ -11,9 +11,9 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2, kstest
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation import positions as module
 from catseye.estimation.positions import Status, positions
-from catseye.estimation.positions_descent import CAP, Ranges, descend
+from catseye.estimation.positions import dispatch as module
+from catseye.estimation.positions.descent import CAP, Ranges, descend
 
 NETWORK = Path(__file__).parents[1] / "vectors" / "networks" / "ranging-18x500"
 UP = np.array([0.0, 0.0, 1.0])

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.estimation.positions_status import Status
+from catseye.estimation.positions.status import Status
 from catseye.estimation.trilateration import (
     trilaterate,
     trilaterate_by_averaging,

@@ -8,7 +8,7 @@ from scipy.linalg import orthogonal_procrustes
 
 from catseye.errors import ValidityError
 from catseye.estimation.unfolding import UNFOLDED, classical_scaling, locate, unfold
-from catseye.estimation.unfolding_factors import match_means
+from catseye.estimation.unfolding.factors import match_means
 
 SIGMA = 1e-3  # m, on figures of 100 m
 

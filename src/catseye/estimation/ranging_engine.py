@@ -15,7 +15,7 @@ from catseye.estimation.multilateration import (
     StationRanges,
     adjust_ranges,
 )
-from catseye.estimation.multilateration_blocks import linearise
+from catseye.estimation.multilateration.blocks import linearise
 from catseye.estimation.network import Network, NetworkSolution
 from catseye.estimation.observations import Coordinates, Distances
 

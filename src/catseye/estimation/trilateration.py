@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.estimation.positions_status import Status
+from catseye.estimation.positions.status import Status
 
 FLAT = 1e-13  # squared extent over largest squared extent: below it a figure of points is flat to double precision
 

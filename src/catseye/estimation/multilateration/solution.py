@@ -8,8 +8,8 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, Fit
-from catseye.estimation.multilateration_blocks import UNCHECKED, State, linearise
-from catseye.estimation.multilateration_network import RangingNetwork, Setup
+from catseye.estimation.multilateration.blocks import UNCHECKED, State, linearise
+from catseye.estimation.multilateration.network import RangingNetwork, Setup
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from catseye.estimation.adjustment import NONCENTRALITY, Fit
-from catseye.estimation.multilateration_blocks import UNCHECKED, State
+from catseye.estimation.multilateration.blocks import UNCHECKED, State
 
 
 @dataclass(frozen=True, eq=False)

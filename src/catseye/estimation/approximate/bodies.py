@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from catseye.estimation.approximate_sightings import parts_of
+from catseye.estimation.approximate.sightings import parts_of
 from catseye.estimation.network import Network
 from catseye.estimation.observations import FramePoints, RigidBodies
 from catseye.estimation.observations.kind import value

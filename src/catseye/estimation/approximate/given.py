@@ -7,10 +7,10 @@ disagree, all that may move are placed anew from the observations alone, and lai
 
 import numpy as np
 
-from catseye.estimation.approximate_bodies import rigid_motion
-from catseye.estimation.approximate_figures import level_turn, place_all
-from catseye.estimation.approximate_search import Search
-from catseye.estimation.approximate_sightings import LEVEL, RANGE, Sightings
+from catseye.estimation.approximate.bodies import rigid_motion
+from catseye.estimation.approximate.figures import level_turn, place_all
+from catseye.estimation.approximate.search import Search
+from catseye.estimation.approximate.sightings import LEVEL, RANGE, Sightings
 
 GROSS = 0.05  # misfit over range: of 50 networks 6 m off at 100 m all converge, of those 10 m off a tenth do not
 OUTLYING = 3.0  # times the median: points further off their given places do not decide where a figure belongs

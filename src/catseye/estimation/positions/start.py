@@ -74,7 +74,7 @@ class Starts:
 
 
 def starts(planes: Planes, which: np.ndarray, d: np.ndarray, u: np.ndarray, *, near: np.ndarray | None) -> Starts:
-    """The closed form for targets of patterns `which` (k,), d and u as in `positions_descent.Ranges`, near (1 or k, 3).
+    """The closed form for targets of patterns `which` (k,), d and u as in `descent.Ranges`, near (1 or k, 3).
 
     The height comes from the mean square of the ranges, or from the stations' own spread along the normal, which also
     tells the sign: whichever is better known, with u^2 of 1 / n + z1^2 / E1 + z2^2 / E2 against z3^2 / E3, E the sums

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.estimation.adjustment import CONVERGED, NOT_CONVERGED, RANK_DEFICIENT, UNDEFINED
-from catseye.estimation.multilateration_blocks import UNCHECKED, Problem, State, Statistics, linearise
+from catseye.estimation.multilateration.blocks import UNCHECKED, Problem, State, Statistics, linearise
 
 __all__ = ["CONVERGED", "NOT_CONVERGED", "RANK_DEFICIENT", "UNDEFINED", "Names", "contradiction"]
 

@@ -4,10 +4,10 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
-from catseye.estimation.approximate_bodies import rigid_motion
-from catseye.estimation.approximate_search import LENIENT, STRICT, Search
-from catseye.estimation.approximate_sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
-from catseye.estimation.approximate_ties import FLOOR
+from catseye.estimation.approximate.bodies import rigid_motion
+from catseye.estimation.approximate.search import LENIENT, STRICT, Search
+from catseye.estimation.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
+from catseye.estimation.approximate.ties import FLOOR
 from catseye.estimation.rigid_body import closed_form
 from catseye.estimation.unfolding import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, classical_scaling, unfold
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from catseye.estimation.positions_start import SIGNIFICANT, Starts
-from catseye.estimation.positions_status import Status
+from catseye.estimation.positions.start import SIGNIFICANT, Starts
+from catseye.estimation.positions.status import Status
 
 ENOUGH = 1e-4  # sigmas: the next step foreseen is smaller, so the answer stands; 1 nm where 10 um are claimed
 SINGULAR = 1e-15  # determinant over cubed trace of a normal matrix that holds no digit

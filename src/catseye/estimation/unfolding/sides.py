@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from catseye.estimation.unfolding_fit import FLAT, flattened
-from catseye.estimation.unfolding_location import locate
+from catseye.estimation.unfolding.fit import FLAT, flattened
+from catseye.estimation.unfolding.location import locate
 
 
 def extend(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, sigma: float) -> None:

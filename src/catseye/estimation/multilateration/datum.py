@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from catseye.estimation.multilateration_blocks import State
+from catseye.estimation.multilateration.blocks import State
 
 GENERATORS = 7
 STILL = 1e-10  # of the network's size: a held coordinate moved by less is not moved

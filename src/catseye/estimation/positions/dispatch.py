@@ -11,12 +11,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation import positions_descent as descent
-from catseye.estimation.positions_start import SIGNIFICANT, Planes, patterns_of, planes_of, starts
-from catseye.estimation.positions_status import TEXTS, Status
+from catseye.estimation.positions import descent
+from catseye.estimation.positions.start import SIGNIFICANT, Planes, patterns_of, planes_of, starts
+from catseye.estimation.positions.status import TEXTS, Status
 from catseye.estimation.trilateration import FLAT
-
-__all__ = ["TEXTS", "Positions", "Status", "positions"]
 
 LANES = 2**15  # ranges a chunk of the plain form, so that its arrays stay in the cache
 LANES_COMPILED = 2**18
@@ -162,7 +160,7 @@ def _checked(
 
 def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Chunk, Positions], np.ndarray]:
     """The compiled form for these stations: writes a chunk's answers, returns (k,) whether it vouches for them."""
-    from catseye.estimation import positions_kernel as kernel
+    from catseye.estimation.positions import kernel as kernel
 
     frame = np.concatenate([whole.centre, whole.axes[0], whole.inverse])
     site = kernel.Site(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)

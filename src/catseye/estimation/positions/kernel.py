@@ -1,7 +1,7 @@
 """The compiled fast lane of `positions`: whole blocks of targets at once, one array a quantity.
 
 It takes undamped Gauss-Newton steps from the closed start and vouches only for what went smoothly; every other target
-is left to the plain form in `positions_start` and `positions_descent`, which is also its test. Import it only when a
+is left to the plain form in `start` and `descent`, which is also its test. Import it only when a
 problem is large: loading numba takes longer than a hundred thousand positions.
 """
 
@@ -29,7 +29,7 @@ class Measured(NamedTuple):
 
 class Site(NamedTuple):
     """The stations (s, 3) m, and of their own plane: `half_square` (s,), `rows` (3, s), and `frame` (5, 3): its centre,
-    three axes and inverse extents, see `positions_start.Planes`; all relative to `origin` (3,) m."""
+    three axes and inverse extents, see `start.Planes`; all relative to `origin` (3,) m."""
 
     stations: np.ndarray
     half_square: np.ndarray
@@ -39,7 +39,7 @@ class Site(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The thresholds of the same names in `positions_start` and `positions_descent`."""
+    """The thresholds of the same names in `start` and `descent`."""
 
     flat: float
     significant: float
@@ -233,7 +233,7 @@ def _own_figure(ranges, spread, root, stations, count, flat, figure, m, z, clear
 
 @_inlined
 def _closed_start(figure, z, count, near, significant, x, clear):
-    """The closed form of `positions_start.starts`; z: coordinates along the axes, sum of y, variance of the third,
+    """The closed form of `start.starts`; z: coordinates along the axes, sum of y, variance of the third,
     which the height then replaces."""
     for j in range(LANES):
         square = -2.0 * z[3, j] / count[j] - z[0, j] * z[0, j] - z[1, j] * z[1, j]

@@ -12,9 +12,9 @@ by a twentieth, as those of exchanged points, is it placed anew, and named.
 Where nothing (or too little) is given, the first local network keeps its own axes: z up if it has angles, those of
 `Unfolding`, mirror image and side included, if it has ranges alone. `Approximation.assumed` names its points.
 
-`approximate_sightings` reads the network into one table, `approximate_ties` places one point, `approximate_search` one
-after the other, `approximate_figures` builds local networks, `approximate_bodies` poses rigid bodies and
-`approximate_given` doubts given coordinates.
+`sightings` reads the network into one table, `ties` places one point, `search` one
+after the other, `figures` builds local networks, `bodies` poses rigid bodies and
+`given` doubts given coordinates.
 """
 
 from collections.abc import Iterator
@@ -24,11 +24,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catseye.estimation.approximate_bodies import bodies_of, poses
-from catseye.estimation.approximate_figures import place_all
-from catseye.estimation.approximate_given import disagreeing, placed_anew
-from catseye.estimation.approximate_search import Search
-from catseye.estimation.approximate_sightings import GROUND, parts_of, sightings
+from catseye.estimation.approximate.bodies import bodies_of, poses
+from catseye.estimation.approximate.figures import place_all
+from catseye.estimation.approximate.given import disagreeing, placed_anew
+from catseye.estimation.approximate.search import Search
+from catseye.estimation.approximate.sightings import GROUND, parts_of, sightings
 from catseye.estimation.network import Network
 from catseye.estimation.observations import (
     Directions,

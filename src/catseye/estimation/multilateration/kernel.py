@@ -1,4 +1,4 @@
-"""Elimination of targets from a ranging network, compiled; `multilateration_blocks` does the same in plain numpy.
+"""Elimination of targets from a ranging network, compiled; `blocks` does the same in plain numpy.
 
 Targets stand in blocks of LANES, one lane each; a slot is one station (or its repetition) over the lanes of a block, so
 that every inner loop runs over lanes and fills the vector unit. A lane without a range has root weight zero.
@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
-from catseye.estimation.multilateration_blocks import NONCENTRALITY, UNCHECKED, Problem, Reduced, State, Statistics
-from catseye.estimation.multilateration_layout_kernel import by_target, fill, gather, slots_of
+from catseye.estimation.multilateration.blocks import NONCENTRALITY, UNCHECKED, Problem, Reduced, State, Statistics
+from catseye.estimation.multilateration.layout_kernel import by_target, fill, gather, slots_of
 
 LANES = 128
 ROWS = 7  # of a slot's scratch: a (3), derivatives by zero and scale (2), misclosure, phi^2

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.estimation.multilateration_blocks import Problem, State
-from catseye.estimation.multilateration_datum import ENOUGH, Datum, free_motions
-from catseye.estimation.multilateration_status import Names
-from catseye.estimation.multilateration_terms import Gauges, PointPriors, StationRanges, Terms
+from catseye.estimation.multilateration.blocks import Problem, State
+from catseye.estimation.multilateration.datum import ENOUGH, Datum, free_motions
+from catseye.estimation.multilateration.status import Names
+from catseye.estimation.multilateration.terms import Gauges, PointPriors, StationRanges, Terms
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.estimation.unfolding_location import locate
+from catseye.estimation.unfolding.location import locate
 
 FIT = 3.0  # rms residual in standard uncertainties up to which a figure fits, degrees of freedom accounted for
 FLAT = 0.02  # least over middle extent of points below which they may lie in one plane, as far as ranges tell

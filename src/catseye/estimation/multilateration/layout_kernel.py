@@ -1,4 +1,4 @@
-"""Ranges of a network laid out by station and target for `multilateration_kernel`, compiled.
+"""Ranges of a network laid out by station and target for `kernel`, compiled.
 
 Targets stand in blocks of `lanes`; a slot is one station, or its repetition, over the lanes of a block. The number of
 lanes is an argument because the cache of compiled code does not see a constant of another file change.

@@ -1,7 +1,7 @@
 """Figures from ranges alone: stations and targets both unknown, found up to a rigid motion and a mirror image.
 
-How the figure comes out of the factors of the squared ranges: `unfolding_factors`. From a complete part it is extended
-to the rest (`unfolding_sides`), fitted to all ranges and judged (`unfolding_fit`).
+How the figure comes out of the factors of the squared ranges: `factors`. From a complete part it is extended
+to the rest (`sides`), fitted to all ranges and judged (`fit`).
 
 Least numbers: ranges S T >= 3 (S + T) - 6 with S, T >= 4 (4 x 6, 5 x 5), where several figures may fit and the status
 says so; linear, thus without a search, from 10 stations or 10 targets on. Stations in one plane: at least 6, and no
@@ -14,19 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import ValidityError
-from catseye.estimation.unfolding_factors import (
+from catseye.estimation.unfolding.factors import (
     Figure,
-    classical_scaling,
     factors,
     in_plane,
     in_space,
     upgraded,
 )
-from catseye.estimation.unfolding_fit import FIT, Fit, flattest, least_squares, loose
-from catseye.estimation.unfolding_location import locate
-from catseye.estimation.unfolding_sides import extend, settle_sides
-
-__all__ = ["UNFOLDED", "Unfolding", "classical_scaling", "locate", "unfold"]
+from catseye.estimation.unfolding.fit import FIT, Fit, flattest, least_squares, loose
+from catseye.estimation.unfolding.sides import extend, settle_sides
 
 UNFOLDED = "unfolded"
 TOO_FEW = "not unfolded, too few ranges: {m} between {s} stations and {t} targets leave no complete part with 4 of \

@@ -5,7 +5,7 @@ Every target is eliminated into a dense system of the stations' parameters, so t
 in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises, with the
 normal matrix of a large network kept once a step is a thousandth of the one before (covariances to 1e-6 of their own).
 It is scale-free: rank is judged by directions and by the share of a diagonal that survives the elimination, so metres,
-nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `multilateration_datum`.
+nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `datum`.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,12 @@ import numpy as np
 from scipy.linalg import lapack
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation import multilateration_status as status_of
 from catseye.estimation.adjustment import CONVERGED, NOT_CONVERGED, ROUNDING, STEP_IN_SIGMAS, UNDEFINED
-from catseye.estimation.multilateration_blocks import NumpyBlocks, Reduced, State, Statistics
-from catseye.estimation.multilateration_datum import Conditions, displacements, generators
-from catseye.estimation.multilateration_network import RangingNetwork, Setup, set_up
-from catseye.estimation.multilateration_solution import Gauge, RangingSolution
-from catseye.estimation.multilateration_terms import PointPriors, StationRanges
-
-__all__ = ["PointPriors", "RangingNetwork", "RangingSolution", "StationRanges", "adjust_ranges"]
+from catseye.estimation.multilateration import status as status_of
+from catseye.estimation.multilateration.blocks import NumpyBlocks, Reduced, State, Statistics
+from catseye.estimation.multilateration.datum import Conditions, displacements, generators
+from catseye.estimation.multilateration.network import RangingNetwork, Setup, set_up
+from catseye.estimation.multilateration.solution import Gauge, RangingSolution
 
 COMPILED_FROM = 200_000  # ranges: below, importing the compiled kernels costs more than they save
 WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): directions within 1 microradian of a plane show nothing off it
@@ -82,7 +79,7 @@ def _engine(setup: Setup, engine: str | None) -> Blocks:
         raise InputError(f'engine is "numpy", "numba" or None, not {engine!r}')
     if engine == "numpy" or (engine is None and len(setup.problem.distance) < COMPILED_FROM):
         return NumpyBlocks(setup.problem)
-    from catseye.estimation.multilateration_kernel import KernelBlocks
+    from catseye.estimation.multilateration.kernel import KernelBlocks
 
     return KernelBlocks(setup.problem)
 

@@ -4,9 +4,9 @@ from collections import Counter
 
 import numpy as np
 
-from catseye.estimation.approximate_bodies import rigid_motion
-from catseye.estimation.approximate_sightings import BEARING, COORDINATE, DIFFERENCE, LEVEL, RANGE, WORDS, Sightings
-from catseye.estimation.approximate_ties import FLOOR, Ties, wrapped
+from catseye.estimation.approximate.bodies import rigid_motion
+from catseye.estimation.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, LEVEL, RANGE, WORDS, Sightings
+from catseye.estimation.approximate.ties import FLOOR, Ties, wrapped
 from catseye.estimation.unfolding import locate
 
 STRICT, LENIENT = 1e-3, 1e-7  # least over largest eigenvalue of a point's normal matrix: good geometry; any at all

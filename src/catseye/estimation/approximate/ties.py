@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from catseye.estimation.approximate_sightings import BEARING, COORDINATE, DIFFERENCE, LEVEL, RANGE, ZENITH, Sightings
+from catseye.estimation.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, LEVEL, RANGE, ZENITH, Sightings
 from catseye.estimation.unfolding import locate
 
 FLOOR = 1e-3  # m: no sigma counts as smaller, for the points that are given may be poor
