@@ -209,7 +209,7 @@ SOURCES: dict[str, Source] = {
     "GAMA18": Source(
         title="A. Cepek, GNU Gama: adjustment of geodetic networks, manual and schema gama-local.xsd 1.00, 2018",
         locator="https://www.gnu.org/software/gama/manual/",
-        used="chapter XML input data format for gama-local",
+        used="chapter XML input data format for gama-local; the elements of gama-local-adjustment.xsd 1.00",
     ),
     "STARNET04": Source(
         title="STAR*NET V6 Least Squares Survey Adjustment Program, Reference Manual, Standard and PLUS Editions, 2004",

@@ -8,8 +8,9 @@ import pytest
 
 from catseye.errors import EstimationError
 from catseye.estimation.monte_carlo import Disturbance, measured, scatter
-from catseye.estimation.network import Parameter
+from catseye.estimation.network import Network, Parameter, Points
 from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.observations import ZenithAngles
 from catseye.estimation.plan import plan, predicted, schedule
 
 
@@ -148,3 +149,17 @@ def test_air_that_is_wrong_shows_beside_the_claim(ranging_network):
     off = np.abs(drawn.groups[0].observed - network.groups[0].predict(network.points.xyz.ravel())[0])
     assert off[bad[0]].min() > 15 * 5e-5
     assert off[~bad[0]].max() < 5 * 5e-5
+
+
+def test_refraction_lifts_targets_by_its_square_of_distance():
+    true = np.array([[0.0, 0.0, 0.0], [300.0, 400.0, 20.0]])
+    zenith = ZenithAngles("z", np.zeros(1), np.full(1, 1e-30), np.array([0]), np.array([3]))
+    fixed = np.zeros((2, 3), dtype=bool)
+    network = Network(Points(("A", "B"), true, fixed, fixed), (), (zenith,))
+    draws = [
+        measured(network, true.ravel(), np.random.default_rng(seed), Disturbance(refraction=0.2))[0].groups[0].observed
+        for seed in range(400)
+    ]
+    k = (zenith.predict(true.ravel())[0] - np.ravel(draws)) * 2 * 6_371_000.0 / 500.0  # k > 0 lifts: the angle shrinks
+    assert np.std(k) == pytest.approx(0.2, rel=0.15)
+    assert np.corrcoef(k, [np.random.default_rng(s).standard_normal(4)[3] for s in range(400)])[0, 1] > 0.99

@@ -246,6 +246,10 @@ def plan(
     station_ppm: Annotated[
         float, typer.Option("--station-ppm", min=0.0, help="In the runs: scale error of each station's ranges, ppm.")
     ] = 0.0,
+    refraction: Annotated[
+        float,
+        typer.Option("--refraction", min=0.0, help="In the runs: spread of the coefficient k of refraction (1σ)."),
+    ] = 0.0,
     blunders_percent: Annotated[
         float,
         typer.Option("--blunders-percent", min=0.0, max=30.0, help="In the runs: share of gross errors, rejected."),
@@ -279,6 +283,7 @@ def plan(
                 seed=seed,
                 air_ppm=air_ppm,
                 station_ppm=station_ppm,
+                refraction=refraction,
                 blunders=blunders_percent / 100.0,
                 progress=progress,
             )

@@ -90,8 +90,8 @@ class ProgressLine:
         if not self._shown or (what == self._last and now < self._next):
             return
         self._last, self._next = what, now + INTERVAL
-        bar = "█" * (20 * done // total if total else 20)
-        self._write(f"{bar:·<20} {what} {done}/{total}")
+        bar = "█" * (20 * done // total if total else done % 21)  # without a known end it fills again and again
+        self._write(f"{bar:·<20} {what} {done}{f'/{total}' if total else ''}")
 
     def clear(self) -> None:
         if self._shown:

@@ -9,8 +9,10 @@ from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED
 from catseye.estimation.network import Network, NetworkSolution, points_of
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations import Distances, ZenithAngles
 from catseye.estimation.rows import variances
+
+XY = np.arange(2)
 
 
 @dataclass(frozen=True)
@@ -19,12 +21,14 @@ class Disturbance:
 
     common_ppm    standard deviation of a scale error of all ranges together: the index of air, wrong all over
     station_ppm   the same of each ranger for itself: its own thermometer
+    refraction    standard deviation of the coefficient k of vertical refraction, which bends all zenith angles
     blunders      share of observations with a gross error
     size          standard deviations of such an error, either sign
     """
 
     common_ppm: float = 0.0
     station_ppm: float = 0.0
+    refraction: float = 0.0
     blunders: float = 0.0
     size: float = 20.0
 
@@ -61,6 +65,7 @@ def measured(
     groups, wrong = [], []
     common = generator.standard_normal() * disturbance.common_ppm * PPM
     own = generator.standard_normal(len(network.points.names)) * disturbance.station_ppm * PPM
+    bend = generator.standard_normal() * disturbance.refraction
     for group in network.groups:
         values = group.predict(truth)[0]
         m = len(values)
@@ -74,6 +79,9 @@ def measured(
             noise = np.einsum("bij,bj->bi", factor, noise.reshape(b, r)).ravel()
         if isinstance(group, Distances):
             noise = noise + values * (common + own[points_of(group)[0]])
+        if isinstance(group, ZenithAngles):
+            along = truth[group.target[:, None] + XY] - truth[group.origin[:, None] + XY]
+            noise = noise - bend * np.hypot(*along.T) / (2.0 * group.radius)
         bad = generator.random(m) < disturbance.blunders
         noise = noise + bad * disturbance.size * sigma * generator.choice([-1.0, 1.0], m)
         groups.append(replace(group, observed=values + noise))  # type: ignore[type-var]

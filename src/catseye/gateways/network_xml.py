@@ -67,7 +67,7 @@ def network_xml(found: Findings) -> Iterator[str]:
 
     found   what is told of a solution; `scaled` becomes Gama's "aposteriori"
 
-    Source: [GAMA] schema gama-local-adjustment.xsd, version 1.00.
+    Source: [GAMA18] schema gama-local-adjustment.xsd, version 1.00.
     """
     yield f'<?xml version="1.0"?>\n<gama-local-adjustment xmlns="{NAMESPACE}">\n'
     if not found.answered:

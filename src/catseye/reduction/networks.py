@@ -220,6 +220,7 @@ def measured_on_paper(
     seed: int,
     air_ppm: float = 0.0,
     station_ppm: float = 0.0,
+    refraction: float = 0.0,
     blunders: float = 0.0,
     progress: Progress | None = None,
 ) -> Scatter:
@@ -229,9 +230,10 @@ def measured_on_paper(
     runs, seed   how many, of which generator
     air_ppm      standard deviation of a scale error of all ranges together
     station_ppm  the same of each ranger
+    refraction   standard deviation of the coefficient of vertical refraction
     blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
     """
-    disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, blunders=blunders)
+    disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, refraction=refraction, blunders=blunders)
 
     def solve(drawn: Network) -> NetworkSolution:
         return adjusted(drawn, reject=blunders > 0.0).solution
