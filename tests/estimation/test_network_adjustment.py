@@ -271,3 +271,36 @@ def test_a_network_with_nothing_known_calibrates_itself(ranging_network, engine)
     apart = [np.linalg.norm(s.x[:, None] - s.x[None], axis=2) for s in (solution, known)]
     np.testing.assert_allclose(apart[0], apart[1], atol=1e-7)
     assert solution.degrees_of_freedom == known.degrees_of_freedom
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_network_that_is_almost_flat_is_weak_not_floating(ranging_network, engine):
+    network, flat = ranging_network(21, stations=8, flat=True, off=0.0)
+    true = flat.copy()
+    true[:, 2] = 2e-3 * np.random.default_rng(21).standard_normal(len(true))  # millimetres in a hundred metres
+    ranges = network.groups[0]
+    length = np.linalg.norm(true[ranges.target // 3] - true[ranges.origin // 3], axis=1)
+    exact = replace(ranges, observed=length, covariance=np.full(len(length), 1e-20))
+    solution = adjust_network(
+        replace(network, points=replace(network.points, xyz=true), groups=(exact,)), engine=engine
+    )
+    assert solution.status == "converged"
+    u = np.sqrt(np.einsum("nii->ni", solution.covariance))
+    assert np.median(u[:, 2]) > 1e3 * np.median(u[:, :2])  # a slope of some 2e-5 carries height
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_target_seen_from_stations_a_millimetre_apart_is_weak_not_floating(engine):
+    rng = np.random.default_rng(22)
+    true = np.concatenate([1e-3 * rng.uniform(-1, 1, (8, 3)), [[50.0, 60.0, 40.0]]])
+    length = np.linalg.norm(true[8] - true[:8], axis=1)
+    ranges = Distances("ranges", length, np.full(8, 1e-20), 3 * np.arange(8), np.full(8, 24))
+    fixed = np.arange(9)[:, None] < np.full(3, 8)
+    names = tuple(f"P{i}" for i in range(9))
+    network = Network(Points(names, true, fixed, np.zeros_like(fixed)), (), (ranges,))
+    solution = adjust_network(network, engine=engine)
+    assert solution.status == "converged"
+    along = true[8] / np.linalg.norm(true[8])
+    u = np.sqrt(np.linalg.eigvalsh(solution.covariance[8]))
+    assert np.sqrt(along @ solution.covariance[8] @ along) < 1e-9  # ranges of 0.1 nm, and directions within 1e-5
+    assert 3e-6 < u[2] < 3e-4
