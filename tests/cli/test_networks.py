@@ -205,3 +205,24 @@ def test_a_plan_says_what_a_network_is_worth_and_what_to_measure_next(answered, 
     assert all(row["residual"] is None and row["mdb"] > 0.0 for row in found["observations"])
     aimed = answered("plan", EXAMPLES / "feed-arm.toml", "--interest", "ZY113")
     assert aimed["interest"] == ["ZY113"]
+
+
+def test_relative_ellipsoids_are_of_the_pairs_asked_for(answered, catseye):
+    file = EXAMPLES / "feed-arm.toml"
+    found = answered("adjust", file, "--relative", "ZY113,ZY118", "--relative", "ZY101,ZP201")
+    near, far = found["relative"]
+    assert (near["from"], near["to"]) == ("ZY113", "ZY118")
+    x = [np.array([found["points"][n][k] for k in "xyz"]) for n in ("ZY113", "ZY118")]
+    assert near["distance"] == pytest.approx(np.linalg.norm(x[1] - x[0]), abs=1e-9)
+    sum_ = sum(np.array(found["points"][n]["covariance"]) for n in ("ZY113", "ZY118"))
+    assert np.trace(near["covariance"]) < np.trace(sum_)  # neighbours on the arm err together
+    unit = (x[1] - x[0]) / near["distance"]
+    assert near["u_distance"] == pytest.approx(np.sqrt(unit @ np.array(near["covariance"]) @ unit), rel=1e-9)
+    assert near["ellipsoid"]["semi_axes"][0] == pytest.approx(
+        np.sqrt(np.linalg.eigvalsh(near["covariance"])[2]), rel=1e-9
+    )
+    assert far["u_distance"] > 0.0
+    assert catseye("adjust", file, "--relative", "ZY113")[0] == 2
+    status, _, err = catseye("adjust", file, "--relative", "ZY113,NOBODY")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "NOBODY" in err

@@ -91,6 +91,10 @@ def adjust(
     level: Annotated[
         float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
     ] = 0.05,
+    relative: Annotated[
+        list[str] | None,
+        typer.Option("--relative", metavar="A,B", help="Relative ellipsoid of two points; may repeat."),
+    ] = None,
     points: Annotated[
         str | None, typer.Option("--points", metavar="A,B,...", help="Points to compare between two epochs.")
     ] = None,
@@ -103,6 +107,7 @@ def adjust(
         raise typer.BadParameter("cannot go with --reject: either weigh or leave out.", param_hint="'--robust'")
     if points is not None and later is None:
         raise typer.BadParameter("needs a second network to compare with.", param_hint="'--points'")
+    pairs = [_pair(text) for text in relative or ()]
     progress = ProgressLine(quiet)
     sources = [network] if later is None else [network, later]
     if out is not None:
@@ -127,7 +132,7 @@ def adjust(
             )
             for source in sources
         ]
-        found = [findings(t.solution, scaled=scaled, level=level) for t in treated]
+        found = [findings(t.solution, scaled=scaled, level=level, pairs=pairs) for t in treated]
         if later is not None:
             _compared(found, sources, points, level, out, json, quiet, progress)
             return
@@ -139,6 +144,13 @@ def adjust(
         _tell_adjusted(treated[0], found[0], json, quiet, out)
     if not found[0].answered:
         raise EstimationError(f"{network}: {treated[0].solution.status}")
+
+
+def _pair(text: str) -> tuple[str, str]:
+    names = tuple(part.strip() for part in text.split(","))
+    if len(names) != 2 or not all(names) or names[0] == names[1]:
+        raise typer.BadParameter(f"{text!r} is not two points with a comma between.", param_hint="'--relative'")
+    return names[0], names[1]
 
 
 def _read(reader: "Callable[[Path], Network]", source: Path) -> "Network":

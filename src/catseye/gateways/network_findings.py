@@ -11,7 +11,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, NONCENTRALITY
 from catseye.estimation.diagnosis import label
-from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, point_uncertainty
+from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, point_uncertainty, relative_covariance
 from catseye.estimation.external import effects_at_ends
 from catseye.estimation.network import Network, NetworkSolution, points_of
 from catseye.estimation.reliability import (
@@ -198,6 +198,25 @@ def _file_order(network: Network) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
+class Relative:
+    """How well the vector between two points is known, in the axes of the file.
+
+    first, second   names
+    distance        m
+    u_distance      m, its standard uncertainty
+    covariance      (3, 3) m^2 of the vector from the first to the second
+    ellipsoid       its standard ellipsoid
+    """
+
+    first: str
+    second: str
+    distance: float
+    u_distance: float
+    covariance: np.ndarray
+    ellipsoid: Ellipsoid
+
+
+@dataclass(frozen=True, eq=False)
 class Findings:
     """A solution and what is said of it, in the axes of its file.
 
@@ -214,6 +233,7 @@ class Findings:
     whole         chi-square test of the variance factor against 1
     level         of `whole`, and of all single tests together
     level_single  of one of them; nan where nothing is tested
+    relative      between the pairs of points asked for
     critical      |statistic| beyond which an observation is suspect; nan where nothing is tested
     """
 
@@ -232,6 +252,7 @@ class Findings:
     level: float
     level_single: float
     critical: float
+    relative: tuple[Relative, ...] = ()
 
     @property
     def network(self) -> Network:
@@ -308,14 +329,21 @@ class Findings:
         return self.table.kinds[self.table.kind[row]]
 
 
-def findings(solution: NetworkSolution, *, scaled: bool = False, level: float = 0.05) -> Findings:
+def findings(
+    solution: NetworkSolution,
+    *,
+    scaled: bool = False,
+    level: float = 0.05,
+    pairs: Sequence[tuple[str, str]] = (),
+) -> Findings:
     """All that the ways out tell of a solution.
 
     solution   an adjusted network, with an answer or without
     scaled     multiply covariances by the variance factor, and test observations against it (tau tests)
     level      of the chi-square test, and of all tests of single observations together
+    pairs      of points, by name, whose relative ellipsoids are wanted
 
-    Raises EstimationError where `scaled` and nothing was measured twice.
+    Raises EstimationError for a name that is not in the network, and where `scaled` and nothing was measured twice.
     """
     factor = solution.variance_factor if scaled else 1.0
     if scaled and not np.isfinite(factor) and np.isfinite(solution.covariance).any():
@@ -355,4 +383,21 @@ def findings(solution: NetworkSolution, *, scaled: bool = False, level: float = 
         level=level,
         level_single=single,
         critical=limit,
+        relative=tuple(_relative(solution, pair, factor) for pair in pairs),
     )
+
+
+def _relative(solution: NetworkSolution, pair: tuple[str, str], factor: float) -> Relative:
+    """The vector between two points; unknown where there is no answer."""
+    strange = [name for name in pair if name not in solution.index]
+    if strange:
+        raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+    axes, rows = solution.network.axes, [solution.index[name] for name in pair]
+    vector = (solution.x[rows[1]] - solution.x[rows[0]]) @ axes
+    covariance = np.full((3, 3), np.nan)
+    if np.isfinite(solution.covariance).all():
+        covariance = axes.T @ relative_covariance(solution.block(pair)) @ axes * factor
+    distance = float(np.linalg.norm(vector))
+    unit = vector / distance if distance > 0.0 else np.full(3, np.nan)
+    u = float(np.sqrt(np.maximum(unit @ covariance @ unit, 0.0)))
+    return Relative(*pair, distance, u, covariance, ellipsoid(covariance))

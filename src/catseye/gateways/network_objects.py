@@ -113,6 +113,17 @@ def _head(found: Findings, treated: "Adjusted | None") -> dict[str, Any]:
                 "noncentrality": NONCENTRALITY,
             },
             "treatment": None if treated is None else _treatment(found, treated),
+            "relative": [
+                {
+                    "from": r.first,
+                    "to": r.second,
+                    "distance": r.distance,
+                    "u_distance": r.u_distance,
+                    "covariance": r.covariance,
+                    "ellipsoid": {"semi_axes": r.ellipsoid.semi_axes, "directions": r.ellipsoid.directions.T},
+                }
+                for r in found.relative
+            ],
             "suspects": found.suspects,
             "unchecked": np.flatnonzero(found.table.active & ~found.table.checked),
             "parameters": {

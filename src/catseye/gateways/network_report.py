@@ -226,6 +226,25 @@ def _points(found: Findings, file: str) -> str:
             f"Covariances are in {file}."
         ),
         table(columns, lines, "tttnnnnnnnn"),
+        _relative(found),
+    )
+
+
+def _relative(found: Findings) -> str:
+    """The pairs asked for."""
+    if not found.relative:
+        return ""
+    rows = [
+        (
+            f"{r.first} - {r.second}",
+            _number(r.distance, ".7f"),
+            _number(r.u_distance / MILLIMETRE, ".4f"),
+            " / ".join(_number(float(v) / MILLIMETRE, ".4g") for v in r.ellipsoid.semi_axes),
+        )
+        for r in found.relative
+    ]
+    return "<h3>From point to point</h3>" + table(
+        ("pair", "distance (m)", "u (mm)", "semi-axes of the relative ellipsoid (mm)"), rows, "tnnn"
     )
 
 

@@ -172,6 +172,11 @@ def _points(found: Findings) -> str:
         text += (
             f" {len(weak)} points are over {WEAK:g} times worse than usual: {_listed([found.names[i] for i in weak])}."
         )
+    for r in found.relative:
+        text += (
+            f" {r.first} - {r.second}: {r.distance:.5f} m, u {quantity(r.u_distance, 'm')}; its relative ellipsoid has "
+            f"the semi-axes {', '.join(quantity(float(v), 'm') for v in r.ellipsoid.semi_axes)}."
+        )
     return text + (
         " The variance factor is applied."
         if found.scaled
