@@ -304,3 +304,15 @@ def test_a_target_seen_from_stations_a_millimetre_apart_is_weak_not_floating(eng
     u = np.sqrt(np.linalg.eigvalsh(solution.covariance[8]))
     assert np.sqrt(along @ solution.covariance[8] @ along) < 1e-9  # ranges of 0.1 nm, and directions within 1e-5
     assert 3e-6 < u[2] < 3e-4
+
+
+@pytest.mark.parametrize("targets", [12, 220])
+def test_given_coordinates_exchanged_in_the_datum_are_named_though_every_range_fits(ranging_network, targets):
+    network, _ = ranging_network(23, stations=9, targets=targets)
+    xyz = network.points.xyz.copy()
+    xyz[[2, 6]] = xyz[[6, 2]]
+    good = adjust_network(network)
+    solution = adjust_network(replace(network, points=replace(network.points, xyz=xyz)), start=good)
+    assert good.status == "converged"
+    assert solution.variance_factor == pytest.approx(good.variance_factor, rel=1e-6)
+    assert solution.status.startswith("converged, but S03 and S07 lie at each other's given places")

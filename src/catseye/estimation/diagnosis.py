@@ -11,6 +11,7 @@ from scipy.special import chdtrc
 
 from catseye.estimation.adjustment import CONVERGED, Solution
 from catseye.estimation.network import Network, NetworkSolution, points_of
+from catseye.estimation.rigid_body import closed_form
 
 PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
 or hold each"
@@ -18,6 +19,10 @@ FLOATS = "rank deficient: {points} floats; {advice}"
 CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
 TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points hang together by a pose
+DATUM_EXCHANGED = "converged, but {first} and {second} lie at each other's given places: the datum's coordinates fit \
+the measured shape to {now:.3g} m, with the two exchanged to {best:.3g} m; exchange them, or take them out of the datum"
+DISPLACED = 0.01  # of the network's size: a worse fit of the datum's given coordinates is looked into
+EXCHANGED_BACK = 0.1  # of the misfit, below which it falls when the right two are exchanged
 LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
 GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
 EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
@@ -116,7 +121,7 @@ def diagnosed(solution: NetworkSolution, solve: Callable[[Network], NetworkSolut
     tests = [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
     largest = [float(t.max(initial=0.0)) for t in tests]
     if not (chdtrc(degrees, factor * degrees) < LIKELY and (factor > GROSS_FACTOR or max(largest) > GROSS_TEST)):
-        return CONVERGED
+        return _datum_exchanged(solution) or CONVERGED
     group = int(np.argmax(largest))
     row = int(np.argmax(tests[group]))
     fit, network = solution.fits[group], solution.network
@@ -132,6 +137,40 @@ def label(network: Network, group: int, row: int) -> str:
     ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
     where = network.places[group][row] if network.places and network.places[group] else ""
     return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")
+
+
+def _datum_exchanged(solution: NetworkSolution) -> str | None:
+    """The status where the shape that was measured fits the datum's given coordinates only with two of them exchanged.
+
+    No observation shows that: the network is right in itself, and turned and shifted by the wrong coordinates.
+    """
+    points = solution.network.points
+    on = np.flatnonzero(points.datum.all(axis=1) & np.isfinite(points.xyz).all(axis=1))
+    if not 4 <= len(on) <= EXCHANGE_ALL:
+        return None
+    x, given = solution.x[on], points.xyz[on]
+    size = float(np.linalg.norm(np.ptp(given, axis=0)))
+    now = _misfit(x, given)
+    if now < DISPLACED * size:
+        return None
+    best, i, j = np.inf, 0, 0
+    for a, b in combinations(range(len(on)), 2):
+        order = np.arange(len(on))
+        order[[a, b]] = b, a
+        misfit = _misfit(x, given[order])
+        if misfit < best:
+            best, i, j = misfit, a, b
+    if best > EXCHANGED_BACK * now:
+        return None
+    first, second = points.names[on[i]], points.names[on[j]]
+    return DATUM_EXCHANGED.format(first=first, second=second, now=now, best=best)
+
+
+def _misfit(x: np.ndarray, given: np.ndarray) -> float:
+    """Root mean square departure, m, of points (n, 3) from given ones after the best rigid motion."""
+    rotation, _ = closed_form(x, given)
+    off = (x - x.mean(axis=0)) @ rotation.T - (given - given.mean(axis=0))
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
 
 def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
