@@ -10,7 +10,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.monte_carlo import Disturbance, measured, scatter
 from catseye.estimation.network import Network, Parameter, Points
 from catseye.estimation.network_adjustment import adjust_network
-from catseye.estimation.observations import ZenithAngles
+from catseye.estimation.observations import Vectors, ZenithAngles
 from catseye.estimation.plan import plan, predicted, schedule
 
 
@@ -163,3 +163,17 @@ def test_refraction_lifts_targets_by_its_square_of_distance():
     k = (zenith.predict(true.ravel())[0] - np.ravel(draws)) * 2 * 6_371_000.0 / 500.0  # k > 0 lifts: the angle shrinks
     assert np.std(k) == pytest.approx(0.2, rel=0.15)
     assert np.corrcoef(k, [np.random.default_rng(s).standard_normal(4)[3] for s in range(400)])[0, 1] > 0.99
+
+
+def test_correlated_observations_are_drawn_with_their_correlations():
+    lever = np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [-0.5, 0.4, 0.8]])
+    covariance = lever @ lever.T
+    vectors = Vectors("v", np.zeros(6), np.stack([covariance, 4 * covariance]), np.array([0, 0]), np.array([3, 3]))
+    nothing = np.zeros((2, 3), dtype=bool)
+    network = Network(Points(("A", "B"), np.zeros((2, 3)), nothing, nothing), (), (vectors,))
+    rng = np.random.default_rng(5)
+    drawn = np.array([measured(network, np.zeros(6), rng, Disturbance())[0].groups[0].observed for _ in range(3000)])
+    found = np.cov(drawn.T)
+    assert found[:3, :3] == pytest.approx(covariance, abs=0.12)  # four standard deviations of a covariance near 1
+    assert found[3:, 3:] == pytest.approx(4 * covariance, abs=0.48)
+    assert found[:3, 3:] == pytest.approx(np.zeros((3, 3)), abs=0.16)

@@ -167,3 +167,31 @@ def test_observations_joined_with_a_diagonal_covariance_are_the_separate_ones(se
     np.testing.assert_allclose(two.covariance, one.covariance, rtol=0, atol=1e-7 * one.covariance.max())
     w = np.concatenate([f.standardised for f in one.fits[:2]])
     np.testing.assert_allclose(two.fits[0].standardised, w, atol=1e-4)
+
+
+@quick
+@given(seeds)
+def test_inflation_scales_a_covariance_and_keeps_or_dilutes_its_correlations(seed):
+    network, rng = mixed(seed), np.random.default_rng(seed)
+    inflation = [rng.uniform(1.0, 3.0, len(g.observed)) for g in network.groups]
+
+    def by_hand(alone):
+        groups = []
+        for group, f in zip(network.groups, inflation, strict=True):
+            c = group.covariance
+            if c.ndim == 1:
+                groups.append(replace(group, covariance=c * f**2))
+                continue
+            f = f.reshape(c.shape[:-1])
+            larger = c * f[..., :, None] * f[..., None, :]
+            if alone:
+                own = np.diagonal(c, axis1=-2, axis2=-1) * (f**2 - 1.0)
+                larger = c + own[..., None] * np.eye(c.shape[-1])
+            groups.append(replace(group, covariance=larger))
+        return adjust_network(replace(network, groups=tuple(groups)))
+
+    for alone in (False, True):
+        found, expected = adjust_network(network, inflation=inflation, alone=alone), by_hand(alone)
+        np.testing.assert_allclose(found.x, expected.x, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found.covariance, expected.covariance, rtol=0, atol=1e-7 * expected.covariance.max())
+        assert np.isclose(found.variance_factor, expected.variance_factor, rtol=1e-7)

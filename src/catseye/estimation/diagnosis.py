@@ -192,7 +192,7 @@ def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution
             xyz, order = network.points.xyz.copy(), [j, i]
             xyz[[i, j]] = xyz[order]
             trial = solve(replace(network, points=replace(network.points, xyz=xyz)))
-            if trial.status == CONVERGED and trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
+            if trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
                 trials.append((float(np.nansum((trial.x - xyz) ** 2)), i, j, trial.variance_factor))
         if trials:  # a symmetric network fits after other exchanges too, but far from the given coordinates
             _, i, j, factor = min(trials)
