@@ -15,7 +15,7 @@ from catseye.estimation.network_adjustment import adjust_network, with_datum
 from catseye.estimation.observations import Distances
 from catseye.estimation.rows import variances
 
-BATCH = 4000  # candidate pairs whose effect is computed at once
+BATCH = 200  # ranges whose effect is computed at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,29 +134,31 @@ def schedule(
     coordinates = np.flatnonzero(np.repeat(chosen.interest, 3))
     total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
     pairs, sigma = _pairs(solution, repeats)
-    spent = np.zeros(len(names))
+    spent, inside = np.zeros(len(names)), np.repeat(chosen.interest, 3)
+    shown, own = _effects(solution.x, full, coordinates, pairs)
+    unit = _unit(solution.x, pairs) if len(pairs) else np.zeros((0, 3))
+    open_ = np.full(len(pairs), shot_s <= budget_s)
     picked: list[Candidate] = []
-    while len(picked) < most and len(pairs):
-        open_ = spent[pairs[:, 0]] + shot_s <= budget_s * (1.0 + 1e-12)
-        if not open_.any():
-            break
-        gains = np.where(open_, _gains(solution.x, full, coordinates, pairs, sigma), -1.0)
+    while len(picked) < most and open_.any():
+        gains = np.where(open_, shown / (sigma**2 + own), -1.0)
         best = int(np.argmax(gains))
         if gains[best] <= 1e-9 * total:
             break
         i, j = pairs[best]
-        a = _across(solution.x, full, pairs[best : best + 1])[:, 0]
-        slope = _unit(solution.x, pairs[best : best + 1])[0]
-        own = float(slope @ (a[3 * j : 3 * j + 3] - a[3 * i : 3 * i + 3]))
-        full -= np.outer(a, a) / (sigma[best] ** 2 + own)
+        q, left = _across(solution.x, full, pairs[best : best + 1])[0], sigma[best] ** 2 + own[best]
+        # Q becomes Q - q q' / left; what every other pair sees of it follows from two numbers a pair
+        felt, common = _seen(q, pairs, unit) / left, _seen(full[:, inside] @ q[inside], pairs, unit)
+        shown = np.maximum(shown - 2.0 * felt * common + felt**2 * float(q[inside] @ q[inside]), 0.0)
+        own = np.maximum(own - felt**2 * left, 0.0)
+        full -= np.outer(q, q / left)
         before, total = total, total - float(gains[best])
         spent[i] += shot_s
         count = len(coordinates)
         after = (max(total, 0.0) / count) ** 0.5
         gain = (before / count) ** 0.5 - after
         picked.append(Candidate(names[i], names[j], float(sigma[best]), after, gain, float(spent[i])))
-        if not repeats:
-            pairs, sigma = np.delete(pairs, best, axis=0), np.delete(sigma, best)
+        open_ &= spent[pairs[:, 0]] + shot_s <= budget_s * (1.0 + 1e-12)
+        open_[best] &= repeats
     return tuple(picked)
 
 
@@ -215,38 +217,45 @@ def _unit(x: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def _across(x: np.ndarray, full: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Q a (n, k) of ranges between pairs."""
-    unit, xyz = _unit(x, pairs), np.arange(3)
-    result = np.zeros((len(full), len(pairs)))
-    for axis in xyz:
-        result += (full[:, 3 * pairs[:, 1] + axis] - full[:, 3 * pairs[:, 0] + axis]) * unit[:, axis]
+    """Q a (k, n) of ranges between pairs."""
+    unit = _unit(x, pairs)
+    result = np.zeros((len(pairs), len(full)))
+    for axis in range(3):
+        result += (full[3 * pairs[:, 1] + axis] - full[3 * pairs[:, 0] + axis]) * unit[:, axis, None]
     return result
 
 
-def _gains(
-    x: np.ndarray, full: np.ndarray, coordinates: np.ndarray, pairs: np.ndarray, sigma: np.ndarray
-) -> np.ndarray:
-    """Fall of the sum of variances of some coordinates by each further range, m^2: |(Q a)_I|^2 / (s^2 + a'Qa)."""
-    gains = np.empty(len(pairs))
+def _seen(vector: np.ndarray, pairs: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """a'v (k,) of ranges between pairs, v over all coordinates."""
+    v = vector.reshape(-1, 3)
+    return np.sum(unit * (v[pairs[:, 1]] - v[pairs[:, 0]]), axis=1)
+
+
+def _effects(
+    x: np.ndarray, full: np.ndarray, coordinates: np.ndarray, pairs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """|(Q a)_I|^2 over some coordinates, and a'Qa, of each range between pairs.
+
+    Their quotient shown / (sigma^2 + own) is the fall of the sum of variances of these coordinates by that range.
+    """
+    shown, own = np.empty(len(pairs)), np.empty(len(pairs))
     inside = np.zeros(len(full), dtype=bool)
     inside[coordinates] = True
     for low in range(0, len(pairs), BATCH):
         part = slice(low, low + BATCH)
         across, unit = _across(x, full, pairs[part]), _unit(x, pairs[part])
-        k = np.arange(across.shape[1])
-        own = sum(
-            unit[:, axis] * (across[3 * pairs[part, 1] + axis, k] - across[3 * pairs[part, 0] + axis, k])
-            for axis in range(3)
-        )
-        gains[part] = np.sum(across[inside] ** 2, axis=0) / (sigma[part] ** 2 + own)
-    return gains
+        moved, k = across.reshape(len(across), -1, 3), np.arange(len(across))
+        own[part] = np.sum(unit * (moved[k, pairs[part, 1]] - moved[k, pairs[part, 0]]), axis=1)
+        shown[part] = np.sum(across[:, inside] ** 2, axis=1)
+    return shown, own
 
 
 def _best(
     solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float, most: int
 ) -> tuple[Candidate, ...]:
     pairs, sigma = _pairs(solution, repeats=True)
-    gains = _gains(solution.x, full, coordinates, pairs, sigma)
+    shown, own = _effects(solution.x, full, coordinates, pairs)
+    gains = shown / (sigma**2 + own)
     names, count = solution.network.points.names, len(coordinates)
     now = (total / count) ** 0.5
     after = np.sqrt(np.maximum(total - gains, 0.0) / count)
@@ -262,27 +271,24 @@ def _worth(
 ) -> tuple[np.ndarray, ...]:
     """Growth of the mean standard uncertainty were one observation left out, m: |(Q a)_I|^2 / (s^2 r)."""
     x = np.concatenate([solution.x.ravel(), solution.parameters])
-    count = len(coordinates)
-    now, whole = (total / count) ** 0.5, len(full)
+    count, chosen = len(coordinates), np.ascontiguousarray(full[:, coordinates])
+    if len(x) > len(full):  # parameters beside the points are seen too
+        others = solution.q.across(np.arange(len(full), len(x)))[coordinates]
+        chosen = np.concatenate([chosen, others.T])
+    now = (total / count) ** 0.5
     result = []
     for group, fit in zip(solution.network.groups, solution.fits, strict=True):
-        growth = np.zeros(len(group.observed))
-        for low in range(0, len(growth), BATCH):
-            rows = slice(low, low + BATCH)
-            a = np.zeros((len(growth[rows]), len(x)))
-            jacobian = group.predict(x)[1][rows]
-            if group.columns.ndim == 1:
-                a[:, group.columns] = jacobian
-            else:
-                at = group.columns[rows]
-                np.add.at(a, (np.arange(len(a))[:, None], np.maximum(at, 0)), np.where(at < 0, 0.0, jacobian))
-            across = a[:, :whole] @ full[:, coordinates]
-            if len(x) > whole:
-                others = np.flatnonzero(np.any(a[:, whole:] != 0.0, axis=0)) + whole
-                across = across + a[:, others] @ solution.q.across(others)[coordinates].T
-            left = fit.sigma[rows] ** 2 * fit.redundancy[rows]
-            with np.errstate(divide="ignore"):
-                gained = np.sum(across**2, axis=1) / np.where(fit.redundancy[rows] > 1e-9, left, 0.0)
-            growth[rows] = np.sqrt((total + gained) / count) - now
-        result.append(growth)
+        slopes = group.predict(x)[1]
+        columns = np.broadcast_to(group.columns, slopes.shape)
+        slopes, columns = np.where(columns < 0, 0.0, slopes), np.maximum(columns, 0)
+        gained = np.empty(len(slopes))
+        for low in range(0, len(slopes), BATCH):
+            part = slice(low, low + BATCH)
+            across = np.zeros((len(slopes[part]), count))
+            for own, at in zip(slopes[part].T, columns[part].T, strict=True):
+                across += chosen[at] * own[:, None]
+            gained[part] = np.einsum("mc,mc->m", across, across)
+        left = fit.sigma**2 * np.where(fit.redundancy > 1e-9, fit.redundancy, 0.0)
+        with np.errstate(divide="ignore"):
+            result.append(np.sqrt((total + gained / left) / count) - now)
     return tuple(result)
