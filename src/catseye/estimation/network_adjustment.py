@@ -95,7 +95,13 @@ def adjust_network(
         from catseye.estimation.ranging_engine import adjusted_as_ranges
 
         solution = adjusted_as_ranges(
-            network, active=active, inflation=inflation, start=start, tests=tests, forced=engine is not None
+            network,
+            active=active,
+            inflation=inflation,
+            start=start,
+            iterations=iterations,
+            tests=tests,
+            forced=engine is not None,
         )
         if solution is not None:
             return replace(solution, status=diagnosed(solution, _factor_alone)) if tests and diagnose else solution

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -15,13 +14,12 @@ from catseye.estimation.multilateration import (
     StationRanges,
     adjust_ranges,
 )
-from catseye.estimation.multilateration.blocks import linearise
 from catseye.estimation.network import Network, NetworkSolution
 from catseye.estimation.observations import Coordinates, Distances
+from catseye.estimation.ranging_covariance import RangingCovariance
 
 FEWEST_POINTS = 200  # below it the dense form is as fast, and names what is wrong with more care
 MOST_STATIONS = 600  # their parameters make a dense system
-HELD, FREE = 0.0, np.inf
 
 
 def adjusted_as_ranges(
@@ -30,6 +28,7 @@ def adjusted_as_ranges(
     active: Sequence[np.ndarray] | None,
     inflation: Sequence[np.ndarray] | None,
     start: NetworkSolution | None,
+    iterations: int,
     tests: bool,
     forced: bool,
 ) -> NetworkSolution | None:
@@ -39,7 +38,8 @@ def adjusted_as_ranges(
     active       as for `adjust_network`
     inflation    likewise
     start        an earlier solution
-    tests        likewise
+    iterations   cap of Gauss-Newton steps
+    tests        as for `adjust_network`
     forced       raise EstimationError for another kind of network instead of None, and keep an answer that is none
 
     What has no answer is left to the general engine, which says why.
@@ -61,7 +61,7 @@ def adjusted_as_ranges(
         if forced:
             raise EstimationError("the ranging engine does not weigh coordinates robustly; use another engine")
         return None
-    solution = adjust_ranges(problem[0], tests=tests, inflation=given)
+    solution = adjust_ranges(problem[0], tests=tests, iterations=iterations, inflation=given)
     if solution.status.startswith("contradictory"):  # an answer all the same; `diagnosis` says what and where
         solution = replace(solution, status=CONVERGED)
     if solution.status != CONVERGED and not forced:
@@ -324,153 +324,3 @@ def _fits(network: Network, split: _Split, solution: RangingSolution, inflation:
             pvv = float(np.einsum("bi,bi->", v.reshape(-1, 3), np.linalg.solve(blocks, v.reshape(-1, 3, 1))[:, :, 0]))
         result.append(Fit(group.name, **column, pvv=pvv))
     return tuple(result)
-
-
-@dataclass(frozen=True, eq=False)
-class RangingCovariance:
-    """A ranging solution's covariance over the parameter vector of its network; see `covariance.Covariance`."""
-
-    solution: RangingSolution
-    station: np.ndarray
-    target: np.ndarray
-    zero: np.ndarray
-    scale: np.ndarray
-
-    @cached_property
-    def _own(self) -> np.ndarray:
-        """(n,) where each parameter of the network stands among the stations' parameters; -1 for targets'."""
-        count, width = len(self.station), self.solution.width
-        used = [c[c >= 0] for c in (self.zero, self.scale)]
-        place = np.full(3 * count + len(used[0]) + len(used[1]), -1)
-        at = np.flatnonzero(self.station >= 0)
-        place[3 * at[:, None] + np.arange(3)] = self.station[at][:, None] * width + np.arange(3)
-        for k, columns in ((3, self.zero), (4, self.scale)):
-            mine = np.flatnonzero(columns >= 0)
-            place[3 * count + columns[mine]] = mine * width + k
-        return place
-
-    @cached_property
-    def _across_targets(self) -> np.ndarray:
-        """(T, n, 3) covariance of the stations' parameters with each target."""
-        y = _response(self.solution, np.arange(len(self.solution.targets)))
-        across = np.einsum("ij,tjk->tik", self.solution.covariance, y, optimize=True)
-        gauge = self.solution._gauge
-        if gauge is not None and len(gauge.points):
-            across[gauge.points] -= np.einsum("nf,kif->kni", gauge.null, gauge.drift)
-        return across
-
-    def matrix(self) -> np.ndarray:
-        return self.within(np.arange(len(self._own)))
-
-    def across(self, columns: np.ndarray) -> np.ndarray:
-        """(n, k), a few columns at a time: targets follow the stations, and have a part of their own."""
-        own, n = self._own, len(self._own)
-        result = np.empty((n, len(columns)))
-        stations, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
-        joint = self.within(np.concatenate([stations, columns]))
-        by_station = joint[: len(stations), len(stations) :]  # (stations' parameters, columns)
-        result[stations] = by_station
-        y = _response(self.solution, np.arange(len(self.solution.targets)))
-        whole = np.zeros((len(self.solution.covariance), len(columns)))
-        whole[own[stations]] = by_station
-        moved = np.einsum("tni,nk->tik", y, whole, optimize=True)
-        gauge, mine = self.solution._gauge, own[columns] < 0
-        target, axis = self.target[columns // 3 * mine], columns % 3
-        for k in np.flatnonzero(mine).tolist():
-            moved[target[k], :, k] += self.solution._inverse[target[k]][:, axis[k]]
-        if gauge is not None and len(gauge.points):
-            drift = np.zeros((len(self.solution.targets), 3, gauge.null.shape[1]))
-            drift[gauge.points] = gauge.drift
-            follow = np.zeros((len(columns), gauge.null.shape[1]))  # of each column with the amounts of the motions
-            for k in range(len(columns)):
-                felt = y[target[k]][:, axis[k]] if mine[k] else np.eye(len(whole))[own[columns[k]]]
-                follow[k] = felt @ gauge.null
-            moved -= drift @ follow.T
-        result[late] = moved[self.target[late // 3], late % 3]
-        return result
-
-    def within(self, columns: np.ndarray) -> np.ndarray:
-        own = self._own[columns]
-        parameters, targets = np.unique(own[own >= 0]), np.unique(self.target[columns[own < 0] // 3])
-        joint = _joint(self.solution, parameters, targets)
-        at = np.empty(len(columns), dtype=int)
-        at[own >= 0] = np.searchsorted(parameters, own[own >= 0])
-        late = columns[own < 0]
-        at[own < 0] = len(parameters) + 3 * np.searchsorted(targets, self.target[late // 3]) + late % 3
-        return joint[np.ix_(at, at)]
-
-    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Rows of one station's parameters and one target's coordinates, or of either alone."""
-        at, a = np.maximum(columns, 0), np.where(columns < 0, 0.0, a)
-        own = self._own[at]
-        station = own >= 0
-        inside = np.where(station, own, 0)
-        a1 = np.where(station, a, 0.0)[:, :, None]
-        result = np.where(
-            station, (self.solution.covariance[inside[:, :, None], inside[:, None, :]] @ a1)[:, :, 0], 0.0
-        )
-        late = ~station & (columns >= 0)
-        rows = np.flatnonzero(late.any(axis=1))
-        late = late[rows]
-        target = np.max(np.where(late, self.target[np.where(late, at[rows] // 3, 0)], -1), axis=1)
-        axis = np.where(late, at[rows] % 3, 0)
-        # (k, w, 3) covariance of a row's parameters with its target
-        across = np.take_along_axis(self._across_targets[target], inside[rows][:, :, None], axis=1)
-        within = np.take_along_axis(self.solution.covariance_targets[target], axis[:, :, None], axis=1)
-        a2 = np.zeros((len(rows), 3))
-        np.add.at(a2, (np.arange(len(rows))[:, None], axis), np.where(late, a[rows], 0.0))
-        mine = np.where(late[:, :, None], within, np.where(station[rows][:, :, None], across, 0.0))
-        result[rows] += (mine @ a2[:, :, None])[:, :, 0]
-        felt = (a1[rows].transpose(0, 2, 1) @ np.where(station[rows][:, :, None], across, 0.0))[:, 0]
-        result[rows] += np.where(late, np.take_along_axis(felt, axis, axis=1), 0.0)
-        return result
-
-    def blocks(self, first: np.ndarray) -> np.ndarray:
-        count = len(self.station)
-        result = np.empty((count, 3, 3))
-        result[self.station >= 0] = self.solution.covariance_stations
-        result[self.target >= 0] = self.solution.covariance_targets
-        return result[first // 3]
-
-    def diagonal(self) -> np.ndarray:
-        own = self._own
-        result = np.empty(len(own))
-        late = np.flatnonzero(own < 0)
-        result[own >= 0] = np.diag(self.solution.covariance)[own[own >= 0]]
-        result[late] = self.solution.covariance_targets[self.target[late // 3], late % 3, late % 3]
-        return result
-
-
-def _response(solution: RangingSolution, targets: np.ndarray) -> np.ndarray:
-    """(k, n, 3) how targets follow the stations' parameters: minus V^-1 times what joins them, transposed."""
-    problem, p = solution._setup.problem, solution.width
-    place = np.full(len(solution.targets), -1)
-    place[targets] = np.arange(len(targets))
-    rows = np.flatnonzero(place[problem.target] >= 0)
-    seen = linearise(problem, solution._at, rows, problem.root[rows])
-    y = np.zeros((len(targets), len(solution.stations), p, 3))
-    np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
-    return y.reshape(len(targets), len(solution.covariance), 3) @ solution._inverse[targets]
-
-
-def _joint(solution: RangingSolution, parameters: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Joint covariance of some of the stations' parameters, then all coordinates of some targets."""
-    gauge = solution._gauge
-    if gauge is None:
-        raise EstimationError(f"no covariance: {solution.status}")
-    y = _response(solution, targets).transpose(1, 0, 2).reshape(len(solution.covariance), -1)
-    parts = np.zeros((len(solution.covariance), len(parameters)))
-    parts[parameters, np.arange(len(parameters))] = 1.0
-    maps = np.concatenate([parts, y], axis=1)
-    out = maps.T @ solution.covariance @ maps
-    first = len(parameters)
-    for i, target in enumerate(targets):
-        at = slice(first + 3 * i, first + 3 * i + 3)
-        out[at, at] += solution._inverse[target]
-    if len(gauge.points):
-        drift = np.zeros((len(solution.targets), 3, gauge.null.shape[1]))
-        drift[gauge.points] = gauge.drift
-        late = np.concatenate([np.zeros((first, drift.shape[2])), drift[targets].reshape(-1, drift.shape[2])])
-        moved = maps.T @ gauge.null
-        out -= moved @ late.T + late @ moved.T
-    return out

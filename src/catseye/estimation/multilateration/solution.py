@@ -128,34 +128,89 @@ class RangingSolution:
             raise EstimationError(self.status)
         return self
 
+    def following(self, targets: np.ndarray) -> np.ndarray:
+        """(k, 3, n) how targets (k,) move with the stations' parameters: minus V^-1 times what joins them."""
+        problem = self._setup.problem
+        place = np.full(len(self.targets), -1)
+        place[targets] = np.arange(len(targets))
+        rows = np.flatnonzero(place[problem.target] >= 0)
+        seen = linearise(problem, self._at, rows, problem.root[rows])
+        y = np.zeros((len(targets), len(self.stations), self.width, 3))
+        np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
+        return self._inverse[targets] @ y.reshape(len(targets), len(self.covariance), 3).transpose(0, 2, 1)
+
+    def joined(self, first: "Mapped", second: "Mapped") -> np.ndarray:
+        """Covariance (k, l) of some parameters with others; EstimationError without an answer or without tests.
+
+        M Q M' of the stations' parameters that they follow, V^-1 of coordinates of the same target, and what the datum
+        takes from those of its own targets.
+        """
+        gauge = self._gauge
+        if gauge is None:
+            raise EstimationError(f"no covariance: {self.status if self.status != CONVERGED else 'tests was False'}")
+        out = first.maps @ self.covariance @ second.maps.T
+        same = (first.target[:, None] == second.target) & (first.target[:, None] >= 0)
+        i, j = np.nonzero(same)
+        out[i, j] += self._inverse[first.target[i], first.axis[i], second.axis[j]]
+        if len(gauge.points):
+            one, two = (self._drift[m.target, m.axis] for m in (first, second))
+            out -= (first.maps @ gauge.null) @ two.T + one @ (second.maps @ gauge.null).T
+        return out
+
+    def products(self, chosen: "Mapped", a: np.ndarray) -> np.ndarray:
+        """(m, w) covariance of w parameters with the sum of a (m, w) times them, row by row; see `joined`.
+
+        chosen   maps (m, w, n), target and axis (m, w)
+        """
+        gauge, maps, target, axis = self._gauge, chosen.maps, chosen.target, chosen.axis
+        if gauge is None:
+            return np.full(a.shape, np.nan)
+        moved = np.einsum("mwn,mw->mn", maps, a, optimize=True)
+        out = (maps @ (moved @ self.covariance)[:, :, None])[:, :, 0]
+        same = (target[:, :, None] == target[:, None]) & (target[:, :, None] >= 0)
+        own = self._inverse[target[:, :, None], axis[:, :, None], axis[:, None]]
+        out += (np.where(same, own, 0.0) @ a[:, :, None])[:, :, 0]
+        if len(gauge.points):
+            drift = self._drift[target, axis]
+            taken = np.einsum("mwf,mw->mf", drift, a)
+            out -= ((maps @ gauge.null) @ taken[:, :, None] + drift @ (moved @ gauge.null)[:, :, None])[:, :, 0]
+        return out
+
+    @cached_property
+    def _drift(self) -> np.ndarray:
+        """(T + 1, 3, f) `Gauge.drift` of every target, zero outside the datum; the last for none, which is -1."""
+        assert self._gauge is not None
+        drift = np.zeros((len(self.targets) + 1, 3, self._gauge.null.shape[1]))
+        drift[self._gauge.points] = self._gauge.drift
+        return drift
+
     def joint(self, stations: Sequence[int] = (), targets: Sequence[int] = ()) -> np.ndarray:
         """Joint covariance (3k, 3k), m^2, of some stations, then some targets, each once, in the order given.
 
         Raises EstimationError without an answer or without tests.
         """
-        if self._gauge is None:
-            raise EstimationError(f"no covariance: {self.status if self.status != CONVERGED else 'tests was False'}")
-        problem, gauge, p = self._setup.problem, self._gauge, self.width
-        s, t = np.asarray(stations, dtype=np.int64), np.asarray(targets, dtype=np.int64)
-        place = np.full(len(self.targets), -1)
-        place[t] = np.arange(len(t))
-        rows = np.flatnonzero(place[problem.target] >= 0)
-        seen = linearise(problem, self._at, rows, problem.root[rows])
-        y = np.zeros((len(t), len(self.stations), p, 3))
-        np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
-        y = (y.reshape(len(t), -1, 3) @ self._inverse[t]).transpose(1, 0, 2).reshape(len(self.covariance), -1)
-        at = (s[:, None] * p + np.arange(3)).ravel()
-        parts = np.zeros((len(self.covariance), len(at)))
-        parts[at, np.arange(len(at))] = 1.0
-        maps = np.concatenate([parts, y], axis=1)
-        out = maps.T @ self.covariance @ maps
-        first = len(at)
-        for i, target in enumerate(t):
-            out[first + 3 * i : first + 3 * i + 3, first + 3 * i : first + 3 * i + 3] += self._inverse[target]
-        if len(gauge.points):
-            drift = np.zeros((len(self.targets), 3, gauge.null.shape[1]))
-            drift[gauge.points] = gauge.drift
-            late = np.concatenate([np.zeros((first, drift.shape[2])), drift[t].reshape(-1, drift.shape[2])])
-            moved = maps.T @ gauge.null
-            out -= moved @ late.T + late @ moved.T
-        return out
+        s, t, xyz = np.asarray(stations, dtype=np.int64), np.asarray(targets, dtype=np.int64), np.arange(3)
+        own = np.eye(len(self.covariance))[(s[:, None] * self.width + xyz).ravel()]
+        chosen = Mapped(
+            np.concatenate([own, self.following(t).reshape(-1, len(self.covariance))]),
+            np.concatenate([np.full(len(own), -1), np.repeat(t, 3)]),
+            np.concatenate([np.zeros(len(own), dtype=np.int64), np.tile(xyz, len(t))]),
+        )
+        return self.joined(chosen, chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class Mapped:
+    """Some parameters of a ranging network, by how they follow the stations' parameters.
+
+    maps     (k, n) row of the identity for one of the stations' own, of `RangingSolution.following` for a target's
+    target   (k,) which target's coordinate it is; -1 for the stations' own
+    axis     (k,) 0, 1 or 2 of such a coordinate
+    """
+
+    maps: np.ndarray
+    target: np.ndarray
+    axis: np.ndarray
+
+    def __getitem__(self, rows: np.ndarray) -> "Mapped":
+        return Mapped(self.maps[rows], self.target[rows], self.axis[rows])
