@@ -474,7 +474,6 @@ class TestWhatIsAssumed:
             survey.ranges(name, *targets)
         answer = approximate(survey.network(*survey.names))
         assert answer.assumed == tuple(survey.names)
-        assert answer.assumption.endswith("of S0, S1, S2, S3 and 24 more")
 
     def test_a_level_network_with_nothing_known_or_one_point_alone(self):
         places = {"S": (60, -20, 31), "T": (0, 40, 20), "p": (100, 20, 33), "q": (40, 70, 28)}
@@ -490,7 +489,6 @@ class TestWhatIsAssumed:
         answer = approximate(survey.network("S", "p", "q"))
         assert answer.found == ("S", "p", "q")
         assert answer.assumed == ()
-        assert answer.assumption == ""
 
     @pytest.mark.parametrize("height", [0.0, 20.0])
     def test_the_sides_of_targets_that_stations_in_one_plane_see_but_not_of_those_given(self, height):

@@ -11,7 +11,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.adjustment import CONVERGED, NONCENTRALITY
 from catseye.estimation.diagnosis import label
-from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, point_uncertainty, relative_covariance
+from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
 from catseye.estimation.external import effects_at_ends
 from catseye.estimation.network import Network, NetworkSolution, points_of
 from catseye.estimation.reliability import (
@@ -271,11 +271,6 @@ class Findings:
     def u(self) -> np.ndarray:
         """(n, 3) m, standard uncertainties of the coordinates."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
-
-    @cached_property
-    def u_point(self) -> np.ndarray:
-        """(n,) m, root of the trace of the covariance."""
-        return point_uncertainty(self.covariance)
 
     @cached_property
     def u_parameters(self) -> np.ndarray:

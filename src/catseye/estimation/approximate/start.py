@@ -59,14 +59,6 @@ class Approximation(NamedTuple):
     assumed: tuple[str, ...] = ()
     replaced: tuple[str, ...] = ()
 
-    @property
-    def assumption(self) -> str:
-        """One line of words on `assumed`, for reports; empty where nothing is."""
-        if not self.assumed:
-            return ""
-        names = ", ".join(self.assumed[:4]) + (f" and {len(self.assumed) - 4} more" if len(self.assumed) > 4 else "")
-        return f"assumed, not observed: the side of a mirror plane, or the place of a whole figure, of {names}"
-
 
 def approximate(network: Network) -> Approximation:
     """Start values of all points and of the orientations, level heights and poses among the parameters.
