@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError
+from catseye.estimation import network_adjustment
 from catseye.estimation.datum import motions
 from catseye.estimation.network import Network, Parameter, Points
 from catseye.estimation.network_adjustment import adjust_network
-from catseye.estimation.observations import Azimuths, Coordinates, Directions, Distances, ZenithAngles
+from catseye.estimation.observations import Azimuths, Coordinates, Directions, Distances, Vectors, ZenithAngles
 
 ENGINES = ("dense", "sparse")
 
@@ -84,7 +85,11 @@ def test_sparse_and_dense_agree(ranging_network):
 @pytest.mark.parametrize(("sigma", "size"), [(1e-9, 100.0), (5e-5, 100.0), (1e-6, 1e5), (1e-3, 0.01)])
 def test_rank_does_not_depend_on_units_or_sigmas(ranging_network, engine, sigma, size):
     good, _ = ranging_network(6, sigma=sigma, size=size, off=1e-6)
-    assert adjust_network(good, engine=engine).status == "converged"
+    solution = adjust_network(good, engine=engine)
+    assert solution.status == "converged"
+    conditions = motions(good.points.xyz)[:, :6].T * good.points.datum.ravel()  # in its datum, covariance too
+    joint = conditions @ solution.block(good.points.names) @ conditions.T
+    assert np.abs(joint).max() < 1e-6 * np.trace(solution.covariance.sum(axis=0))
     last = 3 * (len(good.points.names) - 1)
     lost = (good.groups[0].target != last) | (good.groups[0].origin < 6)
     bad = adjust_network(with_ranges(good, keep=lost), engine=engine)
@@ -316,3 +321,22 @@ def test_given_coordinates_exchanged_in_the_datum_are_named_though_every_range_f
     assert good.status == "converged"
     assert solution.variance_factor == pytest.approx(good.variance_factor, rel=1e-6)
     assert solution.status.startswith("converged, but S03 and S07 lie at each other's given places")
+
+
+def test_points_on_a_line_do_not_turn_about_it():
+    true, everywhere = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 3.0]]), np.ones((2, 3), dtype=bool)
+    vector = Vectors("v", np.array([10.01, 0.0, 3.0]), np.full(3, 1e-6), np.array([0]), np.array([3]))
+    solution = adjust_network(Network(Points(("A", "B"), true, ~everywhere, everywhere), (), (vector,)))
+    assert solution.status == "converged"
+    assert solution.datum.endswith("against shift along x, shift along y, shift along z")
+    np.testing.assert_allclose(solution.x, [[-0.005, 0, 0], [10.005, 0, 3]], atol=1e-12)
+    np.testing.assert_allclose(solution.covariance, np.tile(np.eye(3) * 1e-6 / 4, (2, 1, 1)), atol=1e-15)
+
+
+def test_a_network_that_does_not_come_to_rest_in_its_datum_says_so(ranging_network, monkeypatch):
+    network, _ = ranging_network(24, off=0.5)
+    monkeypatch.setattr(
+        network_adjustment, "PASSES", 1
+    )  # the first pass holds the fewest coordinates, half a metre off
+    solution = adjust_network(network, engine="dense")
+    assert solution.status.startswith("not converged: the network does not come to rest in its datum")

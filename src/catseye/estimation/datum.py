@@ -99,6 +99,8 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     if still.any():  # a held coordinate must not move
         _, singular, turned = np.linalg.svd(h[still], full_matrices=True)
         allowed = turned[int(np.sum(singular > 1e-9 * np.sqrt(len(xyz)))) :].T
+    _, singular, turned = np.linalg.svd(h @ allowed, full_matrices=False)
+    allowed = allowed @ turned[singular > 1e-9 * np.sqrt(len(xyz))].T  # points on a line do not turn about it
     others = coordinates + np.flatnonzero(free[coordinates:] & (norms[coordinates:] > 0.0))
     if not (allowed.size and norms[:coordinates].any()):
         return Floating(np.zeros((n, 0)), np.zeros((7, 0)), centre, size)

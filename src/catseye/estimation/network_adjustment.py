@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import Solution, adjust
+from catseye.estimation.adjustment import CONVERGED, Solution, adjust
 from catseye.estimation.covariance import Covariance
 from catseye.estimation.datum import (
     Floating,
@@ -24,11 +24,14 @@ from catseye.estimation.rows import Rows, variances
 FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
 DATUMS = ("free", "fixed")
 PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
-SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order
+SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order,
+UNDONE = 1e-6  # nor does one that leaves less than this share of the usual standard uncertainty undone
 
 NO_DATUM = "rank deficient: the network floats ({motions}) and nothing holds it; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
 WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network against {motions}; mark more of them"
+NOT_SETTLED = "not converged: the network does not come to rest in its datum after {passes} passes; \
+check the starting coordinates"
 NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
 
 
@@ -212,6 +215,7 @@ class _Problem:
         x, taken = self.x0, 0
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: Solution | None = None
+        settled = False
         for _ in range(PASSES):
             try:
                 floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
@@ -239,21 +243,29 @@ class _Problem:
             )
             taken += solution.iterations
             x = solution.x
-            if not solution.solved or not len(conditions):
+            settled = not len(conditions)
+            if not solution.solved or settled:
                 break
             floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
-            if floating.motions.shape[1] != len(conditions):
-                break
+            if floating.motions.shape[1] != len(conditions):  # told wrongly from a poor start: once more from here
+                continue
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
             x = x + moved
             size = float(np.ptp(x[:n].reshape(-1, 3), axis=0).max())
-            if np.abs(moved[:n]).max() <= SETTLED * size:
+            limit = SETTLED * size
+            if tests:  # what a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties
+                u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0))
+                limit = max(limit, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
+            settled = bool(np.abs(moved[:n]).max() <= limit)
+            if settled:
                 if tests:
                     solution = replace(solution, q=transformed(solution.q, t, conditions))
                 break
         assert solution is not None
         solution = replace(solution, x=x, iterations=taken)
+        if not settled and solution.status == CONVERGED:
+            solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
         if len(solution.floating):
             status = unconnected(self.network) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
