@@ -272,4 +272,49 @@ SOURCES: dict[str, Source] = {
         locator="JCGM 102:2011",
         used="clause 6.5.2: coverage factors of ellipsoidal regions",
     ),
+    "RILEY08": Source(
+        title="W. J. Riley, Handbook of frequency stability analysis, NIST Special Publication 1065, 2008",
+        locator="NIST SP 1065",
+        used="eq. 11 (overlapping Allan deviation), tables 3 and 5, section 12 (series of 1000 readings)",
+    ),
+    "WHITTLE53": Source(
+        title="P. Whittle, Estimation and information in stationary time series, Arkiv för Matematik, 1953",
+        locator="doi:10.1007/BF02590998",
+        used="likelihood of a periodogram",
+    ),
+    "RIFE74": Source(
+        title="D. C. Rife and R. R. Boorstyn, Single-tone parameter estimation from discrete-time observations, 1974",
+        locator="doi:10.1109/TIT.1974.1055282",
+        used="Cramér-Rao bounds of amplitude, phase and frequency of a tone in white noise",
+    ),
+    "ISO5725": Source(
+        title="ISO 5725-2, Accuracy of measurement methods and results, part 2: repeatability and reproducibility",
+        locator="ISO 5725-2:2019",
+        used="section 7.4: mean squares within and between, unequal sets",
+    ),
+    "SIEGMAN86": Source(
+        title="A. E. Siegman, Lasers, University Science Books, 1986",
+        locator="ISBN 978-0-935702-11-8",
+        used="chapter 17: radius and curvature of a Gaussian beam, share through an aperture",
+    ),
+    "GOODMAN05": Source(
+        title="J. W. Goodman, Introduction to Fourier optics, third edition, Roberts, 2005",
+        locator="ISBN 978-0-9747077-2-3",
+        used="chapter 4: Fresnel's diffraction integral",
+    ),
+    "YARIV97": Source(
+        title="A. Yariv, Optical electronics in modern communications, fifth edition, Oxford, 1997",
+        locator="ISBN 978-0-19-510626-8",
+        used="chapter 10: shot noise and thermal noise of optical detection",
+    ),
+    "IRVINE81": Source(
+        title="H. M. Irvine, Cable structures, MIT Press, 1981",
+        locator="ISBN 978-0-262-09023-3",
+        used="section 1.4: the elastic catenary",
+    ),
+    "ISO1": Source(
+        title="ISO 1, Standard reference temperature for the specification of geometrical properties",
+        locator="ISO 1:2022",
+        used="20 °C",
+    ),
 }
