@@ -26,7 +26,7 @@ SOURCES: dict[str, Source] = {
     "PARKER04": Source(
         title="D. H. Parker, Working notes on the Green Bank Telescope laser metrology system, 2004",
         locator="National Radio Astronomy Observatory, 29 April 2004",
-        used="chapters 1 to 5: eqs. 1.1-1.53, 2.1-2.47, 3.1-3.7, 4.1-4.14, 5.1-5.19",
+        used="chapters 1 to 8: eqs. 1.1-1.53, 2.1-2.47, 3.1-3.7, 4.1-4.14, 5.1-5.19",
         errata=(
             "1.12 prints p_r where 1.18 uses the temperature-corrected p_t",
             "1.31 prints + phi/2pi, 5.18 requires minus; 1.32-1.34 and 1.36-1.38 carry the wrong sign with it",
@@ -35,6 +35,9 @@ SOURCES: dict[str, Source] = {
             "2.44 omits the plus signs between X_r and its offset",
             "3.1 says the coordinates are unique: three ranges give two points, mirror images in the stations' plane",
             "2.5 (example) says the y origin is the tooling ball of ZY2: z is meant",
+            "5.1.3 says the detected signal is mixed with 1500.000 MHz; 5.1.1, + IF, is right",
+            "5.2: clipping on top shifts a single edge, not the average of both edges that the Clark-Hess meter takes",
+            "5.9 prints -2pi/lambda/2; -2pi/(lambda/2) is meant",
             "5.14 and 5.17 print -2pi(n_i - n_0); 5.12 and 5.15 require +2pi(n_i - n_0)",
         ),
     ),
@@ -316,5 +319,25 @@ SOURCES: dict[str, Source] = {
         title="ISO 1, Standard reference temperature for the specification of geometrical properties",
         locator="ISO 1:2022",
         used="20 °C",
+    ),
+    "HARRIS78": Source(
+        title="F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform, 1978",
+        locator="doi:10.1109/PROC.1978.10837",
+        used="the Hann window and its equivalent noise bandwidth of 1.5 bins",
+    ),
+    "GRANDKE83": Source(
+        title="T. Grandke, Interpolation algorithms for discrete Fourier transforms of weighted signals, 1983",
+        locator="doi:10.1109/TIM.1983.4315077",
+        used="frequency from the two largest bins under a Hann window",
+    ),
+    "LANG80": Source(
+        title="R. Lang and K. Kobayashi, External optical feedback effects on semiconductor injection laser, 1980",
+        locator="doi:10.1109/JQE.1980.1070479",
+        used="the laser with a weak reflector: stationary phase condition",
+    ),
+    "ACKET84": Source(
+        title="G. A. Acket, D. Lenstra, A. J. den Boef, B. H. Verbeek, The influence of feedback intensity, 1984",
+        locator="doi:10.1109/JQE.1984.1072281",
+        used="the feedback parameter C",
     ),
 }

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.signal.drift import drift_at, reference_surprise
+from catseye.signal.drift import drift_along, drift_at, reference_surprise
 
 WALK = 3e-4  # rad per square root of a second, some ten times what ZY rangers show
 
@@ -176,3 +176,37 @@ def test_a_single_reference_surprises_nobody():
     difference, uncertainty = reference_surprise(np.zeros(1), np.zeros(1), np.ones(1), random_walk=WALK)
     assert np.isnan(difference).all()
     assert np.isnan(uncertainty).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_short_way_along_is_the_diagonal_of_the_long_one(seed):
+    t, phase, variance = references(seed)
+    variance[seed] = 0.0  # one exact reference
+    shuffled = np.random.default_rng(seed).permutation(6)
+    time = np.concatenate([np.random.default_rng(seed + 300).uniform(-200, 900, 40), t, [t[0] - 1e-9]])
+    mean, covariance = drift_at(t, phase, variance, time, random_walk=WALK)
+    short, u = drift_along(t[shuffled], phase[shuffled], variance[shuffled], time, random_walk=WALK)
+    np.testing.assert_allclose(short, mean, rtol=0, atol=1e-11)
+    # the long way keeps exact references apart by a part in 1e12, and loses digits by it
+    np.testing.assert_allclose(u**2, np.diag(covariance), rtol=1e-6, atol=1e-6 * WALK**2)
+
+
+def test_the_short_way_takes_half_a_million_shots_and_thousands_of_references():
+    rng = np.random.default_rng(5)
+    t = np.sort(rng.uniform(0, 1e5, 3000))
+    phase = np.cumsum(rng.standard_normal(3000)) * WALK * 5
+    time = rng.uniform(0, 1e5, 500_000)
+    mean, u = drift_along(t, phase, np.full(3000, 1e-8), time, random_walk=WALK)
+    some = np.arange(0, 500_000, 100_000)
+    near = np.abs(t - time[some][:, None]).min(axis=0) < 3000  # far references no longer count
+    expected, covariance = drift_at(t[near], phase[near], np.full(near.sum(), 1e-8), time[some], random_walk=WALK)
+    np.testing.assert_allclose(mean[some], expected, rtol=0, atol=1e-9)
+    # the floor that keeps exact references apart is 1e-12 of the walk's variance over the whole time, 5e-7 of the noise
+    np.testing.assert_allclose(u[some] ** 2, np.diag(covariance), rtol=5e-6)
+
+
+def test_without_a_walk_the_short_way_is_the_weighted_mean():
+    t, phase, variance = references(3)
+    mean, u = drift_along(t, phase, variance, np.array([-1e4, t[2], 1e4]), random_walk=0.0)
+    np.testing.assert_allclose(mean, (phase / variance).sum() / (1 / variance).sum(), rtol=1e-9)
+    np.testing.assert_allclose(u**-2, (1 / variance).sum(), rtol=1e-9)
