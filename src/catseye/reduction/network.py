@@ -12,6 +12,7 @@ from catseye.estimation.observations import Distances, Linear, Observations
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.records.triplet import Triplet
 from catseye.reduction.air import AirField
+from catseye.reduction.head import head_unknowns
 from catseye.reduction.places import Place, places_of, unit
 from catseye.reduction.ranges import Electronics, Phases
 from catseye.reduction.settings import Settings
@@ -21,6 +22,7 @@ AIR = "the air"  # no point can have this name: it has a blank
 APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
 ZEROS = "ranger zeros"
+HEADS = "head effects"
 
 
 @dataclass
@@ -71,8 +73,8 @@ def build_network(
     """The unknowns and priors of a campaign.
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
-    points, each firing ranger's zero and rest of leakage, the air's offsets, two tilts of every prism face, and the
-    rest of every glass constant.
+    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets,
+    two tilts of every prism face, and the rest of every glass constant.
     """
     places = places_of(campaign)
     fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
@@ -90,6 +92,8 @@ def build_network(
     for name in sorted(shooting):
         layout.add(f"zero {name}", [""], [0.0])
         layout.add(f"leakage {name}", ["real", "imaginary"], [0.0, 0.0])
+        for unknown in head_unknowns(campaign, name):
+            layout.add(unknown.name, unknown.parts, np.zeros(len(unknown.parts)))
     air = AirField.of(campaign, settings)
     layout.add(AIR, air.names, np.zeros(len(air.names)))
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
@@ -171,7 +175,7 @@ def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[
 
 
 def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
-    """Zeros and leakage of the rangers that fired, as calibrated."""
+    """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
     rangers = [n for n in campaign.rangers if f"zero {n}" in layout.at]
     mirrors = [campaign.mirror_of(n) for n in rangers]
     zeros = [layout.at[f"zero {n}"] for n in rangers]
@@ -181,7 +185,19 @@ def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
     return [
         _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
         _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
+        *(_head(campaign, n, layout) for n in rangers if head_unknowns(campaign, n)),
     ]
+
+
+def _head(campaign: Campaign, name: str, layout: Layout) -> Linear:
+    """How far the effects of one ranger's head may be off its sheet."""
+    zp = campaign.mirror_of(name).zp
+    columns: list[int] = []
+    u: list[float] = []
+    for unknown in head_unknowns(campaign, name):
+        columns.extend(layout.columns(unknown.name, len(unknown.parts)))
+        u.extend([_positive(unknown.u, f"mirrors/{zp}.toml: {unknown.key}")] * len(unknown.parts))
+    return _independent(HEADS, columns, np.zeros(len(columns)), u)
 
 
 def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[Observations]:

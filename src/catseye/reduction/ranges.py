@@ -8,10 +8,11 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.settings import Settings
+from catseye.signal.buffers import BufferStatus, inspect_buffers
+from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
 from catseye.signal.cycles import fraction
 from catseye.signal.drift import drift_at, reference_surprise
 from catseye.signal.leakage import subtract_leakage
-from catseye.signal.phase import detect
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
 
@@ -26,7 +27,9 @@ class Phases:
     """What every shot's samples say, in the order of the campaign's shots.
 
     phasor      V, complex, free of leakage
-    u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter
+    u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter, the two taken as alike
+    u_across    V, of the quadrature that turns the phasor, noise that is alike in neighbouring cycles allowed for; below
+                16 cycles u_phasor itself
     offset      V
     harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
     largest     V, largest magnitude of a sample
@@ -35,6 +38,7 @@ class Phases:
 
     phasor: np.ndarray
     u_phasor: np.ndarray
+    u_across: np.ndarray
     offset: np.ndarray
     harmonics: np.ndarray
     largest: np.ndarray
@@ -54,7 +58,7 @@ class Phases:
     def u_phase(self) -> np.ndarray:
         """rad, from the samples' noise; infinite without a return."""
         amplitude = self.amplitude
-        return np.divide(self.u_phasor, amplitude, out=np.full_like(self.u_phasor, np.inf), where=amplitude > 0.0)
+        return np.divide(self.u_across, amplitude, out=np.full_like(self.u_across, np.inf), where=amplitude > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,8 @@ class Electronics:
     shots        (m,) indices into the campaign's shots
     phase        (m,) rad
     covariance   (m, m) rad^2, from the noise of the references and the walk between them
-    reference    (m,) V, complex: the reference phasor that the leakage acts on
+    reference    (m,) V, complex: the reference phasor that the leakage acts on; its magnitude, the cube's return at
+                 that instant, is what amplitude-to-phase coupling counts from
     """
 
     shots: np.ndarray
@@ -78,7 +83,7 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
 
     A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
     leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
-    changed, for a return; clipped when a sample stands at the converter's end.
+    changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see `signal.buffers`.
     """
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
@@ -86,7 +91,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
     ends = (-(2 ** (adc.bits - 1)), 2 ** (adc.bits - 1) - 1)
     raw = np.zeros(n, dtype=complex)
     u_phasor, offset, largest, clipped = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=int)
-    harmonics = np.zeros((n, 2))
+    harmonics, total, between = np.zeros((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    wrong = [""] * n
     shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
     done = 0
     for cycles, samples_per_cycle in shapes:
@@ -94,7 +100,12 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
         for start in range(0, len(alike), 64):
             rows = alike[start : start + 64]
             samples = campaign.frames[shots.frame[rows], : cycles * samples_per_cycle]
-            found = detect(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+            seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+            found = seen.detection
+            for k, row in enumerate(rows):
+                if seen.status[k] in (BufferStatus.DROPOUT, BufferStatus.STUCK):
+                    wrong[row] = seen.text(k)
+            total[rows], between[rows] = found.scatter.total, found.scatter.between
             raw[rows], u_phasor[rows], offset[rows] = found.phasor, found.u_phasor, found.offset
             harmonics[rows], largest[rows], clipped[rows] = found.harmonics, found.largest, found.clipped
             done += len(rows)
@@ -107,6 +118,9 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
         np.array([m.leakage_amplitude_volt for m in mirrors]),
         np.array([m.leakage_phase_rad for m in mirrors]),
     )
+    scatter = CycleScatter(shots.cycles, total, between, np.zeros(n, dtype=np.int64))
+    enough = shots.cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
+    u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), u_phasor)
     u_dark = np.hypot(u_phasor, [m.u_leakage_volt for m in mirrors])
     amplitude = np.abs(phasor)
     usual = _usual_amplitude(campaign, amplitude)
@@ -130,8 +144,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
                 f"{mirrors[k].leakage_amplitude_volt:.4f} V: converter or cable"
             )
         else:
-            reason.append("")
-    return Phases(phasor, u_phasor, offset, harmonics, largest, tuple(reason))
+            reason.append(wrong[k])
+    return Phases(phasor, u_phasor, u_across, offset, harmonics, largest, tuple(reason))
 
 
 def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:

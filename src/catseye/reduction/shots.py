@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.observations import Distances
 from catseye.optics.prism import obliquity_correction, obliquity_slope
+from catseye.reduction.head import HeadCorrections, head_corrections
 from catseye.reduction.network import AIR, Network
 from catseye.reduction.places import unit
 from catseye.reduction.ranges import Electronics
@@ -16,7 +17,18 @@ from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
 
 @dataclass(frozen=True, eq=False)
 class ShotParts:
-    """The pieces of one ranger's ranges, for the record of every correction."""
+    """The pieces of one ranger's ranges, for the record of every correction.
+
+    name, electronics  of the ranger; its other fields have a row a shot
+    target             names
+    phase              rad, the target's after the electronics', as measured
+    cycles, margin     whole half wavelengths and how far the coarse length was from another number, m
+    refractivity       n_g - 1 along the path
+    incidence          rad, on a prism's face
+    glass, obliquity   Pc and dPc, m
+    leakage_slope      (m, 2) m/V, of the observed optical length by the rest of leakage
+    head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
+    """
 
     name: str
     electronics: Electronics
@@ -29,6 +41,7 @@ class ShotParts:
     glass: np.ndarray
     obliquity: np.ndarray
     leakage_slope: np.ndarray
+    head: HeadCorrections
 
 
 def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, ShotParts]:
@@ -57,13 +70,23 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
-    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]])
+    lit, cube = phases.phasor[rows], electronics.reference
+    head = head_corrections(
+        campaign,
+        name,
+        layout.at,
+        sight=b - a,
+        phase=phase,
+        amplitude=np.abs(lit),
+        reference_amplitude=np.abs(cube),
+        index=n,
+    )
+    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]] - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
 
     # Leakage left over, complex dL: a phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
     per_radian = -half / TWO_PI
-    lit, cube = phases.phasor[rows], electronics.reference
     turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
     leakage_slope = per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
 
@@ -79,7 +102,7 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
         origin=origin,
         target=target,
         scale=n,
-        offset=-n * (glass + obliquity + d0)
+        offset=-n * (glass + obliquity + d0 + head.value)
         - distance * (air.slopes @ x[air_columns])
         + n * np.sum(normal_slopes * x[normal_columns], axis=1),
         nuisance=np.concatenate(
@@ -89,6 +112,7 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
                 np.broadcast_to(air_columns, (m, len(air_columns))),
                 normal_columns,
                 rest_columns[:, None],
+                head.columns,
             ],
             axis=1,
         ),
@@ -99,12 +123,24 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
                 distance[:, None] * air.slopes,
                 -n[:, None] * normal_slopes,
                 (-n * has_rest)[:, None],
+                -n[:, None] * head.slopes,
             ],
             axis=1,
         ),
     )
     parts = ShotParts(
-        name, electronics, targets, phase, cycles, margin, air.refractivity, incidence, glass, obliquity, leakage_slope
+        name=name,
+        electronics=electronics,
+        target=targets,
+        phase=phase,
+        cycles=cycles,
+        margin=margin,
+        refractivity=air.refractivity,
+        incidence=incidence,
+        glass=glass,
+        obliquity=obliquity,
+        leakage_slope=leakage_slope,
+        head=head,
     )
     return group, parts
 
