@@ -74,7 +74,7 @@ SOURCES: dict[str, Source] = {
     "RUEGER90": Source(
         title="J. M. Rüeger, Electronic Distance Measurement: An Introduction, third edition, Springer, 1990",
         locator="doi:10.1007/978-3-642-97196-9",
-        used="eqs. 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them",
+        used="eqs. 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them; velocity corrections",
     ),
     "OWENS67": Source(
         title="J. C. Owens, Optical refractive index of air: dependence on pressure, temperature and composition, 1967",
@@ -124,7 +124,7 @@ SOURCES: dict[str, Source] = {
     "FOERSTNER16": Source(
         title="W. Förstner and B. P. Wrobel, Photogrammetric Computer Vision, Springer, 2016",
         locator="doi:10.1007/978-3-319-11550-4",
-        used="chapter 4: Gauss-Markov model, evaluation of the result, robust estimation and outlier detection",
+        used="chapters 3 and 4: tests of hypotheses, Gauss-Markov model, evaluation of the result, robust estimation and outlier detection",
     ),
     "HUBER09": Source(
         title="P. J. Huber and E. M. Ronchetti, Robust Statistics, second edition, Wiley, 2009",
@@ -134,7 +134,7 @@ SOURCES: dict[str, Source] = {
     "JCGM100": Source(
         title="JCGM, Evaluation of measurement data: guide to the expression of uncertainty in measurement, 2008",
         locator="JCGM 100:2008",
-        used="eq. 10: combined standard uncertainty of uncorrelated inputs",
+        used="4.2.3 (mean), eqs. 10, 13, 16 and G.2b (combined uncertainty, degrees of freedom), 5.1.3, annexes G and H.1",
     ),
     "BAARDA73": Source(
         title="W. Baarda, S-transformations and criterion matrices, Netherlands Geodetic Commission, 1973",
@@ -290,7 +290,7 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1109/TIT.1974.1055282",
         used="Cramér-Rao bounds of amplitude, phase and frequency of a tone in white noise",
     ),
-    "ISO5725": Source(
+    "ISO19": Source(
         title="ISO 5725-2, Accuracy of measurement methods and results, part 2: repeatability and reproducibility",
         locator="ISO 5725-2:2019",
         used="section 7.4: mean squares within and between, unequal sets",
@@ -315,7 +315,7 @@ SOURCES: dict[str, Source] = {
         locator="ISBN 978-0-262-09023-3",
         used="section 1.4: the elastic catenary",
     ),
-    "ISO1": Source(
+    "ISO22": Source(
         title="ISO 1, Standard reference temperature for the specification of geometrical properties",
         locator="ISO 1:2022",
         used="20 °C",
@@ -339,5 +339,25 @@ SOURCES: dict[str, Source] = {
         title="G. A. Acket, D. Lenstra, A. J. den Boef, B. H. Verbeek, The influence of feedback intensity, 1984",
         locator="doi:10.1109/JQE.1984.1072281",
         used="the feedback parameter C",
+    ),
+    "ISO98": Source(
+        title="ISO 3650, Geometrical product specifications, length standards, gauge blocks, 1998",
+        locator="ISO 3650:1998",
+        used="definition of a gauge block's length, wrung",
+    ),
+    "JCGM101": Source(
+        title="JCGM, Propagation of distributions using a Monte Carlo method, supplement 1 to the guide, 2008",
+        locator="JCGM 101:2008",
+        used="clauses 6.4 (distributions), 7.2-7.9 (Monte Carlo, adaptive), 8.1 (validation), 9.2 and 9.4 (tests)",
+    ),
+    "ISO12": Source(
+        title="ISO 17123-4, Field procedures for testing geodetic instruments: electro-optical distance meters, 2012",
+        locator="ISO 17123-4:2012",
+        used="full test procedure: zero-point correction, experimental standard deviation, statistical tests a to c",
+    ),
+    "KENWARD97": Source(
+        title="M. G. Kenward, J. H. Roger, Small sample inference for fixed effects from restricted likelihood, 1997",
+        locator="doi:10.2307/2533558",
+        used="what estimated variance components add to the covariance of the parameters",
     ),
 }

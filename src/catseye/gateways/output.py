@@ -14,7 +14,14 @@ from catseye.gateways.interruption import deferred, undone_when_interrupted
 
 PROVENANCE = "provenance.json"
 FORMAT = "catseye-reduction-1"  # marks a directory as ours, so that it may be replaced; as do the next
-FORMATS = (FORMAT, "catseye-adjustment-1", "catseye-comparison-1", "catseye-plan-1")
+FORMATS = (
+    FORMAT,
+    "catseye-adjustment-1",
+    "catseye-comparison-1",
+    "catseye-plan-1",
+    "catseye-baseline-1",
+    "catseye-calibration-1",
+)
 
 
 def refuse_output(out: Path, campaign: Path) -> Path:
@@ -107,3 +114,34 @@ def _replace(where: Path, fresh: Path, old: Path) -> None:
     except OSError:
         os.rename(old, where)
         raise
+
+
+@contextmanager
+def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
+    """A text file that appears whole or not at all: what the block puts into the list.
+
+    path     as the user wrote it: new, or an earlier file of catseye, one that holds `mark` in its first 4096 bytes
+    option   that named it, for messages
+    mark     text that tells our files from others', such as format = "catseye-baseline-1"
+
+    Raises InputError where another's file would be lost or nothing can be written.
+    """
+    where = path.resolve()
+    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
+    pieces: list[str] = []
+    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+        try:
+            if where.is_dir():
+                raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
+            if where.exists():
+                with where.open("rb") as stream:
+                    if mark.encode() not in stream.read(4096):
+                        raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
+            yield pieces
+            fresh.write_text("".join(pieces), encoding="utf-8")
+            with deferred():
+                os.replace(fresh, where)
+        except OSError as problem:
+            raise InputError(f"{option} {path}: cannot be written: {problem.strerror or problem}") from problem
+        finally:
+            fresh.unlink(missing_ok=True)

@@ -155,7 +155,7 @@ def _axes(monument: Monument, mirror: Mirror, sight: np.ndarray) -> tuple[np.nda
         monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad
     )
     target = sight @ mirror_from_ground.T
-    prime = _only_prime(mirror, direction_angles(target)[0])
+    prime = only_prime(mirror, direction_angles(target)[0])
     theta, phi = beam_angles(target, offsets, prime=prime)
     if np.isnan(phi).any():
         raise ValidityError(
@@ -175,7 +175,7 @@ def _axes(monument: Monument, mirror: Mirror, sight: np.ndarray) -> tuple[np.nda
     return change_0 - change, slopes_0 - slopes
 
 
-def _only_prime(mirror: Mirror, theta: np.ndarray) -> np.ndarray:
+def only_prime(mirror: Mirror, theta: np.ndarray) -> np.ndarray:
     """Where the azimuth limits forbid the direct pointing and allow the prime one."""
 
     def allowed(count: np.ndarray) -> np.ndarray:

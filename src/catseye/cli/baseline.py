@@ -1,0 +1,199 @@
+"""The command of EDM baselines."""
+
+import math
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.commands import MODELS, Json, Quiet, _known_model, _uncertainty, app
+from catseye.cli.networks import Out, _level
+from catseye.cli.terminal import ProgressLine, say, wrapped
+
+if TYPE_CHECKING:
+    from catseye.records.baseline import Baseline, Heights, Observations
+    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline_lengths import BaselineSettings
+
+UNKNOWN = "unknown in the record where not given"
+
+
+def _above_zero(value: float | None) -> float | None:
+    if value is not None and not (0.0 < value < math.inf):
+        raise typer.BadParameter(f"{value} is not above zero.")
+    return value
+
+
+def _finite(value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def _day(value: str | None) -> str | None:
+    if value is not None:
+        try:
+            date.fromisoformat(value)
+        except ValueError as problem:
+            raise typer.BadParameter(f"{value!r} is not a day as 2026-11-21.") from problem
+    return value
+
+
+def _u(name: str, what: str):
+    return typer.Option(name, callback=_uncertainty, help=what)
+
+
+@app.command(
+    epilog="\b\nExample: catseye baseline observations.csv --heights heights.csv --write BASELINE.toml\n"
+    "         catseye baseline instrument.csv --heights heights.csv --against BASELINE.toml --out report"
+)
+def baseline(
+    observations: Annotated[
+        Path, typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: docs/formats/baseline.md.")
+    ],
+    heights: Annotated[
+        Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level without.")
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option("--against", metavar="BASELINE.toml", help="Known pillars: finds the instrument's scale, too."),
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="BASELINE.toml", help="Keep the pillars with full covariance.")
+    ] = None,
+    reference_index: Annotated[
+        float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
+    ] = 1.000286338,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Carrier in vacuum, µm.")] = 0.658,
+    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 420.0,
+    model: Annotated[
+        str, typer.Option("--model", metavar=MODELS, callback=_known_model, help="Formula for the index of air.")
+    ] = "ciddor_hill1999",
+    corrected: Annotated[
+        bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")
+    ] = False,
+    refraction: Annotated[
+        float, typer.Option("--refraction-k", callback=_finite, help="Coefficient of refraction.")
+    ] = 0.13,
+    reference_height_m: Annotated[
+        float | None,
+        typer.Option("--reference-height-m", callback=_finite, help="Height of the distances; the first pillar's."),
+    ] = None,
+    u_temperature_c: Annotated[float, _u("--u-temperature-c", "Common to all shots, °C (1σ).")] = 0.5,
+    u_pressure_hpa: Annotated[float, _u("--u-pressure-hpa", "Common to all shots, hPa (1σ).")] = 0.3,
+    u_humidity_percent: Annotated[float, _u("--u-humidity-percent", "Common to all shots, % (1σ).")] = 5.0,
+    u_scale_ppm: Annotated[float, _u("--u-scale-ppm", "Of the instrument's frequency, without --against (1σ).")] = 1.0,
+    u_direction_arcsec: Annotated[
+        float, typer.Option("--u-direction-arcsec", callback=_above_zero, help="Of a set's direction (1σ).")
+    ] = 0.6,
+    u_centring_mm: Annotated[float, _u("--u-centring-mm", "Across the line, for directions, mm (1σ).")] = 0.2,
+    unit_length_m: Annotated[
+        float | None,
+        typer.Option("--unit-length-m", callback=_above_zero, help="Of cyclic terms: half a wave; none without."),
+    ] = None,
+    orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Of cyclic terms.")] = 1,
+    specified_mm: Annotated[
+        float, typer.Option("--specified-mm", callback=_above_zero, help="Maker's claim a + b D: a, mm (1σ).")
+    ] = 0.6,
+    specified_ppm: Annotated[float, _u("--specified-ppm", "Maker's claim a + b D: b, ppm (1σ).")] = 1.0,
+    level: Annotated[float, typer.Option("--level", callback=_level, help="Level of each test.")] = 0.05,
+    reject: Annotated[bool, typer.Option("--reject", help="Leave out what the tests reject, one by one.")] = False,
+    serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None,
+    measured_on: Annotated[
+        str | None, typer.Option("--measured-on", callback=_day, metavar="YYYY-MM-DD", help=f"Day; {UNKNOWN}.")
+    ] = None,
+    by: Annotated[str | None, typer.Option("--by", help=f"Who measured; {UNKNOWN}.")] = None,
+    report: Annotated[str | None, typer.Option("--report", help=f"Where it is written up; {UNKNOWN}.")] = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
+    from catseye.reduction.baseline_lengths import BaselineSettings
+
+    settings = BaselineSettings(
+        air_model=model,
+        wavelength_um=wavelength_um,
+        co2_ppm=co2_ppm,
+        reference_index=reference_index,
+        corrected=corrected,
+        refraction=refraction,
+        u_temperature_c=u_temperature_c,
+        u_pressure_hpa=u_pressure_hpa,
+        u_humidity_percent=u_humidity_percent,
+        u_scale_ppm=u_scale_ppm,
+        u_direction_arcsec=u_direction_arcsec,
+        u_centring_mm=u_centring_mm,
+        unit_length=unit_length_m,
+        orders=orders,
+        specified_mm=specified_mm,
+        specified_ppm=specified_ppm,
+        level=level,
+        reject=reject,
+        reference_height=reference_height_m,
+    )
+    sources = [p for p in (observations, heights, against) if p is not None]
+    if out is not None:
+        from catseye.gateways.output import refuse_output
+
+        for source in sources:
+            refuse_output(out, source)
+    progress = ProgressLine(quiet)
+    try:
+        found, inputs = _calibrated(observations, heights, against, settings, progress)
+        if out is not None:
+            from catseye.gateways.baseline_files import write_calibration
+            from catseye.gateways.output import whole_directory
+
+            with whole_directory(out, observations) as directory:
+                write_calibration(found, directory, inputs, progress)
+        if write is not None:
+            from catseye.gateways.baseline_files import write_record
+
+            day = None if measured_on is None else date.fromisoformat(measured_on)
+            write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
+    finally:
+        progress.clear()
+    _tell(found, json, quiet, out, write)
+
+
+def _calibrated(
+    observations: Path, heights: Path | None, against: Path | None, settings: "BaselineSettings", progress: ProgressLine
+) -> "tuple[BaselineCalibration, dict[str, str]]":
+    """The calibration, and the SHA-256 of each file that was read."""
+    from catseye.records.baseline import digest_of, read_baseline, read_heights, read_observations
+    from catseye.reduction.baseline import calibrate_baseline
+
+    seen: Observations = read_observations(observations)
+    inputs = {observations.name: seen.digest}
+    tops: Heights | None = None
+    if heights is not None:
+        tops = read_heights(heights)
+        inputs[heights.name] = tops.digest
+    known: Baseline | None = None
+    if against is not None:
+        known = read_baseline(against)
+        inputs[against.name] = digest_of(against)
+    return calibrate_baseline(seen, tops, known, settings=settings, progress=progress), inputs
+
+
+def _tell(found: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
+    from catseye.gateways.baseline_objects import baseline_object, passages, spans
+
+    if json:
+        from catseye.gateways.objects import json_line
+
+        say(json_line(baseline_object(found)))
+        return
+    if quiet:
+        return
+    for passage in passages(found):
+        say(wrapped(passage.title, passage.text))
+    if len(found.names) <= 12:
+        for a, b, d, u in spans(found):
+            say(f"{'':<14}{a:>6} - {b:<6} {d:12.5f} m   u {u * 1e3:.3f} mm")
+    if out is not None:
+        say(wrapped("Written to", f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"))
+    if write is not None:
+        say(wrapped("Written to", f"{write}: the pillars with their full covariance"))

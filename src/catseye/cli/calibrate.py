@@ -1,0 +1,105 @@
+"""The commands of calibrations from tables of readings."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.terminal import say, wrapped
+from catseye.errors import InputError
+
+if TYPE_CHECKING:
+    from catseye.reduction.calibration import Calibration
+
+
+def _known(kind: str) -> str:
+    from catseye.reduction.calibrations import KINDS
+
+    if kind not in KINDS:
+        raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
+    return kind
+
+
+@app.command(
+    epilog="\b\nExample: catseye calibrate linearity examples/calibrations/linearity.csv --certificate zp103.html\n"
+    "Columns and keys of every KIND: docs/formats/calibrations.md"
+)
+def calibrate(
+    kind: Annotated[
+        str,
+        typer.Argument(metavar="KIND", callback=_known, help="What is calibrated: reference-distance, leakage, ..."),
+    ],
+    readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Table of readings.")],
+    sheet: Annotated[
+        Path | None,
+        typer.Option("--sheet", metavar="SHEET.toml", help="Who, when, with what; READINGS.toml if not given."),
+    ] = None,
+    reject: Annotated[
+        bool, typer.Option("--reject", help="Leave out readings that the tests reject, one by one.")
+    ] = False,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="RECORD.toml", help="Record to write: new, or an earlier one.")
+    ] = None,
+    certificate: Annotated[
+        Path | None,
+        typer.Option("--certificate", metavar="PAGE.html", help="Page to sign: new, or an earlier one."),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A calibration from a table of readings: record with uncertainties, residuals, tests and a certificate."""
+    from catseye.reduction.calibrations import calibrate as calibrated
+
+    _refuse_outputs(readings, sheet, write, certificate)
+    found = calibrated(kind, readings, sheet, reject=reject)
+    _write(found, write, certificate)
+    if json:
+        from catseye.gateways.certificate_record import calibration_object
+        from catseye.gateways.objects import json_line
+
+        say(json_line(calibration_object(found)))
+    elif not quiet:
+        _tell(found)
+        for what, path in (("Record", write), ("Certificate", certificate)):
+            if path is not None:
+                say(wrapped(what, str(path)))
+
+
+def _refuse_outputs(readings: Path, sheet: Path | None, write: Path | None, certificate: Path | None) -> None:
+    """Nothing that is read may be written, and two outputs need two names."""
+    inputs = [readings.resolve(), (sheet or readings.with_suffix(".toml")).resolve()]
+    for option, path in (("--write", write), ("--certificate", certificate)):
+        if path is not None and path.resolve() in inputs:
+            raise InputError(f"{option} {path}: is an input of this calibration (expected another name)")
+    if write is not None and certificate is not None and write.resolve() == certificate.resolve():
+        raise InputError(f"--write {write}: is the --certificate too (expected two names)")
+
+
+def _write(found: "Calibration", write: Path | None, certificate: Path | None) -> None:
+    """Both files whole; neither is begun when one of them may not be written."""
+    from contextlib import ExitStack
+    from datetime import UTC, datetime
+
+    from catseye.gateways.output import whole_file
+
+    pages = []
+    if write is not None:
+        from catseye.gateways.certificate_record import MARK, calibration_toml
+
+        pages.append((write, "--write", MARK, calibration_toml(found)))
+    if certificate is not None:
+        from catseye.gateways.certificate import MARK as PAGE_MARK
+        from catseye.gateways.certificate import certificate as drawn
+
+        pages.append((certificate, "--certificate", PAGE_MARK, drawn(found, datetime.now(UTC))))
+    with ExitStack() as files:
+        for path, option, mark, text in pages:
+            files.enter_context(whole_file(path, option, mark)).append(text)
+
+
+def _tell(found: "Calibration") -> None:
+    from catseye.gateways.certificate_text import passages
+
+    for title, text in passages(found):
+        say(wrapped(title, text))

@@ -1,0 +1,284 @@
+"""The linear model of a baseline: shots averaged over their sets, directions, places known before; and its solution.
+
+See `baseline` for what is modelled.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from catseye.errors import EstimationError
+
+LEAST_SEPARATION = 1e-4  # below it the parameters themselves are not determined; rounding and slopes fake as much
+
+
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """Shots between pillars.
+
+    start, end    (m,) numbers of pillars
+    set           (m,) number of the set, 0 to M - 1: shots in a row on one target
+    setup         (m,) number of the set-up, 0 to K - 1
+    distance      (m,) horizontal distance at the common height, m
+    stretch       (m,) what a metre more on the slope makes in it: 1 over the cosine of the slope
+    systematic    (m, q) what one standard uncertainty of each common effect adds, m
+    effects       (q,) their names
+    direction     (m,) horizontal circle reading, clockwise, rad; nan where none
+    u_direction   (m,) rad, of the reading as printed
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    set: np.ndarray
+    setup: np.ndarray
+    distance: np.ndarray
+    stretch: np.ndarray
+    systematic: np.ndarray
+    effects: tuple[str, ...]
+    direction: np.ndarray
+    u_direction: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.distance)
+
+    def only(self, keep: np.ndarray) -> "Sights":
+        """Some of the shots, sets and set-ups numbered anew."""
+        one, setup = (np.unique(c[keep], return_inverse=True)[1] for c in (self.set, self.setup))
+        return replace(
+            self,
+            start=self.start[keep],
+            end=self.end[keep],
+            set=one,
+            setup=setup,
+            distance=self.distance[keep],
+            stretch=self.stretch[keep],
+            systematic=self.systematic[keep],
+            direction=self.direction[keep],
+            u_direction=self.u_direction[keep],
+        )
+
+    @cached_property
+    def shots(self) -> np.ndarray:
+        """(M,) shots in each set."""
+        return np.bincount(self.set)
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """(M,) first shot of each set."""
+        return np.unique(self.set, return_index=True)[1]
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """(M, ...) means over the sets."""
+        total = np.zeros((len(self.shots), *values.shape[1:]))
+        np.add.at(total, self.set, values)
+        return total / self.shots.reshape(-1, *[1] * (values.ndim - 1))
+
+    @cached_property
+    def within(self) -> np.ndarray:
+        """(m,) each distance less its set's mean."""
+        return self.distance - self.mean(self.distance)[self.set]
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Places known before, with their covariance.
+
+    x, y         (n,) m
+    rows         (r,) which of [x, y] are known with covariance: i for x of pillar i, n + i for y
+    covariance   (r, r) m²
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    rows: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Extra:
+    """Further terms linear in their coefficients: cyclic terms, a response to the weather.
+
+    names     (e,)
+    columns   (m, e) what a coefficient of 1 adds to each distance, m
+    """
+
+    names: tuple[str, ...]
+    columns: np.ndarray
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Variances of the noise.
+
+    shot   of one shot, m²
+    set    of one set, m²; or (M,) of each
+    air    of one set, over the square of its distance
+    """
+
+    shot: float
+    set: Any
+    air: float
+
+
+class Model:
+    """The linear model at given values: sets' means, then directions, then places known before."""
+
+    def __init__(self, sights, x, y, known, scale, extra, u_centring):
+        self.sights, self.known, self.scale, self.extra, self.u_centring = sights, known, scale, extra, u_centring
+        n = len(x)
+        self.x0, self.y0 = x.copy(), y.copy()
+        self.start, self.end = sights.start[sights.first], sights.end[sights.first]
+        self.setup = sights.setup[sights.first]
+        self.distance, self.shots = sights.mean(sights.distance), sights.shots
+        self.systematic, self.stretch = sights.mean(sights.systematic), sights.mean(sights.stretch)
+        seen = np.isfinite(sights.direction)
+        self.aimed = np.flatnonzero(np.bincount(sights.set, seen) > 0)
+        self.direction, self.var_direction = self._directions(seen)
+        along = np.argsort(x, kind="stable")
+        touched = np.zeros(n, bool)
+        touched[self.start] = touched[self.end] = True
+        if known is not None:
+            self.free = known.rows
+        else:
+            missing = np.flatnonzero(~touched)
+            if len(missing):
+                raise EstimationError(f"pillar number {missing[0]} has no distance")
+            across = n + along[1:-1] if len(self.aimed) else np.empty(0, int)
+            self.free = np.concatenate([along[1:], across])
+        self.lengths = len(self.free)
+        aimed_setups = np.unique(self.setup[self.aimed])
+        self.names = (
+            *(f"x {i}" if i < n else f"y {i - n}" for i in self.free),
+            "zero",
+            *(("scale",) if scale else ()),
+            *(extra.names if extra is not None else ()),
+            *(f"orientation {k}" for k in aimed_setups),
+        )
+        self.orientation = {int(k): len(self.names) - len(aimed_setups) + i for i, k in enumerate(aimed_setups)}
+        unknown = 1 + int(scale) + (len(extra.names) if extra is not None else 0)
+        self.freedom_sets = len(self.distance) - unknown - (0 if known is not None else n - 1)
+
+    def _directions(self, seen):
+        """Mean of each aimed set, about its first reading, and the variance of the reading."""
+        s = self.sights
+        mean, variance = np.full(len(self.shots), np.nan), np.full(len(self.shots), np.nan)
+        for k in self.aimed:
+            mine = np.flatnonzero((s.set == k) & seen)
+            turn = s.direction[mine] - s.direction[mine[0]]
+            weight = 1.0 / s.u_direction[mine] ** 2
+            mean[k] = s.direction[mine[0]] + np.sum(weight * np.arctan2(np.sin(turn), np.cos(turn))) / np.sum(weight)
+            variance[k] = np.min(s.u_direction[mine]) ** 2  # repeats share what makes a reading wrong
+        return mean, variance
+
+    def at(self, values):
+        """Places for given values."""
+        n = len(self.x0)
+        both = np.concatenate([self.x0, self.y0])
+        both[self.free] += values[: self.lengths]
+        return both[:n], both[n:]
+
+    def rows(self, values):
+        """Misclosures and design of all rows."""
+        x, y = self.at(values)
+        i, j, n, m = self.start, self.end, len(x), len(self.distance)
+        dx, dy = x[j] - x[i], y[j] - y[i]
+        size = np.hypot(dx, dy)
+        every = np.zeros((m, 2 * n))
+        rows = np.arange(m)
+        for column, slope in ((j, dx / size), (i, -dx / size), (n + j, dy / size), (n + i, -dy / size)):
+            every[rows, column] += slope
+        rate = self.stretch**2  # a scale works on the slope, which is D/cos, and shows in D by 1/cos again
+        factor = 1.0 + rate * (values[self.lengths + 1] if self.scale else 0.0)
+        design = np.zeros((m, len(self.names)))
+        design[:, : self.lengths] = factor[:, None] * every[:, self.free]
+        design[:, self.lengths] = self.stretch
+        predicted = factor * size + self.stretch * values[self.lengths]
+        at = self.lengths + 1
+        if self.scale:
+            design[:, at] = rate * size
+            at += 1
+        if self.extra is not None:
+            columns = self.sights.mean(self.extra.columns)
+            design[:, at : at + columns.shape[1]] = columns
+            predicted = predicted + columns @ values[at : at + columns.shape[1]]
+        parts = [(self.distance - predicted, design), self._aims(values, dx, dy, size), self._priors(values)]
+        return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+
+    def _aims(self, values, dx, dy, size):
+        """Clockwise reading + orientation = -atan2(dy, dx)."""
+        k, n = self.aimed, len(self.x0)
+        design = np.zeros((len(k), len(self.names)))
+        every = np.zeros((len(k), 2 * n))
+        rows = np.arange(len(k))
+        across, along = (dy / size**2)[k], (-dx / size**2)[k]
+        i, j = self.start[k], self.end[k]
+        for column, slope in ((j, across), (i, -across), (n + j, along), (n + i, -along)):
+            every[rows, column] += slope
+        design[:, : self.lengths] = every[:, self.free]
+        orientation = np.array([self.orientation[int(s)] for s in self.setup[k]], int)
+        design[rows, orientation] = -1.0
+        turn = self.direction[k] + values[orientation] + np.arctan2(dy[k], dx[k])
+        return np.arctan2(np.sin(turn), np.cos(turn)), design
+
+    def _priors(self, values):
+        design = np.zeros((self.lengths if self.known is not None else 0, len(self.names)))
+        if self.known is None:
+            return np.zeros(0), design
+        design[:, : self.lengths] = np.eye(self.lengths)
+        both = np.concatenate([self.known.x - self.x0, self.known.y - self.y0])
+        return both[self.free] - values[: self.lengths], design
+
+    def cofactors(self):
+        """(3, M) diagonals of the noise of the means."""
+        return np.stack([1.0 / self.shots, np.ones(len(self.shots)), self.distance**2])
+
+    def noise_only(self, noise: Claim):
+        m, a, r = len(self.distance), len(self.aimed), self.lengths if self.known is not None else 0
+        v = np.zeros((m + a + r, m + a + r))
+        shot, one, square = self.cofactors()
+        v[:m, :m] = np.diag(noise.shot * shot + noise.set * one + noise.air * square)
+        size = self.distance[self.aimed]
+        v[m : m + a, m : m + a] = np.diag(self.var_direction[self.aimed] + 2 * (self.u_centring / size) ** 2)
+        return v
+
+    def variance(self, noise: Claim):
+        v, m = self.noise_only(noise), len(self.distance)
+        v[:m, :m] += self.systematic @ self.systematic.T
+        if self.known is not None:
+            v[-self.lengths :, -self.lengths :] = self.known.covariance
+        return v
+
+    def step(self, values, noise: Claim):
+        """The next step and what it came from."""
+        y, a = self.rows(values)
+        normal = Normal(y, a, self.variance(noise), self.names)
+        return normal.values, normal
+
+
+class Normal:
+    """Generalised least squares of dense rows: values, covariance, and the projector P."""
+
+    def __init__(self, y, a, v, names):
+        root = np.linalg.cholesky(v)
+        white, target = np.linalg.solve(root, a), np.linalg.solve(root, y)
+        length = np.linalg.norm(white, axis=0)
+        length = np.where(length > 0.0, length, 1.0)
+        u, size, vt = np.linalg.svd(white / length, full_matrices=False)
+        if len(y) < len(names) or size[-1] < LEAST_SEPARATION:
+            weak = ", ".join(names[i] for i in np.flatnonzero(np.abs(vt[-1]) > 0.2)[:6])
+            raise EstimationError(
+                f"the distances do not determine {weak}: measure more pairs, parts of the line and the whole of it"
+            )
+        self.separation = float(size[-1])
+        self.values = (vt.T @ ((u.T @ target) / size)) / length
+        scaled = vt.T / size / length[:, None]
+        self.covariance = scaled @ scaled.T
+        self.gain = scaled @ np.linalg.solve(root.T, u).T  # values = gain y
+        self.v, self.y, self.a = v, y, a
+        inverse = np.linalg.inv(root)
+        image = np.linalg.solve(root.T, u)
+        self.p = inverse.T @ inverse - image @ image.T
+        self.log_v = 2.0 * float(np.sum(np.log(np.diag(root))))
+        self.log_n = float(2.0 * np.sum(np.log(size)) + 2.0 * np.sum(np.log(length)))

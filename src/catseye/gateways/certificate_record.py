@@ -1,0 +1,144 @@
+"""A calibration as a record in TOML and as an object for JSON."""
+
+import json
+import math
+import re
+from collections.abc import Iterable
+from datetime import date
+from typing import Any
+
+import numpy as np
+
+from catseye import __version__
+from catseye.gateways.objects import plain
+from catseye.reduction.calibration import Calibration
+from catseye.reduction.calibrations.kind import PROVENANCE
+
+FORMAT = "catseye-calibration-1"
+MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
+COVERAGE = 2.0  # factor of the interval that a certificate states
+BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def calibration_object(found: Calibration) -> dict[str, Any]:
+    """A calibration as `catseye calibrate --json` gives it; units are in the keys, null stands for undefined."""
+    return plain(
+        {
+            "format": FORMAT,
+            "kind": found.kind,
+            "title": found.title,
+            **found.provenance,
+            "quantities": {
+                q.key: {
+                    "value": q.value,
+                    "u": q.u,
+                    "low": q.value - COVERAGE * q.u,
+                    "high": q.value + COVERAGE * q.u,
+                    "unit": q.unit,
+                    "meaning": q.meaning,
+                }
+                for q in found.quantities
+            },
+            "covariance_order": [q.key for q in found.quantities],
+            "covariance": found.covariance,
+            "coverage_factor": COVERAGE,
+            "record": found.record,
+            "variance_factor": found.variance_factor,
+            "degrees_of_freedom": found.degrees_of_freedom,
+            "decisions": [vars(decision) for decision in found.decisions],
+            "notes": found.notes,
+            "readings": [dict(zip(found.columns, row, strict=True)) for row in found.rows],
+            "not_used": [number for number, row in enumerate(found.rows) if not _used(row)],
+        }
+    )
+
+
+def _used(row: tuple[Any, ...]) -> bool:
+    return row[-1] in ("used", "suspect")
+
+
+def calibration_toml(found: Calibration) -> str:
+    """A calibration as its record: RECORD.toml, which `records.calibration.CalibrationRecord` reads back."""
+    said = found.provenance
+    head = {
+        "kind": found.kind,
+        "title": found.title,
+        **{key: said[key] for key in PROVENANCE},
+        "made_by": f"catseye {__version__}",
+        "variance_factor": found.variance_factor,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "method": found.method,
+        "notes": list(found.notes),
+    }
+    lines = [MARK, *_pairs(head)]
+    lines += ["", "# to copy into the record of the instrument", *_table("record", found.record)]
+    for q in found.quantities:
+        lines += ["", "[[quantity]]", *_pairs(vars(q))]
+    matrix = ",\n".join(f"  {_value([float(v) for v in row])}" for row in np.atleast_2d(found.covariance))
+    lines += ["", "[covariance]", f"order = {_value([q.key for q in found.quantities])}", f"matrix = [\n{matrix},\n]"]
+    for decision in found.decisions:
+        lines += ["", "[[decision]]", *_pairs(vars(decision))]
+    rows = ",\n".join(f"  {_value([_cell(cell) for cell in row])}" for row in found.rows)
+    lines += ["", "[readings]", f"columns = {_value(list(found.columns))}", f"rows = [\n{rows},\n]"]
+    for name in ("inputs_sha256", "sheet"):
+        lines += ["", *_table(name, said[name])]
+    return "\n".join(lines) + "\n"
+
+
+def record_lines(record: dict[str, Any]) -> list[str]:
+    """What can be copied into the instrument's record, as TOML; a table each where it belongs to several records."""
+    lines = list(_pairs({key: value for key, value in record.items() if not isinstance(value, dict)}))
+    for name, values in record.items():
+        if isinstance(values, dict):
+            lines += [f"# {name}", *_pairs(values)]
+    return lines
+
+
+def _table(name: str, values: dict[str, Any]) -> list[str]:
+    """A table and the tables in it."""
+    inner = {key: value for key, value in values.items() if isinstance(value, dict)}
+    lines = [f"[{name}]", *_pairs({key: value for key, value in values.items() if key not in inner})]
+    for key, value in inner.items():
+        lines += ["", *_table(f"{name}.{_key(key)}", value)]
+    return lines
+
+
+def _pairs(values: dict[str, Any]) -> Iterable[str]:
+    """Lines of key = value; what is undefined is left out, as TOML has no word for it."""
+    return [
+        f"{_key(key)} = {_value(value)}"
+        for key, value in values.items()
+        if value is not None and not (isinstance(value, float) and not math.isfinite(value))
+    ]
+
+
+def _cell(value: Any) -> Any:
+    """A cell of the readings; an undefined number is an empty text."""
+    return "" if value is None or (isinstance(value, float) and not math.isfinite(value)) else value
+
+
+def _key(name: str) -> str:
+    return name if BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Any) -> str:
+    """A value as TOML writes it.
+
+    >>> _value(["a", 1.5, True, 3])
+    '["a", 1.5, true, 3]'
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):  # a JSON string is a basic string of TOML but for one character
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, date):
+        return value.isoformat()
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return str(int(value))

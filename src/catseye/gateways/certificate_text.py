@@ -1,0 +1,38 @@
+"""What a terminal shows of a calibration."""
+
+from collections.abc import Iterator
+
+from catseye.gateways.certificate import rounded
+from catseye.reduction.calibration import Calibration
+
+STATE = "state"  # the last column, where rows are readings and not results
+
+
+def passages(found: Calibration) -> Iterator[tuple[str, str]]:
+    """(title, text) of each paragraph."""
+    said = found.provenance
+    yield (
+        "Calibration",
+        f"{found.title}; serial {said['serial']}, measured on {said['measured_on']} by {said['by']}, valid until "
+        f"{said['valid_until']}.",
+    )
+    for number, q in enumerate(found.quantities):
+        value, u = rounded(q.value, q.u)
+        yield "" if number else "Found", f"{q.key} = {value}, u {u} {q.unit}: {q.meaning}"
+    for number, decision in enumerate(found.decisions):
+        outcome = {True: "passed", False: "FAILED", None: "not judged"}[decision.passed]
+        numbers = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.limit == decision.limit else ""
+        yield "" if number else "Tests", f"{decision.name}{numbers}: {outcome}; {decision.text}"
+    odd = (
+        []
+        if found.columns[-1] != STATE
+        else [number for number, row in enumerate(found.rows, start=1) if row[-1] != "used"]
+    )
+    if odd:
+        states = ", ".join(f"{number} ({found.rows[number - 1][-1]})" for number in odd[:12])
+        more = f" and {len(odd) - 12} more" if len(odd) > 12 else ""
+        yield "Readings", f"{len(found.rows)}, of which {states}{more}"
+    elif found.columns[-1] == STATE:
+        yield "Readings", f"{len(found.rows)}, all used"
+    for number, note in enumerate(found.notes):
+        yield "" if number else "Notes", note

@@ -1,0 +1,421 @@
+"""An EDM baseline: shots and weather to pillars, and to the zero, scale and cyclic terms of the instrument.
+
+Signs: observed = (1 + scale) D + zero + cyclic. What an instrument shows too much is above zero; the correction that
+the standard adds to readings is -zero.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.baseline import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
+from catseye.estimation.baseline_iso17123 import FullTest, full_test
+from catseye.estimation.baseline_model import Claim, Extra, Known, Sights
+from catseye.records.baseline import Baseline, Heights, Observations, numbers_of
+from catseye.records.refusal import shown
+from catseye.reduction.baseline_lengths import BaselineSettings, Lengths, reduce_lengths
+from catseye.reduction.baseline_tests import Suspect, decisions_of, suspects_of
+from catseye.reduction.calibration import Decision
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineCalibration:
+    """All that a baseline told.
+
+    observations   as read
+    settings       assumptions
+    names          of the pillars, by their numbers
+    heights        (n,) m, or None
+    reference_height   m, or None
+    lengths        of all shots
+    keep           (m,) the shots used
+    solution       of those
+    test           the full test procedure with the sets' means, or why not
+    all_shots      the same with each shot as a distance of its own: its s is comparable with others' sheets
+    against        the known baseline, or None
+    decisions      tests
+    suspects       shots and sets that the tests reject
+    rejected       (m,) why a shot was left out, "" for the others
+    cyclic         names of the cyclic terms; empty where left out
+    weather        share of the weather's changes that the light followed, and its u: 1 expected
+    notes          what a person should know
+    """
+
+    observations: Observations
+    settings: BaselineSettings
+    names: tuple[str, ...]
+    heights: np.ndarray | None
+    reference_height: float | None
+    lengths: Lengths
+    keep: np.ndarray
+    solution: Solution
+    test: FullTest | str
+    all_shots: FullTest | None
+    against: Baseline | None
+    decisions: tuple[Decision, ...]
+    suspects: tuple[Suspect, ...]
+    rejected: tuple[str, ...]
+    cyclic: tuple[str, ...]
+    weather: tuple[float, float]
+    notes: tuple[str, ...]
+
+    @property
+    def order(self) -> np.ndarray:
+        """(n,) numbers of the pillars along the line."""
+        return np.argsort(self.solution.x, kind="stable")
+
+
+def calibrate_baseline(
+    seen: Observations,
+    heights: Heights | None = None,
+    against: Baseline | None = None,
+    *,
+    settings: BaselineSettings | None = None,
+    progress: Progress | None = None,
+) -> BaselineCalibration:
+    """Pillars and instrument from one table of shots.
+
+    seen       shots
+    heights    of the pillars; None takes them for level
+    against    known pillars; None finds them, the scale being as good as the instrument's frequency
+    settings   assumptions
+    progress   told of the steps
+
+    Raises InputError for tables that do not join, EstimationError where the shots do not determine the answer.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+        return _calibrated(seen, heights, against, settings or BaselineSettings(), progress)
+
+
+def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Progress | None) -> BaselineCalibration:
+    notes: list[str] = []
+    seen_names = _ordered(seen, heights, against)
+    seen = _renumbered(seen, seen_names)
+    height, u_height, reference = _heights(seen, heights, against, settings, notes)
+    lengths = reduce_lengths(seen, height, u_height, reference or 0.0, settings)
+    if against is None and settings.u_scale_ppm > 0.0:
+        by_scale = lengths.stretch**2 * lengths.distance * settings.u_scale_ppm * PPM
+        columns = np.concatenate([lengths.systematic, by_scale[:, None]], axis=1)
+        lengths = replace(lengths, systematic=columns, effects=(*lengths.effects, "scale of the instrument"))
+    known = None if against is None else _known(against)
+    job = _Job(seen, lengths, settings, known, notes)
+    keep, rejected, suspects, solution = job.cleaned(progress)
+    solution, cyclic = job.with_cyclic(keep, solution)
+    test, claimed, all_shots = job.full_tests(solution)
+    weather = job.weather(keep, solution, cyclic)
+    decisions = decisions_of(
+        solution,
+        test,
+        settings,
+        claimed=claimed,
+        agreement=None if against is None else job.agreement(solution, cyclic, keep),
+        weather=weather,
+        against=against,
+        suspects=suspects,
+    )
+    notes += _notes(seen, solution, settings, against)
+    return BaselineCalibration(
+        seen,
+        settings,
+        seen.names,
+        height if heights is not None else None,
+        reference,
+        lengths,
+        keep,
+        solution,
+        test,
+        all_shots,
+        against,
+        decisions,
+        suspects,
+        rejected,
+        cyclic,
+        weather,
+        tuple(notes),
+    )
+
+
+class _Job:
+    """The adjustments of one calibration, which differ in what they leave out or add."""
+
+    def __init__(self, seen, lengths, settings: BaselineSettings, known: Known | None, notes: list[str]):
+        self.seen, self.lengths, self.settings, self.known, self.notes = seen, lengths, settings, known, notes
+        count = len(seen.names)
+        u_direction = np.hypot(seen.u_rounding, settings.u_direction_arcsec * ARCSECOND)
+        self.sights = Sights(
+            seen.start,
+            seen.end,
+            seen.set,
+            seen.setup,
+            lengths.distance,
+            lengths.stretch,
+            lengths.systematic,
+            lengths.effects,
+            seen.direction,
+            u_direction,
+        )
+        if known is None:
+            try:
+                self.x = places_in_line(seen.start, seen.end, lengths.distance, count)
+            except EstimationError as problem:
+                raise EstimationError(_named(str(problem), seen.names)) from problem
+            self.y = np.zeros(count)
+        else:
+            self.x, self.y = known.x, known.y
+
+    def solved(self, keep, *, extra: Extra | None = None, noise: Claim | None = None) -> Solution:
+        part = None if extra is None else Extra(extra.names, extra.columns[keep])
+        try:
+            return adjust_baseline(
+                self.sights.only(keep),
+                self.x,
+                self.y,
+                known=self.known,
+                scale=self.known is not None,
+                extra=part,
+                u_centring=self.settings.u_centring_mm * MILLIMETRE,
+                noise=noise,
+                claim=self._specified(keep),
+            )
+        except EstimationError as problem:
+            raise EstimationError(_named(str(problem), self.seen.names)) from problem
+
+    def _specified(self, keep) -> Claim:
+        """The maker's claim as variances; repeats from their own scatter, or a tenth of the claim."""
+        sights = self.sights.only(keep)
+        a = (self.settings.specified_mm * MILLIMETRE) ** 2
+        repeats = len(sights) - len(sights.shots)
+        shot = float(np.sum(sights.within**2)) / repeats if repeats else 0.0
+        return Claim(max(shot, 0.01 * a), a, (self.settings.specified_ppm * PPM) ** 2)
+
+    def claimed(self, distance: np.ndarray) -> np.ndarray:
+        """Standard deviation that the maker claims, linear in the distance, m."""
+        return self.settings.specified_mm * MILLIMETRE + self.settings.specified_ppm * PPM * distance
+
+    def agreement(self, solution: Solution, cyclic: tuple[str, ...], keep) -> Solution:
+        """Sets against the known pillars, a set's variance being what the maker claims; without directions."""
+        used = solution.used
+        shot = max(solution.noise.shot, 1e-16)
+        sets = np.maximum(self.claimed(used.mean(used.distance)) ** 2 - shot / used.shots, 1e-16)
+        blind = replace(self.sights, direction=np.full(len(self.sights), np.nan))
+        terms = self.cyclic_terms(cyclic)
+        return adjust_baseline(
+            blind.only(keep),
+            self.x,
+            self.y,
+            known=self.known,
+            scale=True,
+            extra=None if terms is None else Extra(terms.names, terms.columns[keep]),
+            noise=Claim(shot, sets, 0.0),
+        )
+
+    def cleaned(self, progress: Progress | None):
+        """Shots used, why others are not, what is suspect, and the solution; one rejection a step."""
+        keep = np.ones(len(self.seen), bool)
+        rejected = [""] * len(self.seen)
+        most = max(1, len(self.seen) // 10)
+        for step in range(len(self.seen)):
+            if progress is not None:
+                progress("adjusting", step, 0)
+            solution = self.solved(keep)
+            suspects = suspects_of(solution, np.flatnonzero(keep), self.settings.level)
+            if not (self.settings.reject and suspects):
+                break
+            worst = suspects[0]
+            if np.sum(~keep) + len(worst.rows) > most:
+                self.notes.append(
+                    f"no more than {most} of {len(keep)} shots are left out; the other suspects stay: look at them"
+                )
+                break
+            for row in worst.rows:
+                keep[row] = False
+                rejected[row] = f"{worst.kind} rejected: w = {worst.w:+.1f}, p = {worst.p:.2g}"
+        return keep, tuple(rejected), suspects, solution
+
+    def cyclic_terms(self, names: tuple[str, ...]) -> Extra | None:
+        """cos and sin of the length shown, in unit lengths; what coefficient 1 m adds."""
+        if not names or self.settings.unit_length is None:
+            return None
+        phase = TWO_PI * self.seen.slope / self.settings.unit_length
+        columns = [self.lengths.stretch * f((k + 1) * phase) for k in range(len(names) // 2) for f in (np.cos, np.sin)]
+        return Extra(names, np.stack(columns, axis=1))
+
+    def with_cyclic(self, keep, solution: Solution) -> tuple[Solution, tuple[str, ...]]:
+        if self.settings.unit_length is None:
+            return solution, ()
+        names = tuple(f"cyclic {f} {k + 1}" for k in range(self.settings.orders) for f in ("cosine", "sine"))
+        terms = self.cyclic_terms(names)
+        assert terms is not None
+        if solution.freedom_sets < len(names) + 2:
+            self.notes.append(
+                f"cyclic terms left out: {solution.freedom_sets} redundant sets for {len(names)} further unknowns"
+            )
+            return solution, ()
+        part = Extra(names, terms.columns[keep])
+        try:
+            apart = separation(solution.used, solution, part, self.known, self.known is not None)
+        except EstimationError:
+            apart = 0.0
+        if apart < SEPARABLE:
+            self.notes.append(
+                f"cyclic terms left out: lengths in units of {self.settings.unit_length:g} m do not tell them from the "
+                f"zero and the pillars (separation {apart:.1g}, needed {SEPARABLE:g})"
+            )
+            return solution, ()
+        return self.solved(keep, extra=terms), names
+
+    def full_tests(self, solution: Solution) -> tuple[FullTest | str, FullTest | None, FullTest | None]:
+        """The standard's procedure along the line, what a pillar off it adds taken away first: of the sets' means with
+        equal weights, with the maker's as weights, and of all shots."""
+        used, y = solution.used, solution.y
+        touched = np.unique(np.concatenate([used.start, used.end]))
+        order = [int(i) for i in np.argsort(solution.x, kind="stable") if i in touched]
+        number = np.full(len(y), -1)
+        number[touched] = np.arange(len(touched))
+
+        def of(distance, start, end, sigma=None):
+            line = np.sqrt(distance**2 - (y[end] - y[start]) ** 2)
+            found = full_test(number[start], number[end], line, number[order], sigma)
+            places = np.full(len(y), np.nan)
+            places[touched] = found.x
+            return replace(found, x=places)
+
+        steep = used.distance - (used.stretch - 1.0) * solution.of("zero")[0]  # its part along the slope
+        start, end, mean = used.start[used.first], used.end[used.first], used.mean(steep)
+        try:
+            every = of(steep, used.start, used.end)
+            return of(mean, start, end), of(mean, start, end, self.claimed(mean)), every
+        except EstimationError as problem:
+            return str(problem), None, None
+
+    def weather(self, keep, solution: Solution, cyclic: tuple[str, ...]) -> tuple[float, float]:
+        """Which share of the correction's changes the light followed: 1 - b, where b of them is left in the distances.
+
+        The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.
+        """
+        index = self.lengths.index
+        column = -self.lengths.distance * (index - index[keep].mean())
+        terms = self.cyclic_terms(cyclic)
+        names = (*(terms.names if terms is not None else ()), "weather")
+        columns = column[:, None] if terms is None else np.concatenate([terms.columns, column[:, None]], axis=1)
+        if solution.freedom_sets < 6 or np.ptp(index[keep]) < 0.2 * PPM:
+            return float("nan"), float("nan")
+        try:
+            found = self.solved(keep, extra=Extra(names, columns))
+        except EstimationError:
+            return float("nan"), float("nan")
+        b, u = found.of("weather")
+        return 1.0 - b, u
+
+
+def _named(text: str, names: tuple[str, ...]) -> str:
+    """Numbers of pillars in a message become their names."""
+    import re
+
+    text = re.sub(r"pillar number (\d+)", lambda m: f"pillar {names[int(m[1])]}", text)
+    return re.sub(r"\b([xy]) (\d+)\b", lambda m: f"{m[1]} of {names[int(m[2])]}", text)
+
+
+def _ordered(seen: Observations, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
+    if against is not None:
+        numbers_of(against, seen.names, seen.file)
+        return against.pillars
+    if heights is None:
+        return seen.names
+    for name in seen.names:
+        if name not in heights.height:
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
+    return tuple(name for name in heights.height if name in seen.names)
+
+
+def _renumbered(seen: Observations, names: tuple[str, ...]) -> Observations:
+    from copy import copy
+
+    number = np.array([names.index(n) for n in seen.names])
+    found = copy(seen)
+    found.names, found.start, found.end = names, number[seen.start], number[seen.end]
+    return found
+
+
+def _heights(seen, heights: Heights | None, against: Baseline | None, settings: BaselineSettings, notes: list[str]):
+    """Heights and their u by the pillars' numbers, and the reference height (None: unknown)."""
+    n = len(seen.names)
+    if heights is None:
+        notes.append("no heights of pillars: they are taken for level, which makes lengths on a slope too long")
+        return np.zeros(n), np.zeros(n), None
+    touched = {seen.names[i] for i in (*seen.start, *seen.end)}
+    for name in touched:
+        if name not in heights.height:
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
+    reference = settings.reference_height
+    if against is not None:
+        if reference is not None and reference != against.reference_height_m:
+            raise InputError(
+                f"--reference-height-m {reference:g} is not the known baseline's "
+                f"({against.reference_height_m}); leave it out"
+            )
+        reference = against.reference_height_m
+        if reference is None:
+            notes.append("the known baseline has no heights: distances are compared at the first pillar's height")
+    first = next(h for name, h in heights.height.items() if name in touched)
+    height = np.array([heights.height.get(name, first) for name in seen.names])
+    u = np.array([heights.u.get(name, 0.0) for name in seen.names])
+    return height, u, first if reference is None else reference
+
+
+def _known(against: Baseline) -> Known:
+    n = len(against.pillars)
+    number = {name: i for i, name in enumerate(against.pillars)}
+    rows = [number[entry[2:]] + (n if entry[0] == "y" else 0) for entry in against.known]
+    return Known(np.array(against.x_m), np.array(against.y_m), np.array(rows), against.covariance)
+
+
+def _notes(seen, solution: Solution, settings: BaselineSettings, against: Baseline | None) -> list[str]:
+    notes = []
+    if against is None:
+        notes.append(
+            "the scale is not determined without a known baseline: the pillars carry the instrument's, "
+            f"{settings.u_scale_ppm:g} ppm (1σ)"
+        )
+        if not np.isfinite(seen.direction).any():
+            notes.append("no horizontal directions: the pillars are taken to stand in a straight line")
+    if settings.unit_length is None:
+        notes.append("no cyclic terms: the instrument's unit length is not given (--unit-length-m)")
+    if not np.isfinite(solution.u_noise[1:]).any():
+        notes.append("too few redundant sets to estimate the noise: the maker's claim stands for it")
+    elif solution.noise.air * float(np.max(solution.used.distance)) ** 2 > 4.0 * (solution.noise.set + 1e-12):
+        notes.append(
+            f"sets scatter in proportion to distance, {solution.noise.air**0.5 / PPM:.1f} ppm: the air, or how its "
+            "temperature was read, more than pointing and centring"
+        )
+    return notes
+
+
+def record_values(found: BaselineCalibration) -> dict[str, Any]:
+    """What BASELINE.toml keeps of a calibration, pillars in their order along the line."""
+    s, order = found.solution, found.order
+    rows, covariance = s.places
+    n = len(s.x)
+    wanted = [int(np.flatnonzero(rows == r)[0]) for axis in (0, n) for r in order + axis if r in rows]
+    labels = [f"{'x' if rows[k] < n else 'y'} {found.names[rows[k] % n]}" for k in wanted]
+    zero, u_zero = s.of("zero")
+    test = found.test if isinstance(found.test, FullTest) else None
+    return {
+        "reference_height_m": found.reference_height,
+        "pillars": tuple(found.names[i] for i in order),
+        "x_m": tuple(s.x[order].tolist()),
+        "y_m": tuple(s.y[order].tolist()),
+        "known": tuple(labels),
+        "covariance_mm2": tuple(map(tuple, (covariance[np.ix_(wanted, wanted)] / MILLIMETRE**2).tolist())),
+        "s_mm": test.s / MILLIMETRE if test is not None else None,
+        "degrees_of_freedom": test.degrees_of_freedom if test is not None else None,
+        "zero_mm": zero / MILLIMETRE,
+        "u_zero_mm": u_zero / MILLIMETRE,
+    }

@@ -1,0 +1,157 @@
+"""From what an instrument shows to horizontal distances between pillars, with what each common cause does to them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.atmosphere.air import air
+from catseye.atmosphere.velocity import (
+    EARTH_RADIUS,
+    REFRACTION,
+    arc_to_chord_correction,
+    first_velocity_correction,
+    second_velocity_correction,
+)
+from catseye.errors import ValidityError
+from catseye.records.baseline import Observations
+from catseye.records.refusal import refusal
+
+
+@dataclass(frozen=True)
+class BaselineSettings:
+    """What a baseline's reduction assumes.
+
+    air_model, wavelength_um, co2_ppm   of the group index; the carrier of both of Busselton's instruments
+    reference_index       group index for which the instrument shows lengths
+    corrected             True: the lengths shown carry the first velocity correction already
+    refraction            coefficient k of the ray
+    u_temperature_c, u_pressure_hpa, u_humidity_percent   common to all shots: the sensors, and what one end says of the
+                          path; what changes from set to set is noise
+    u_scale_ppm           of the instrument's scale, where no known baseline tells it: its frequency
+    u_direction_arcsec, u_centring_mm   of one set's circle reading, and across the line
+    unit_length           m, of the cyclic terms; None leaves them out
+    orders                of the cyclic terms, 1 to 4
+    specified_mm, specified_ppm   standard deviation a + b D that the maker claims
+    level                 of each test
+    reject                True: leave out what the tests of single shots and sets reject
+    reference_height      m; None takes the first pillar's, or the known baseline's
+    """
+
+    air_model: str = "ciddor_hill1999"
+    wavelength_um: float = 0.658
+    co2_ppm: float = 420.0
+    reference_index: float = 1.000286338
+    corrected: bool = False
+    refraction: float = REFRACTION
+    u_temperature_c: float = 0.5
+    u_pressure_hpa: float = 0.3
+    u_humidity_percent: float = 5.0
+    u_scale_ppm: float = 1.0
+    u_direction_arcsec: float = 0.6
+    u_centring_mm: float = 0.2
+    unit_length: float | None = None
+    orders: int = 1
+    specified_mm: float = 0.6
+    specified_ppm: float = 1.0
+    level: float = 0.05
+    reject: bool = False
+    reference_height: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """Each shot's way from what was shown to the horizontal distance; all (m,).
+
+    index        group index of the air
+    first, second, chord   corrections, m
+    level        horizontal less slope, m
+    distance     horizontal at the reference height, between the pillars' axes, m
+    stretch      what a metre more on the slope makes in it
+    systematic   (m, q) what one standard uncertainty of each common effect adds, m
+    effects      (q,) their names
+    """
+
+    index: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    chord: np.ndarray
+    level: np.ndarray
+    distance: np.ndarray
+    stretch: np.ndarray
+    systematic: np.ndarray
+    effects: tuple[str, ...]
+
+
+def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, radius=EARTH_RADIUS):
+    """Distance at a common height from the straight line between two points at heights of their own, in m.
+
+    chord              straight line, m
+    height_from        of its beginning, m
+    height_to          of its end, m
+    reference_height   common height of the distance, m
+    radius             of the earth at height zero, m
+
+    Along the level surface at the reference height, so that parts of a line add up; its chord is shorter by D³/24R²,
+    0.14 um at 510 m. Exact for a round earth: law of cosines with the legs R + h.
+    Source: [RUEGER90], reduction of slope distances.
+
+    Raises ValidityError where the heights differ by more than the chord.
+
+    >>> round(float(horizontal_distance(20.4, 4.8, 4.754)), 6)
+    20.399933
+    """
+    chord, one, other = (np.asarray(v, float) for v in (chord, height_from, height_to))
+    rise = other - one
+    bad = np.flatnonzero(~(np.abs(rise) < chord))
+    if len(bad):
+        k = bad[0]
+        raise ValidityError(
+            f"heights differ by {float(np.ravel(rise)[k]):g} m over a slope distance of "
+            f"{float(np.ravel(np.broadcast_to(chord, rise.shape))[k]):g} m; expected less: check the heights"
+        )
+    common = radius + reference_height
+    half = 0.5 * np.sqrt((chord - rise) * (chord + rise) / ((radius + one) * (radius + other)))
+    return 2.0 * common * np.arcsin(half)
+
+
+def reduce_lengths(
+    seen: Observations, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
+) -> Lengths:
+    """Horizontal distances at one height, with what each common effect does to them.
+
+    seen               shots
+    height, u_height   (n,) of the pillars by their numbers in `seen`, m
+    reference_height   m
+    settings           assumptions
+    """
+    light = {"wavelength_um": settings.wavelength_um, "co2_ppm": settings.co2_ppm, "model": settings.air_model}
+    state = air(seen.temperature_c, seen.pressure_hpa, seen.humidity_percent, **light)
+    shown_length = seen.slope
+    first = first_velocity_correction(shown_length, settings.reference_index, state.group_index)
+    first = np.zeros_like(first) if settings.corrected else first
+    along = shown_length + first
+    second = second_velocity_correction(along, refraction=settings.refraction)
+    chord = arc_to_chord_correction(along, refraction=settings.refraction)
+    straight = along + second + chord
+    one, other = height[seen.start] + seen.instrument, height[seen.end] + seen.target
+    try:
+        distance = horizontal_distance(straight, one, other, reference_height=reference_height)
+    except ValidityError as problem:
+        k = int(np.flatnonzero(~(np.abs(other - one) < straight))[0])
+        raise refusal(seen.file, f"{seen.where[k]}, {problem}") from problem
+    slopes = state.sensitivity
+    effects = {
+        "temperature": -distance / state.group_index * slopes.temperature_c * settings.u_temperature_c,
+        "pressure": -distance / state.group_index * slopes.pressure_hpa * settings.u_pressure_hpa,
+        "humidity": -distance / state.group_index * slopes.humidity_percent * settings.u_humidity_percent,
+        "formula of the index": -distance * state.standard_uncertainty,
+    }
+    rise = other - one
+    for k in np.flatnonzero(u_height > 0.0).tolist():
+        per_start = (rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.start == k)
+        per_end = (-rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.end == k)
+        effects[f"height of {seen.names[k]}"] = (per_start + per_end) * u_height[k]
+    columns = np.stack(list(effects.values()), axis=1)
+    stretch = distance * straight / ((straight - rise) * (straight + rise))
+    level = distance - straight
+    return Lengths(state.group_index, first, second, chord, level, distance, stretch, columns, tuple(effects))

@@ -1,0 +1,175 @@
+"""One range as a function of drawn inputs, from phasors to metres, nothing linearised: what the Monte Carlo runs.
+
+It shares with the budget the list of inputs and no slope. Drift: a path of the electronics is drawn through all
+reference shots and the target's, and the interpolation is applied to it.
+"""
+
+import numpy as np
+
+from catseye.atmosphere.air import air, group_refractivity
+from catseye.atmosphere.path import mean_over_height, pressure_at
+from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.estimation.propagation import Draw, Model, draw_inputs
+from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
+from catseye.geometry.mount import gamma, lambda_
+from catseye.optics.prism import range_constant
+from catseye.reduction.budget.inputs import Item, correlation_of, felt
+from catseye.reduction.budget.scene import Scene, walk_of
+from catseye.reduction.head import AXES, COUNTS, only_prime
+
+NODES = 3  # of the quadrature along the path: exact to degree 5 in height
+
+
+class Columns:
+    """Drawn inputs by key; a key that is no input answers its default."""
+
+    def __init__(self, items: tuple[Item, ...], x: np.ndarray) -> None:
+        self.at = {item.key: k for k, item in enumerate(items)}
+        self.best = {item.key: item.given.value for item in items}
+        self.x = x
+
+    def __call__(self, key: str, default: float = 0.0) -> np.ndarray:
+        return self.x[:, self.at[key]] if key in self.at else np.full(len(self.x), default)
+
+    def off(self, key: str) -> np.ndarray:
+        """How far it was drawn from its best value."""
+        return self(key) - self.best.get(key, 0.0)
+
+    def orders(self, kind: str) -> list[np.ndarray]:
+        """Coefficients of a cyclic deviation, order 1 first, mm."""
+        return [self.x[:, k] for key, k in self.at.items() if key.startswith(f"cyclic {kind} ")]
+
+
+def measurement(scene: Scene, items: tuple[Item, ...]) -> Model:
+    """The range (n,), m, of inputs (n, k) in the items' order and units."""
+
+    def model(x: np.ndarray) -> np.ndarray:
+        v = Columns(items, x)
+        target, phase, level = _phase(scene, v)
+        coupled = v("coupling") * np.log(np.abs(target) / level)
+        half = 0.5 * SPEED_OF_LIGHT / v("frequency")
+        length = half * (scene.cycles - (phase - coupled) / TWO_PI) / _index(scene, v)
+        cyclic = sum(
+            c * np.cos(k * phase) + s * np.sin(k * phase)
+            for k, (c, s) in enumerate(zip(v.orders("cosine"), v.orders("sine"), strict=True), start=1)
+        )
+        return length + (v("d0") - cyclic) * MILLIMETRE + _glass(scene, v) + _axes(scene, v)
+
+    return model
+
+
+def drawing(scene: Scene, items: tuple[Item, ...]) -> Draw:
+    """A function of a generator and a number that draws so many inputs, the electronics' walk as a path."""
+    inputs = [item.given for item in items]
+    correlation = correlation_of(scene, items)
+    walk = next(k for k, item in enumerate(items) if item.key == "walk")
+
+    def draw(generator: np.random.Generator, n: int) -> np.ndarray:
+        x = draw_inputs(inputs, generator, n, correlation)
+        x[:, walk] = inputs[walk].value + _walked(scene, generator, n)
+        return x
+
+    return draw
+
+
+def _walked(scene: Scene, generator: np.random.Generator, n: int) -> np.ndarray:
+    """How far (n,), rad, the electronics were off what interpolation between noiseless references says."""
+    rows = felt(scene)
+    references = scene.references
+    when = np.append(references.seconds[rows], scene.seconds)
+    order = np.argsort(when, kind="stable")
+    steps = generator.standard_normal((n, len(when) - 1)) * np.sqrt(np.diff(when[order])) * walk_of(scene.campaign)
+    path = np.zeros((n, len(when)))
+    path[:, order[1:]] = np.cumsum(steps, axis=1)
+    return path[:, -1] - path[:, :-1] @ references.weight[rows]
+
+
+def _phase(scene: Scene, v: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The target's phasor (V), its phase after the electronics' (rad, not wrapped), the reference amplitude (V)."""
+    leakage = v("leakage real") + 1j * v("leakage imaginary") - scene.leakage
+    amplitude, direction = abs(scene.phasor), scene.phasor / abs(scene.phasor)
+    noise = direction * (v.off("amplitude") + 1j * amplitude * (v.off("noise") + v.off("steps")))
+    target = scene.phasor + noise - leakage
+    references = scene.references
+    electronics, level = v.off("references") + v.off("walk"), np.zeros(len(v.x))
+    for k in np.union1d(felt(scene), np.flatnonzero(references.level)):
+        phasor = references.phasor[k] * (1.0 + 1j * v.off(f"reference {k}")) - leakage
+        electronics += references.weight[k] * np.angle(phasor / references.phasor[k])
+        level += references.level[k] * np.abs(phasor)
+    return target, scene.phase + np.angle(target / scene.phasor) - electronics, level
+
+
+def _index(scene: Scene, v: Columns) -> np.ndarray:
+    """Group index (n,) of the path in the drawn air."""
+    field = scene.field
+    read = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
+    true = np.stack([t - v(f"thermometer {name}") for t, name in zip(read, field.names, strict=False)], axis=1)
+    middle = field.heights.mean()
+    arms = field.heights - middle
+    mean = true.mean(axis=1)
+    bent = field.names[-1] == "bend"
+    slope = true @ arms / np.sum(arms**2) if bent else v("profile")
+    pressure, humidity = v("pressure"), v("humidity")
+    legal = np.clip(humidity, 0.0, 100.0)  # beyond, the index goes on along its tangent
+    light = {"wavelength_um": field.wavelength_um, "model": field.model}
+    best = air(float(read.mean()), v.best["pressure"], v.best["humidity"], **light).sensitivity.humidity_percent
+
+    def profile(z: np.ndarray) -> np.ndarray:
+        temperature = mean[:, None] + slope[:, None] * (z - middle)
+        if bent:
+            low, high = field.heights.min(), field.heights.max()
+            temperature = temperature + v("profile")[:, None] * 4.0 * (z - low) * (high - z) / (high - low) ** 2
+        return group_refractivity(
+            temperature, pressure_at(pressure[:, None], middle, z), np.broadcast_to(legal[:, None], z.shape), **light
+        )
+
+    ends = (np.full(len(v.x), scene.a[2]), np.full(len(v.x), scene.b[2]))
+    mean_refractivity = mean_over_height(profile, *ends, nodes=NODES)
+    beyond = best * (humidity - legal)
+    return 1.0 + mean_refractivity + beyond + (v("formula") + v("fluctuation")) * PPM
+
+
+def _glass(scene: Scene, v: Columns) -> np.ndarray:
+    """Correction for the glass (n,), m, its reference point held where the records put it."""
+    place = scene.place
+    n0 = scene.campaign.site.ranging.bk7_to_air_group_index_ratio
+    n = v("ratio", n0)
+    if place.kind == "ball":
+        r1, r2 = v("r1") * MILLIMETRE, v("r2") * MILLIMETRE
+        best = -(n0 * (v.best["r1"] + v.best["r2"]) - v.best["r1"]) * MILLIMETRE
+        return r1 - n * (r1 + r2) + (place.constant - best)
+    if place.normal is None:
+        return np.full(len(v.x), place.constant)
+    towards = scene.towards
+    along = towards - (towards @ place.normal) * place.normal
+    size = float(np.linalg.norm(along))
+    first = along / size if size > 1e-12 else np.linalg.svd(place.normal[None])[2][1]
+    second = np.cross(place.normal, first)
+    lean, across = v.off("incidence") * DEGREE, v("across") * DEGREE
+    normal = place.normal - lean[:, None] * first + across[:, None] * second  # leaning away from the beam
+    cosine = normal @ towards / np.linalg.norm(normal, axis=1)
+    height, depth = v("height") * MILLIMETRE, place.height / n0
+    in_glass = np.sqrt(n**2 - (1.0 - cosine**2))  # n cos r
+    typed = place.constant - float(range_constant(place.height, n0))  # Pc as the sheet prints it
+    return -height * in_glass + depth * cosine + typed
+
+
+def _axes(scene: Scene, v: Columns) -> np.ndarray:
+    """Correction (n,), m, for axes and beam that do not meet: less the target's change, plus the cube's."""
+    if "axes axis offset" not in v.at:
+        return np.zeros(len(v.x))
+    monument, mirror = scene.campaign.monuments[scene.ranger], scene.mirror
+    mount = gamma(monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad)
+    sight = lambda_(mirror.beta1_rad, mirror.beta2_rad) @ mount @ (scene.b - scene.a)
+    keys = [f"axes {key.removesuffix('_mm').replace('_', ' ')}" for key in AXES]
+    offsets = np.stack([v(key) for key in keys], axis=1) * MILLIMETRE
+    prime = only_prime(mirror, direction_angles(sight)[0])
+    theta, phi = beam_angles(sight, offsets, prime=prime)
+    target, _ = path_change(theta, phi, np.linalg.norm(sight), offsets, prime=prime)
+    cube, _ = path_change(
+        TWO_PI * (mirror.azm_zrg - mirror.na0) / COUNTS,
+        2.0 * TWO_PI * (mirror.elv_zrg - mirror.ne0) / COUNTS,
+        mirror.d0_mm * MILLIMETRE,
+        offsets,
+    )
+    return cube - target

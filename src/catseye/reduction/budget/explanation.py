@@ -1,0 +1,270 @@
+"""A shot explained: its range with a full budget before any adjustment, a Monte Carlo beside it, the network's word."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, TWO_PI
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.reduction.budget.chain import drawing, measurement
+from catseye.reduction.budget.inputs import Item, correlation_of, items_of
+from catseye.reduction.budget.scene import Assumptions, Scene, scene_of
+from catseye.reduction.coordinates import Coordinates
+from catseye.reduction.epoch import Reduction, reduce_epoch
+from catseye.reduction.places import Place, places_of
+from catseye.reduction.ranges import Phases, Progress, follow_electronics, measure_phases
+from catseye.reduction.settings import Settings
+from catseye.signal.cycles import Decision, decision, unwrapped_length
+
+CHECKED = 0.05  # redundancy below which the other shots do not say where a target is
+UNDECIDED = "not adjusted"  # status of a usable shot where the campaign cannot be adjusted
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """What the adjustment of the whole campaign says of the shot; lengths in metres.
+
+    range_, u_range         as this shot gives it with the estimated corrections; u without systematic parameters
+    residual                that minus the adjusted distance
+    standardised            test statistic of the residual
+    redundancy              share of an error of this shot that shows in its residual
+    distance, u_distance    between the adjusted points
+    used                    took part
+    """
+
+    range_: float
+    u_range: float
+    residual: float
+    standardised: float
+    redundancy: float
+    distance: float
+    u_distance: float
+    used: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Everything that can be told of one shot.
+
+    shot, ranger, target, mjd_utc   of the record
+    status      "used", "reference", or what the reason begins with; "not adjusted" without an adjustment
+    reason      why it was not used, "" where it was
+    phasor      V, the light, complex
+    u_across    V, standard uncertainty of the quadrature across it, which turns its phase
+    scene       its measurement; None where there is no range, and then so are the next five
+    items       inputs of its range with units, slopes and sources
+    budget      first order, metres
+    cycles      whole cycles decided: margin (m, optical), probability of a slip
+    coarse      what the coarse length came from
+    scattered   of the Monte Carlo; None where it was not asked for
+    adjusted    None without an adjustment
+    references  of the ranger, (shot id, seconds after this shot, weight), where it has any
+    notes       one line each
+    """
+
+    shot: int
+    ranger: str
+    target: str
+    mjd_utc: float
+    status: str
+    reason: str
+    phasor: complex
+    u_across: float
+    scene: Scene | None = None
+    items: tuple[Item, ...] = ()
+    budget: Budget | None = None
+    cycles: Decision | None = None
+    coarse: str = ""
+    scattered: Scattered | None = None
+    adjusted: Adjusted | None = None
+    references: tuple[tuple[int, float, float], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def explain_shot(
+    campaign: Campaign,
+    shot: int,
+    *,
+    settings: Settings | None = None,
+    assumptions: Assumptions | None = None,
+    draws: int = 0,
+    seed: int = 1,
+    reduction: Reduction | None = None,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Where a shot's range comes from and how well it is known, before any adjustment.
+
+    campaign     as `read_campaign` gives it
+    shot         id in shots.csv
+    settings     assumptions of the reduction
+    assumptions  uncertainties that no record states
+    draws, seed  of the Monte Carlo; none for 0
+    reduction    of this campaign with these settings, where it was made already
+    progress     called with (what, done, of how many)
+
+    The distance is scan point to reference point as this shot alone gives it, zero and leakage by the sheet, air by the
+    weather stations. The places of both ends only say where the air is and which cycle it was: adjusted ones where the
+    campaign can be reduced, those of the records otherwise.
+
+    Raises InputError where there is no such shot.
+
+    Source: [PARKER04] eqs. 5.12-5.19; [JCGM100] clause 5 and annex G; [JCGM101] clause 7.
+    """
+    settings = settings or Settings()
+    found = np.flatnonzero(campaign.shots.shot == shot)
+    if not len(found):
+        low, high = int(campaign.shots.shot.min()), int(campaign.shots.shot.max())
+        raise InputError(f"shot {shot} is not in shots.csv (expected {low} to {high}, {len(campaign.shots)} shots)")
+    row, notes = int(found[0]), []
+    try:
+        reduction = reduction or reduce_epoch(campaign, settings, progress)
+    except (InputError, EstimationError) as problem:
+        notes.append(f"the campaign cannot be adjusted: {problem}")
+    phases = reduction.phases if reduction else measure_phases(campaign, settings, progress)
+    _, wrong = follow_electronics(campaign, phases)
+    status, reason = _status(campaign, phases, wrong, row, reduction)
+    known = Explanation(
+        shot=shot,
+        ranger=campaign.shots.ranger[row],
+        target=campaign.shots.target[row],
+        mjd_utc=float(campaign.shots.mjd_utc[row]),
+        status=status,
+        reason=reason,
+        phasor=complex(phases.phasor[row]),
+        u_across=float(phases.u_across[row]),
+        adjusted=_adjusted(reduction.coordinates, row) if reduction else None,
+        notes=tuple(notes),
+    )
+    if campaign.shots.target[row] == REFERENCE or phases.reason[row] or reason.startswith("no reference"):
+        return known
+    ends, place = _places(campaign, row, reduction)
+    try:
+        scene = scene_of(
+            campaign, phases, wrong, row, ends=ends, place=place, settings=settings, assumptions=assumptions
+        )
+    except InputError as problem:
+        return replace(known, notes=(*known.notes, str(problem)))
+    return _budgeted(known, scene, draws, seed, reduction, progress)
+
+
+def budget_of(scene: Scene, items: tuple[Item, ...]) -> Budget:
+    """The first-order budget of a scene's range."""
+    return propagate(
+        [item.given for item in items],
+        np.array([item.slope for item in items]),
+        value=scene.range_,
+        correlation=correlation_of(scene, items),
+    )
+
+
+def scatter_of(scene: Scene, items: tuple[Item, ...], draws: int, seed: int) -> Scattered:
+    """The Monte Carlo of a scene's range."""
+    generator = np.random.default_rng(seed)
+    found = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
+    spreadless = any(i.given.distribution == STUDENT and i.given.degrees_of_freedom <= 2.0 for i in items)
+    return replace(found, u=float("nan")) if spreadless else found  # such a t has no variance, only an interval
+
+
+def _budgeted(
+    known: Explanation, scene: Scene, draws: int, seed: int, reduction: Reduction | None, progress: Progress | None
+) -> Explanation:
+    items = items_of(scene)
+    budget = budget_of(scene, items)
+    if progress is not None and draws:
+        progress("Monte Carlo", 0, draws)
+    cycles, coarse = _cycles(scene, known.adjusted, items)
+    shots, references = scene.campaign.shots, scene.references
+    neighbours = zip(references.shots, references.seconds - scene.seconds, references.weight, strict=True)
+    return replace(
+        known,
+        scene=scene,
+        items=items,
+        budget=budget,
+        cycles=cycles,
+        coarse=coarse,
+        scattered=scatter_of(scene, items, draws, seed) if draws else None,
+        references=tuple((int(shots.shot[k]), float(after), float(weight)) for k, after, weight in neighbours),
+    )
+
+
+def _status(
+    campaign: Campaign, phases: Phases, wrong: dict[int, str], row: int, reduction: Reduction | None
+) -> tuple[str, str]:
+    if reduction:
+        return reduction.status[row], reduction.rejected.get(int(campaign.shots.shot[row]), "")
+    reason = phases.reason[row] or wrong.get(row, "")
+    usual = "reference" if campaign.shots.target[row] == REFERENCE else UNDECIDED
+    return reason.partition(":")[0] or usual, reason
+
+
+def _places(campaign: Campaign, row: int, reduction: Reduction | None) -> tuple[tuple[np.ndarray, np.ndarray], Place]:
+    names = campaign.shots.ranger[row], campaign.shots.target[row]
+    if reduction and set(names) <= set(reduction.coordinates.points):
+        found = reduction.coordinates
+        a, b = (found.x[found.index(name)] for name in names)
+        return (a, b), found.places[names[1]]
+    places = places_of(campaign)
+    return (places[names[0]].start, places[names[1]].start), places[names[1]]
+
+
+def _adjusted(coordinates: Coordinates, row: int) -> Adjusted | None:
+    ranges = coordinates.ranges
+    mine = np.flatnonzero(ranges.shot == row)
+    if not len(mine):
+        return None
+    k = int(mine[0])
+    names = [ranges.ranger[k], ranges.target[k]]
+    a, b = (coordinates.x[coordinates.index(name)] for name in names)
+    distance = float(np.linalg.norm(b - a))
+    direction = (b - a) / distance
+    both = np.concatenate([-direction, direction])
+    return Adjusted(
+        range_=float(ranges.range_[k]),
+        u_range=float(ranges.u_range[k]),
+        residual=float(ranges.residual[k]),
+        standardised=float(ranges.standardised[k]),
+        redundancy=float(ranges.redundancy[k]),
+        distance=distance,
+        u_distance=float(np.sqrt(max(both @ coordinates.block(names) @ both, 0.0))),
+        used=bool(ranges.used[k]),
+    )
+
+
+def _cycles(scene: Scene, adjusted: Adjusted | None, items: tuple[Item, ...]) -> tuple[Decision, str]:
+    """What decides N: the distance that all other shots give where they do, the records' places otherwise.
+
+    Leaving a shot out turns its residual r into r / redundancy and its u into u / root redundancy.
+    """
+    phases = [item.slope * item.given.u for item in items if item.unit == "rad" and item.key != "coupling"]
+    u_length = float(np.sqrt(np.sum(np.square(phases))))
+    u_phase = u_length * scene.index * TWO_PI / scene.half
+    observed = float(unwrapped_length(scene.cycles, scene.phase, scene.half))
+    if adjusted is not None and (not adjusted.used or adjusted.redundancy >= CHECKED):
+        share = adjusted.redundancy if adjusted.used else 1.0
+        misfit = adjusted.residual / share
+        total = adjusted.u_range / np.sqrt(share)
+        if not adjusted.used and adjusted.standardised:
+            total = abs(adjusted.residual / adjusted.standardised)
+        u_coarse = float(np.sqrt(max(total**2 - u_length**2, 0.0)))  # `decision` puts the phase's own back
+        coarse, source = observed - scene.index * misfit, "the adjusted points, this shot left out"
+    else:
+        coarse = observed - scene.index * (scene.range_ - float(np.linalg.norm(scene.a - scene.b)))
+        u_coarse, source = _u_typed(scene), "the records' places"
+    found = decision(coarse, scene.phase, scene.half, u_coarse=scene.index * u_coarse, u_phase=u_phase)
+    return found, source
+
+
+def _u_typed(scene: Scene) -> float:
+    """Standard uncertainty, m, of the distance between the places of the records."""
+    total = 0.0
+    places = places_of(scene.campaign)
+    for name in (scene.ranger, scene.target):
+        if places[name].typed:
+            total += (places[name].u_start or scene.settings.u_position) ** 2
+        elif name in scene.campaign.monuments:
+            monument, mirror = scene.campaign.monuments[name], scene.campaign.mirror_of(name)
+            u = np.array([monument.u_x_mm, monument.u_y_mm, monument.u_z_mm]) * MILLIMETRE
+            total += float(np.sum((scene.towards * u) ** 2)) + (mirror.u_offset_mm * MILLIMETRE) ** 2
+    return float(np.sqrt(total))

@@ -1,0 +1,337 @@
+"""What is uncertain in one range, and by hand the slope of the range by each.
+
+With s = half / (2 pi n), metres a radian, l the way in air that the phase measured, P the target's phasor, R_j those of
+the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a prism whose reference point is held:
+
+    phase of the target      -S = -(s + c'), c' the slope of the cyclic deviation by the phase
+    phase of the electronics  S
+    leakage L                 S Im(dL/P - sum w_j dL/R_j) - s k Re(dL/P - sum v_j |R_j| dL/R_j / sum v_j |R_j|)
+    coupling k                s ln(A/A_ref)
+    frequency                 -l / f
+    index                     -l / n
+    height h                  -n_g cos r       (the point h_rp below the face stays where it is)
+    index of the glass        -h / cos r       (the same)
+    radii of a ball           -(n_g - 1), -n_g
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.atmosphere.air import MODELS, air
+from catseye.atmosphere.path import mean_over_height, pressure_at
+from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
+from catseye.estimation.propagation import STUDENT, Input
+from catseye.optics.prism import obliquity_slope
+from catseye.reduction.budget.scene import FELT, Scene, head_columns
+from catseye.reduction.head import AXES, head_corrections, head_unknowns
+from catseye.signal.buffers import inspect_buffers
+from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES
+from catseye.signal.cyclic import cyclic_slope
+
+NAMED = 0.01  # weight of a reference beyond which it has a line of its own
+DITHERED = 0.5  # codes of rms noise above which a converter's steps are averaged like noise
+ASSUMED = "assumed: "
+SHEET = "mirrors/{}.toml: "
+
+
+@dataclass(frozen=True)
+class Item:
+    """One input of a range.
+
+    key      for the chain
+    given    name, value, standard uncertainty, distribution, degrees of freedom, in the unit
+    unit     of value and u
+    slope    m, range by the input, a unit
+    source   who says so
+    """
+
+    key: str
+    given: Input
+    unit: str
+    slope: float
+    source: str
+
+
+def items_of(scene: Scene) -> tuple[Item, ...]:
+    """Every input of a range, in the order of the light: samples, electronics, head, air, glass."""
+    return (*_samples(scene), *_electronics(scene), *_head(scene), *_frequency(scene), *_air(scene), *_glass(scene))
+
+
+def correlation_of(scene: Scene, items: tuple[Item, ...]) -> np.ndarray:
+    """Of all inputs: the thermometers', as assumed; whatever acts on target and references alike is one input."""
+    r = np.eye(len(items))
+    thermometers = [k for k, item in enumerate(items) if item.key.startswith("thermometer ")]
+    for i in thermometers:
+        for j in thermometers:
+            if i != j:
+                r[i, j] = scene.assumptions.thermometer_correlation
+    return r
+
+
+def _phase_slope(scene: Scene) -> tuple[float, float]:
+    """S and s, m a radian: by the electronics' phase with and without the cyclic deviation."""
+    s = scene.half / (TWO_PI * scene.index)
+    mirror = scene.mirror
+    cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
+    return s + float(cyclic_slope(scene.phase, cosine, sine)), s
+
+
+def _noise(scene: Scene, row: int) -> tuple[str, float]:
+    """Distribution and degrees of freedom of the noise across a buffer's phasor, as `measure_phases` finds it.
+
+    From 16 cycles on it is that of one quadrature, of fewer degrees where the noise is coloured; of both below that;
+    one cycle alone is judged about its mean and three harmonics.
+    """
+    shots = scene.campaign.shots
+    m, n = int(shots.cycles[row]), int(shots.samples_per_cycle[row])
+    if m < FEWEST_FOR_BATCHES:
+        return STUDENT, float(2 * (m - 1) if m > 1 else n - 7)
+    found = inspect_buffers(scene.campaign.frames[shots.frame[[row]], : m * n], n).detection
+    _, degrees = found.scatter.variance(found.phasor)
+    return STUDENT, float(degrees[0, 1])
+
+
+def _samples(scene: Scene) -> list[Item]:
+    campaign, row = scene.campaign, scene.row
+    shots, adc = campaign.shots, campaign.site.adc
+    slope, s = _phase_slope(scene)
+    amplitude = abs(scene.phasor)
+    count = int(shots.cycles[row] * shots.samples_per_cycle[row])
+    code = adc.full_scale_volt / 2 ** (adc.bits - 1)
+    rms = scene.u_across * np.sqrt(0.5 * count)
+    # Without noise to move it over the steps every cycle repeats the same rounding, and more cycles average nothing.
+    rounded = count if rms >= DITHERED * code else int(shots.samples_per_cycle[row])
+    u_steps = code / np.sqrt(12.0) * np.sqrt(2.0 / rounded)
+    u_rest = float(np.sqrt(max(scene.u_across**2 - u_steps**2, 0.0)))
+    kind, degrees = _noise(scene, row)
+    noise = f"frames.npy row {shots.frame[row]}: scatter of {shots.cycles[row]} cycles, less the converter's steps"
+    phase = float(np.mod(np.angle(scene.phasor), TWO_PI))
+    coupling = scene.mirror.amplitude_to_phase_rad
+    return [
+        Item("noise", Input("noise of the target", phase, u_rest / amplitude, kind, degrees), "rad", -slope, noise),
+        Item(
+            "amplitude",
+            Input("amplitude of the target", amplitude, scene.u_phasor, kind, degrees),
+            "V",
+            s * coupling / amplitude,
+            "as the noise",
+        ),
+        Item(
+            "steps",
+            Input("steps of the converter", 0.0, u_steps / amplitude),
+            "rad",
+            -slope,
+            f"site.toml: {adc.bits} bits, {adc.full_scale_volt:g} V; a step rectangular, {rounded} averaged",
+        ),
+    ]
+
+
+def _electronics(scene: Scene) -> list[Item]:
+    references, (slope, _) = scene.references, _phase_slope(scene)
+    shots = scene.campaign.shots
+    items = []
+    for k in np.flatnonzero(np.abs(references.weight) >= NAMED):
+        row = int(references.shots[k])
+        kind, degrees = _noise(scene, row)
+        after = references.seconds[k] - scene.seconds
+        name = f"noise of reference shot {shots.shot[row]}"
+        given = Input(name, float(references.unwrapped[k]), float(references.u_phase[k]), kind, degrees)
+        source = f"frames.npy row {shots.frame[row]}; {abs(after):.0f} s {'later' if after > 0 else 'before'}"
+        source += f", weight {references.weight[k]:.3f}"
+        items.append(Item(f"reference {k}", given, "rad", slope * float(references.weight[k]), source))
+    rest = np.abs(references.weight) < NAMED
+    if rest.any():
+        u = float(np.sqrt(np.sum((references.weight * references.u_phase)[rest] ** 2)))
+        given = Input("noise of other references", 0.0, u)
+        items.append(Item("references", given, "rad", slope, f"{rest.sum()} shots of little weight"))
+    drift = scene.campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
+    given = Input("walk of the electronics", references.phase, references.u_walk)
+    source = f"site.toml: {drift:g} mrad in the first hour, as its square root; between {_gap(scene)}"
+    return [*items, Item("walk", given, "rad", slope, source)]
+
+
+def _gap(scene: Scene) -> str:
+    after = scene.references.seconds - scene.seconds
+    before, later = after[after <= 0], after[after > 0]
+    if not len(before) or not len(later):
+        return (
+            f"the shot and the nearest reference, {np.min(np.abs(after)):.0f} s {'before' if len(before) else 'later'}"
+        )
+    return f"references {later.min() - before.max():.0f} s apart"
+
+
+def _head(scene: Scene) -> list[Item]:
+    mirror, references = scene.mirror, scene.references
+    file = SHEET.format(mirror.zp)
+    slope, s = _phase_slope(scene)
+    target = 1.0 / scene.phasor
+    cube = complex(np.sum(references.weight / references.phasor))
+    share = references.level * np.abs(references.phasor) / references.amplitude
+    cube_level = complex(np.sum(share / references.phasor))
+    leakage = scene.leakage
+    items = []
+    for key, unit, value in (("real", 1.0, leakage.real), ("imaginary", 1.0j, leakage.imag)):
+        turn, level = (unit * (target - cube)).imag, (unit * (target - cube_level)).real
+        given = Input(f"leakage, {key}", value, mirror.u_leakage_volt)
+        by = slope * turn - s * mirror.amplitude_to_phase_rad * level
+        items.append(Item(f"leakage {key}", given, "V", by, f"{file}u_leakage_volt; in target and references alike"))
+    given = Input("distance of the cube D0", mirror.d0_mm, mirror.u_d0_mm)
+    return [*items, Item("d0", given, "mm", MILLIMETRE, f"{file}u_d0_mm"), *_effects(scene, file)]
+
+
+def _effects(scene: Scene, file: str) -> list[Item]:
+    """Axes, coupling and cyclic deviation, where the sheet knows of them."""
+    mirror = scene.mirror
+    unknowns = head_unknowns(scene.campaign, scene.ranger)
+    found = head_corrections(
+        scene.campaign,
+        scene.ranger,
+        head_columns(scene.campaign, scene.ranger),
+        sight=(scene.b - scene.a)[None],
+        phase=np.array([scene.phase]),
+        amplitude=np.array([abs(scene.phasor)]),
+        reference_amplitude=np.array([scene.references.amplitude]),
+        index=np.array([scene.index]),
+    )
+    slopes = iter(found.slopes[0])
+    items = []
+    for unknown in unknowns:
+        kind = unknown.name.partition(" ")[0]
+        values: tuple[float, ...]
+        if kind == "axes":
+            values, unit, factor = tuple(getattr(mirror, key) for key in AXES), "mm", MILLIMETRE
+        elif kind == "amplitude":
+            values, unit, factor = (mirror.amplitude_to_phase_rad,), "rad", 1.0
+        else:
+            values, unit, factor = (*mirror.cyclic_cosine_mm, *mirror.cyclic_sine_mm), "mm", MILLIMETRE
+        values = values or (0.0,) * len(unknown.parts)
+        for part, value in zip(unknown.parts, values, strict=True):
+            name = {"axes": part, "amplitude": "amplitude to phase", "cyclic": f"cyclic, {part}"}[kind]
+            given = Input(name, float(value), unknown.u / factor)
+            key = "coupling" if kind == "amplitude" else f"{kind} {part}"
+            items.append(Item(key, given, unit, float(next(slopes)) * factor, file + unknown.key))
+    return items
+
+
+def _frequency(scene: Scene) -> list[Item]:
+    f = scene.campaign.site.ranging.modulation_hz
+    given = Input("modulation frequency", f, scene.assumptions.u_frequency * f)
+    return [Item("frequency", given, "Hz", -scene.length / f, ASSUMED + "a rubidium oscillator left alone")]
+
+
+def _air(scene: Scene) -> list[Item]:
+    field, assumed = scene.field, scene.assumptions
+    by_index = -scene.length / scene.index
+    pressure, humidity = mean_readings(scene)
+    by_pressure, by_humidity = _weather_slopes(scene)
+    fluctuation = scene.campaign.site.ranging.path_index_fluctuation_ppm
+    items = []
+    for k, name in enumerate(field.names[:-1]):
+        given = Input(f"offset of thermometer {name}", 0.0, float(field.sigmas[k]))
+        source = ASSUMED + "never compared with a standard"
+        items.append(Item(f"thermometer {name}", given, "°C", by_index * float(scene.path.slopes[0, k]), source))
+    profile = field.names[-1]
+    unit = "°C" if profile == "bend" else "°C/m"
+    given = Input(f"{profile} of temperature with height", 0.0, float(field.sigmas[-1]))
+    source = ASSUMED + ("half-way between the stations" if profile == "bend" else "stations at one height")
+    formula = MODELS[scene.settings.air_model].standard_uncertainty / PPM
+    return [
+        *items,
+        Item("profile", given, unit, by_index * float(scene.path.slopes[0, -1]), source),
+        Item(
+            "pressure",
+            Input("pressure", pressure, assumed.u_pressure_hpa),
+            "hPa",
+            by_index * by_pressure,
+            "weather.csv; u " + ASSUMED + "a station's barometer",
+        ),
+        Item(
+            "humidity",
+            Input("relative humidity", humidity, assumed.u_humidity_percent),
+            "%",
+            by_index * by_humidity,
+            "weather.csv; u " + ASSUMED + "a station's hygrometer",
+        ),
+        Item("formula", Input("formula of the index", 0.0, formula), "ppm", by_index * PPM, scene.settings.air_model),
+        Item(
+            "fluctuation",
+            Input("path against smooth air", 0.0, fluctuation),
+            "ppm",
+            by_index * PPM,
+            "site.toml: path_index_fluctuation_ppm",
+        ),
+    ]
+
+
+def mean_readings(scene: Scene) -> tuple[float, float]:
+    """Pressure, hPa, at the stations' mean height, and relative humidity, %, smoothed to the shot's instant."""
+    state = scene.field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0]
+    return float(state[:, 1].mean()), float(state[:, 2].mean())
+
+
+def _weather_slopes(scene: Scene) -> tuple[float, float]:
+    """Of the path's mean group index by pressure (a hPa) and humidity (a %), temperature by the stations' line."""
+    field = scene.field
+    temperatures = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
+    pressure, humidity = mean_readings(scene)
+    middle = float(field.heights.mean())
+    slope, level = (0.0, float(temperatures.mean()))
+    if field.names[-1] == "bend":
+        slope, level = np.polyfit(field.heights - middle, temperatures, 1)
+
+    def slopes(z: np.ndarray) -> np.ndarray:
+        found = air(
+            level + slope * (z - middle),
+            pressure_at(pressure, middle, z),
+            np.full(z.shape, humidity),
+            wavelength_um=field.wavelength_um,
+            model=field.model,
+        ).sensitivity
+        return np.stack([found.pressure_hpa, found.humidity_percent])
+
+    by_pressure, by_humidity = mean_over_height(slopes, scene.a[2], scene.b[2])
+    return float(by_pressure), float(by_humidity)
+
+
+def _glass(scene: Scene) -> list[Item]:
+    place, campaign = scene.place, scene.campaign
+    n = campaign.site.ranging.bk7_to_air_group_index_ratio
+    u_n = scene.assumptions.half_width_index_ratio / np.sqrt(3.0)
+    ratio = Input("index of the glass over air", n, u_n, "rectangular")
+    melt = ASSUMED + "no sheet names its melt"
+    if place.kind == "ball":
+        file, r1, r2, u = ball_of(scene)
+        return [
+            Item("r1", Input("radius of the small ball", r1, u), "mm", -(n - 1.0) * MILLIMETRE, f"{file}u_r_mm"),
+            Item("r2", Input("radius of the large ball", r2, u), "mm", -n * MILLIMETRE, f"{file}u_r_mm"),
+            Item("ratio", ratio, "", -(r1 + r2) * MILLIMETRE, melt),
+        ]
+    if place.normal is None:
+        return []
+    height = place.height
+    cos_r = float(np.sqrt(1.0 - (np.sin(scene.incidence) / n) ** 2))
+    in_unit = place.group in campaign.triplets
+    file = f"triplets/{place.group}.toml: " if in_unit else "targets.toml: "
+    u_normal = scene.settings.u_plate_normal if in_unit else scene.settings.u_normal
+    by_angle = float(obliquity_slope(height, n, np.cos(scene.incidence)))
+    given = Input("height of the prism", height / MILLIMETRE, place.u_constant / n / MILLIMETRE)
+    tilt = Input("angle of incidence", scene.incidence / DEGREE, u_normal / DEGREE)
+    across = Input("tilt of the face across it", 0.0, u_normal / DEGREE)
+    return [
+        Item("height", given, "mm", -n * cos_r * MILLIMETRE, f"{file}u_height_mm"),
+        Item("ratio", ratio, "", -height / cos_r, melt),
+        Item("incidence", tilt, "°", by_angle * DEGREE, f"{file}normal; u " + ASSUMED + "as the layout's README"),
+        Item("across", across, "°", 0.0, "as the angle of incidence; second order only"),
+    ]
+
+
+def ball_of(scene: Scene) -> tuple[str, float, float, float]:
+    """File, radii and their standard uncertainty, mm, of the ball that a shot is on."""
+    triplet = next(t for t in scene.campaign.triplets.values() if t.ball.target == scene.target)
+    return f"triplets/{triplet.triplet}.toml: ", triplet.ball.r1_mm, triplet.ball.r2_mm, triplet.ball.u_r_mm
+
+
+def felt(scene: Scene) -> np.ndarray:
+    """References that the shot feels at all, indices into the scene's."""
+    return np.flatnonzero(np.abs(scene.references.weight) >= FELT)

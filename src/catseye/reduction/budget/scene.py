@@ -1,0 +1,296 @@
+"""One shot with everything that its range follows from, at the best values."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT
+from catseye.errors import InputError
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.mirror import Mirror
+from catseye.reduction.air import AirField, PathAir
+from catseye.reduction.head import head_corrections, head_unknowns
+from catseye.reduction.places import Place
+from catseye.reduction.ranges import Phases
+from catseye.reduction.settings import Settings
+from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
+from catseye.signal.drift import drift_at
+
+FELT = 1e-6  # weight of a reference below which a shot does not feel it
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Uncertainties that no record of a campaign states, each with its reason.
+
+    u_frequency                 of the modulation, relative: a rubidium oscillator left alone ages by some parts in 1e10
+                                a year
+    u_pressure_hpa              of the mean of the barometers: a station's barometer, compared with one standard
+    u_humidity_percent          of the mean of the hygrometers: their usual class
+    half_width_index_ratio      of the glass over air, rectangular: melts of one glass differ by so much and no sheet
+                                names its melt; the makers' index over air or over vacuum (`optics.glass`) lies within
+    thermometer_correlation     between any two stations' offsets, -1 to 1: 0 for thermometers never compared
+    """
+
+    u_frequency: float = 1e-9
+    u_pressure_hpa: float = 0.1
+    u_humidity_percent: float = 2.0
+    half_width_index_ratio: float = 5e-4
+    thermometer_correlation: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class References:
+    """The reference shots of one ranger as the electronics' phase at one instant depends on them, in order of time.
+
+    shots        (r,) indices into the campaign's shots
+    seconds      (r,) after the campaign's first shot
+    phasor       (r,) V, complex, free of leakage
+    unwrapped    (r,) rad
+    u_phase      (r,) rad, of the samples' noise
+    weight       (r,) of each phase in the electronics' phase; they sum to 1
+    level        (r,) weight of each amplitude in the reference amplitude
+    phase        rad, of the electronics
+    u_walk       rad, what the electronics may have walked off that
+    """
+
+    shots: np.ndarray
+    seconds: np.ndarray
+    phasor: np.ndarray
+    unwrapped: np.ndarray
+    u_phase: np.ndarray
+    weight: np.ndarray
+    level: np.ndarray
+    phase: float
+    u_walk: float
+
+    @property
+    def amplitude(self) -> float:
+        """V, of the cube's return at that instant."""
+        return float(self.level @ np.abs(self.phasor))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One shot's measurement.
+
+    row                  of the campaign's shots
+    seconds              of the shot, after the campaign's first
+    ranger, target       names; `place` is the target's
+    a, b                 (3,) m, scan point and target
+    phasor               V, the light
+    u_phasor, u_across   V, standard uncertainty of a quadrature, the two taken as alike, and of the one that turns it
+    references           of its ranger
+    field, path          the air, and its mean along the path
+    phase                rad in [0, 2 pi), the target's after the electronics', as measured
+    cycles, margin       N and how far the coarse length was from another, m (vacuum)
+    half                 m, half the modulation's wavelength in vacuum
+    glass, obliquity     Pc and dPc, m
+    incidence            rad, on a prism's face; 0 for others
+    head                 m, corrections of the ranger's head beyond zero and leakage
+    """
+
+    campaign: Campaign
+    settings: Settings
+    assumptions: Assumptions
+    row: int
+    seconds: float
+    ranger: str
+    target: str
+    place: Place
+    a: np.ndarray
+    b: np.ndarray
+    phasor: complex
+    u_phasor: float
+    u_across: float
+    references: References
+    field: AirField
+    path: PathAir
+    phase: float
+    cycles: int
+    margin: float
+    half: float
+    glass: float
+    obliquity: float
+    incidence: float
+    head: float
+
+    @property
+    def mirror(self) -> Mirror:
+        return self.campaign.mirror_of(self.ranger)
+
+    @property
+    def towards(self) -> np.ndarray:
+        """Unit vector from the target to the scan point."""
+        return (self.a - self.b) / np.linalg.norm(self.a - self.b)
+
+    @property
+    def index(self) -> float:
+        return 1.0 + float(self.path.refractivity[0])
+
+    @property
+    def leakage(self) -> complex:
+        """V, what was subtracted from every phasor of this ranger."""
+        return complex(self.mirror.leakage_amplitude_volt * np.exp(1j * self.mirror.leakage_phase_rad))
+
+    @property
+    def length(self) -> float:
+        """m, of the way in air that the phase measured."""
+        return float(unwrapped_length(self.cycles, self.phase, self.half)) / self.index
+
+    @property
+    def range_(self) -> float:
+        """m, scan point to the target's point.
+
+        Source: [PARKER04] eq. 5.18 and 5.19, with the glass and the head's corrections in metres.
+        """
+        return self.length + self.mirror.d0_mm * MILLIMETRE + self.glass + self.obliquity + self.head
+
+
+def scene_of(
+    campaign: Campaign,
+    phases: Phases,
+    wrong: dict[int, str],
+    row: int,
+    *,
+    ends: tuple[np.ndarray, np.ndarray],
+    place: Place,
+    settings: Settings,
+    assumptions: Assumptions | None = None,
+) -> Scene:
+    """The scene of a shot on a target that has a phase and a reference.
+
+    wrong   reference shots that were left out, by row, as `follow_electronics` gives them
+    row     of the campaign's shots
+    ends    (3,) m, scan point and target where they are taken to be: they say where the air is and which cycle it was
+    place   the target's
+
+    Raises InputError where the target's face looks away from the ranger: it cannot have returned the light.
+    """
+    from catseye.optics.prism import obliquity_correction
+
+    shots = campaign.shots
+    ranger, target = shots.ranger[row], shots.target[row]
+    a, b = ends
+    mirror = campaign.mirror_of(ranger)
+    references = references_of(campaign, phases, wrong, row)
+    field = AirField.of(campaign, settings)
+    path = field.along(shots.mjd_utc[[row]], a[None], b[None], np.zeros(len(field.names)))
+    distance = float(np.linalg.norm(a - b))
+    incidence, obliquity = 0.0, 0.0
+    if place.normal is not None:
+        cosine = float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
+        if cosine <= 0.0:
+            raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
+        ratio = campaign.site.ranging.bk7_to_air_group_index_ratio
+        incidence = float(np.arccos(cosine))
+        obliquity = float(obliquity_correction(place.height, ratio, cosine))
+    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
+    phase = float(fraction(phases.phase[row], references.phase))
+    index = 1.0 + float(path.refractivity[0])
+    head = _head(campaign, ranger, b - a, phase, abs(phases.phasor[row]), references.amplitude, index)
+    coarse = index * (distance - place.constant - obliquity - mirror.d0_mm * MILLIMETRE - head)
+    cycles, margin = whole_cycles(coarse, phase, half)
+    return Scene(
+        campaign=campaign,
+        settings=settings,
+        assumptions=assumptions or Assumptions(),
+        row=row,
+        seconds=_seconds(campaign, row),
+        ranger=ranger,
+        target=target,
+        place=place,
+        a=a,
+        b=b,
+        phasor=complex(phases.phasor[row]),
+        u_phasor=float(phases.u_phasor[row]),
+        u_across=float(phases.u_across[row]),
+        references=references,
+        field=field,
+        path=path,
+        phase=phase,
+        cycles=int(cycles),
+        margin=float(margin),
+        half=half,
+        glass=place.constant,
+        obliquity=obliquity,
+        incidence=incidence,
+        head=head,
+    )
+
+
+def references_of(campaign: Campaign, phases: Phases, wrong: dict[int, str], row: int) -> References:
+    """The good reference shots of a shot's ranger, and how the electronics' phase at the shot follows from them.
+
+    Raises InputError where the ranger has none.
+
+    Source: as `follow_electronics`; the weights are those of `drift_at`, which is linear in the phases.
+    """
+    shots = campaign.shots
+    mine = [
+        k
+        for k, (ranger, target) in enumerate(zip(shots.ranger, shots.target, strict=True))
+        if ranger == shots.ranger[row] and target == REFERENCE and not phases.reason[k] and k not in wrong
+    ]
+    if not mine:
+        raise InputError(f"shot {shots.shot[row]}: {shots.ranger[row]} has no usable shot on its internal cube")
+    rows = np.array(sorted(mine, key=lambda k: float(shots.mjd_utc[k])))
+    seconds = np.array([_seconds(campaign, k) for k in rows])
+    when = np.array([_seconds(campaign, row)])
+    walk = walk_of(campaign)
+    variance = phases.u_phase[rows] ** 2
+    unwrapped = np.unwrap(np.angle(phases.phasor[rows]))
+    phase, covariance = drift_at(seconds, unwrapped, variance, when, random_walk=walk)
+    unit = np.eye(len(rows))
+    weight = np.array([drift_at(seconds, each, variance, when, random_walk=walk)[0][0] for each in unit])
+    level = np.array([np.interp(when[0], seconds, each) for each in unit])
+    return References(
+        shots=rows,
+        seconds=seconds,
+        phasor=phases.phasor[rows],
+        unwrapped=unwrapped,
+        u_phase=phases.u_phase[rows],
+        weight=weight,
+        level=level,
+        phase=float(phase[0]),
+        u_walk=float(np.sqrt(max(covariance[0, 0] - weight**2 @ variance, 0.0))),
+    )
+
+
+def walk_of(campaign: Campaign) -> float:
+    """Random walk of the electronics, rad per square root of a second."""
+    return campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * 1e-3 / 60.0
+
+
+def _seconds(campaign: Campaign, row: int) -> float:
+    return float((campaign.shots.mjd_utc[row] - campaign.shots.mjd_utc[0]) * SECONDS_PER_DAY)
+
+
+def head_columns(campaign: Campaign, ranger: str) -> dict[str, int]:
+    """First place of each unknown of a head in a list of all its parts."""
+    at, first = {}, 0
+    for unknown in head_unknowns(campaign, ranger):
+        at[unknown.name], first = first, first + len(unknown.parts)
+    return at
+
+
+def _head(
+    campaign: Campaign,
+    ranger: str,
+    sight: np.ndarray,
+    phase: float,
+    amplitude: float,
+    reference_amplitude: float,
+    index: float,
+) -> float:
+    found = head_corrections(
+        campaign,
+        ranger,
+        head_columns(campaign, ranger),
+        sight=sight[None],
+        phase=np.array([phase]),
+        amplitude=np.array([amplitude]),
+        reference_amplitude=np.array([reference_amplitude]),
+        index=np.array([index]),
+    )
+    return float(found.value[0])

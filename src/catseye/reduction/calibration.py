@@ -1,0 +1,96 @@
+"""What a calibration gives, whatever was calibrated: quantities with covariance, residuals, decisions, provenance."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One calibrated number.
+
+    key      its name in files, with its unit: "d0_mm"
+    value    in that unit
+    u        standard uncertainty, in that unit, all known causes together
+    unit     for people: "mm"
+    meaning  one line for the certificate
+    """
+
+    key: str
+    value: float
+    u: float
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A statistical test or a comparison with a limit, with its outcome.
+
+    name       "outliers: largest |w|"
+    statistic  what was computed
+    limit      what it was compared with
+    passed     the outcome; None where the data do not allow the test
+    text       what it means, one sentence
+    """
+
+    name: str
+    statistic: float
+    limit: float
+    passed: bool | None
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The outcome of one calibration: everything that its record and its certificate show.
+
+    kind         "reference-distance", "leakage", ...: as `catseye calibrate` calls it
+    title        "Reference distance D0 of ZP103"
+    provenance   of the readings: serial, measured_on, valid_until, by, report, and what else the sheet says
+    quantities   what was found, in order
+    covariance   (q, q) of the quantities, in their units
+    columns      headings of the table of readings, each with its unit in the name
+    rows         of that table: the readings, what was corrected, the residual, the test statistic, used or why not
+    decisions    tests
+    variance_factor, degrees_of_freedom   of the adjustment; NaN and 0 where nothing was redundant
+    notes        what a person should know, one line each
+    curve        x, y, what was fitted for the figure: name -> (x, y) arrays; "readings" and "fit" at least; where they
+                 are there, "residuals" and "spectrum" are drawn below, "left out" among the readings
+    axes         labels of that figure
+    method       how the readings became the quantities, in a few sentences for the certificate
+    record       what can be copied into the record that the quantities belong to, by its keys: numbers or lists
+    equal_axes   the figure is a plane: both axes to one scale
+    """
+
+    kind: str
+    title: str
+    provenance: dict[str, Any]
+    quantities: tuple[Quantity, ...]
+    covariance: np.ndarray
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    decisions: tuple[Decision, ...] = ()
+    variance_factor: float = float("nan")
+    degrees_of_freedom: int = 0
+    notes: tuple[str, ...] = ()
+    curve: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    axes: tuple[str, str] = ("", "")
+    method: str = ""
+    record: dict[str, Any] = field(default_factory=dict)
+    equal_axes: bool = False
+
+    def value(self, key: str) -> float:
+        """The quantity of that key; KeyError where there is none."""
+        return self._named(key).value
+
+    def u(self, key: str) -> float:
+        """Its standard uncertainty; KeyError where there is none."""
+        return self._named(key).u
+
+    def _named(self, key: str) -> Quantity:
+        for quantity in self.quantities:
+            if quantity.key == key:
+                return quantity
+        raise KeyError(key)

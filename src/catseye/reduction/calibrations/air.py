@@ -1,0 +1,117 @@
+"""The air of a laboratory or a rail: group index of the ranger, phase index of the interferometer, what moves both."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+from catseye.atmosphere.air import MODELS, air, phase_refractivity
+from catseye.constants import PPM, SPEED_OF_LIGHT
+from catseye.records.readings import Readings, Sheet
+from catseye.records.record import Within
+from catseye.reduction.calibrations.fit import Effect
+
+WEATHER = {
+    "temperature_c": Within(-40, 60),
+    "pressure_hpa": Within(300, 1200),
+    "humidity_percent": Within(0, 100),
+}
+SENSORS = ("temperature_c", "pressure_hpa", "humidity_percent")
+STEPS = (0.5, 0.5, 0.5)  # °C, hPa, %: the phase index is smooth, central differences are good to 1e-5 of a slope
+Spread = Annotated[float, Within(0, 100)]
+
+
+class AirSheet(Sheet):
+    """A sheet of readings taken through air.
+
+    modulation_hz, u_modulation_ppm        frequency of the modulation, and its standard uncertainty
+    wavelength_um                          of the ranger's light in vacuum
+    air_model                              formula for the index
+    temperature_c, pressure_hpa, humidity_percent   of all readings; a column where they changed
+    u_temperature_c, ...                   of the sensor: an offset that all readings share
+    """
+
+    modulation_hz: Annotated[float, Within(1e7, 1e11)]
+    u_modulation_ppm: Annotated[float, Within(0, 1000)]
+    wavelength_um: Annotated[float, Within(0.3, 1.7)] = 0.780
+    air_model: Literal["ciddor_hill1999", "rueger1990"] = "ciddor_hill1999"
+    temperature_c: Annotated[float, WEATHER["temperature_c"]] | None = None
+    pressure_hpa: Annotated[float, WEATHER["pressure_hpa"]] | None = None
+    humidity_percent: Annotated[float, WEATHER["humidity_percent"]] | None = None
+    u_temperature_c: Spread
+    u_pressure_hpa: Spread
+    u_humidity_percent: Spread
+
+
+@dataclass(frozen=True, eq=False)
+class Air:
+    """The index along each path, and how an offset of a sensor changes it.
+
+    index    (m,)
+    slopes   (3, m) per °C, hPa, %
+    u_model  standard uncertainty of the formula
+    """
+
+    index: np.ndarray
+    slopes: np.ndarray
+    u_model: float
+
+
+def group_air(readings: Readings) -> Air:
+    """Group index of the ranger's light for every reading."""
+    sheet = readings.sheet
+    state = air(
+        *(readings.get(name) for name in SENSORS),
+        wavelength_um=sheet.wavelength_um,
+        model=sheet.air_model,
+        modulation_hz=sheet.modulation_hz,
+    )
+    return Air(np.asarray(state.group_index), np.array([*state.sensitivity]), state.standard_uncertainty)
+
+
+def phase_air(readings: Readings, wavelength_um: float) -> Air:
+    """Phase index of an interferometer's light in the same air."""
+    sheet = readings.sheet
+    weather = [readings.get(name) for name in SENSORS]
+
+    def index(shift: np.ndarray) -> np.ndarray:
+        moved = [w + s for w, s in zip(weather, shift, strict=True)]
+        return np.asarray(phase_refractivity(*moved, wavelength_um=wavelength_um, model=sheet.air_model))
+
+    slopes = []
+    for k, step in enumerate(STEPS):
+        up, down = np.zeros(3), np.zeros(3)
+        # Humidity may stand at either end of its scale: then the difference is one-sided.
+        room = 100.0 if k == 2 else np.inf
+        up[k] = step if np.all(weather[k] + step <= room) else 0.0
+        down[k] = -step if k < 2 or np.all(weather[k] >= step) else 0.0
+        slopes.append((index(up) - index(down)) / (up[k] - down[k]))
+    return Air(1.0 + index(np.zeros(3)), np.array(slopes), MODELS[sheet.air_model].standard_uncertainty)
+
+
+def half_wavelength(readings: Readings, state: Air) -> np.ndarray:
+    """(m,) m, half the modulation's group wavelength in the air of each reading. Source: [PARKER04] eq. 5.16."""
+    return 0.5 * SPEED_OF_LIGHT / (state.index * readings.sheet.modulation_hz)
+
+
+def sensor_effects(readings: Readings, columns: np.ndarray) -> list[Effect]:
+    """Offsets of the three sensors, `columns` (3, m) being the change of the observed values per °C, hPa, %."""
+    sheet = readings.sheet
+    return [
+        Effect(f"offset of the sensor of {name}", column, getattr(sheet, f"u_{name}"))
+        for name, column in zip(SENSORS, columns, strict=True)
+    ]
+
+
+def ranger_effects(readings: Readings, state: Air, path: np.ndarray) -> list[Effect]:
+    """What stretches the ranger's path (m,) m: a reading too long for each unit of frequency, formula and sensors.
+
+    A true index above the one computed with shortens the true path against the computed one, so the computed is too
+    long by path / n for each unit of index; likewise a true frequency above the nominal one, by path for each unit.
+    """
+    stretch = path / state.index
+    return [
+        Effect("frequency of the modulation, ppm", path * PPM, readings.sheet.u_modulation_ppm),
+        Effect("formula for the group index", stretch, state.u_model),
+        *sensor_effects(readings, state.slopes * stretch),
+    ]

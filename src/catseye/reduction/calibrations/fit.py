@@ -1,0 +1,267 @@
+"""The adjustment that all calibrations share: a line through readings, systematic effects with priors, tests.
+
+What is sought are a few parameters of a linear model. Systematic effects are further parameters with mean zero and a
+known standard uncertainty. The scatter is either claimed, or estimated from the readings themselves (restricted maximum
+likelihood) where nobody claims it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.adjustment import Solution, adjust
+from catseye.estimation.observations import Linear
+from catseye.estimation.reliability import checked, global_test, single_level, tau_critical, w_critical
+from catseye.reduction.calibration import Decision
+from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
+
+SCATTER_LIMIT = 0.05  # level of the test of the variance factor, two-sided
+MOST_REJECTED = 1.0 / 3.0  # of the readings: beyond it the model is wrong, not the readings
+USED, SUSPECT, REJECTED = "used", "suspect", "rejected"
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """A systematic effect that shifts all readings together.
+
+    name     what it is, for the certificate
+    column   (m,) change of the observed values for each unit of it
+    u        its standard uncertainty, in that unit; zero leaves it out
+    """
+
+    name: str
+    column: np.ndarray
+    u: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """How the observed values scatter: what is claimed, and matrices whose factors the readings decide.
+
+    claimed      (m, m) covariance, known beforehand
+    unknown      what scatters -> (m, m) matrix Q; its variance factor is estimated
+    """
+
+    claimed: np.ndarray
+    unknown: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The outcome over m observed values and p sought parameters.
+
+    x, covariance       (p,), (p, p) of the sought parameters, systematic effects included
+    scattered           (p, p) the part of it that comes from the scatter alone
+    effects             effect -> its value and u after the adjustment
+    components          what scattered -> its estimated standard deviation
+    residual, predicted (m,) observed minus predicted, with the effects as estimated; what the sought parameters predict
+    sigma               (m,) standard uncertainty of the observed value, scatter alone
+    statistic           (m,) standardised residual; of a value left out, that of its prediction
+    active              (m,) bool
+    checked             (m,) bool: the others would show an error of it
+    test, critical      "w" (scatter claimed) or "tau" (scatter estimated), and the limit of a single test
+    variance_factor, degrees_of_freedom   NaN and the degrees where the scatter was estimated: it would be 1
+    effective         (p,) degrees of freedom of each parameter's scattered variance; infinite where scatter is claimed
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    scattered: np.ndarray
+    effects: dict[str, tuple[float, float]]
+    components: dict[str, float]
+    residual: np.ndarray
+    predicted: np.ndarray
+    sigma: np.ndarray
+    statistic: np.ndarray
+    active: np.ndarray
+    checked: np.ndarray
+    test: str
+    critical: float
+    variance_factor: float
+    degrees_of_freedom: float
+    effective: np.ndarray
+
+    @property
+    def suspects(self) -> np.ndarray:
+        """(m,) bool: takes part although the test rejects it."""
+        return self.active & self.checked & (np.abs(self.statistic) > self.critical)
+
+    def decisions(self, level: float = SCATTER_LIMIT) -> tuple[Decision, ...]:
+        """Tests of the scatter and of the single readings."""
+        told = []
+        if self.test == "w" and self.degrees_of_freedom > 0.5:
+            test = global_test(self.variance_factor * self.degrees_of_freedom, self.degrees_of_freedom, level)
+            low, high = test.lower, test.upper
+            limit = high if self.variance_factor >= 1.0 else low
+            told.append(
+                Decision(
+                    "scatter: variance factor",
+                    self.variance_factor,
+                    limit,
+                    bool(low <= self.variance_factor <= high),
+                    f"{low:.3g} to {high:.3g} is expected 19 times in 20 if the claimed scatter is true",
+                )
+            )
+        elif self.test == "tau":
+            told.append(
+                Decision(
+                    "scatter: variance factor",
+                    float("nan"),
+                    float("nan"),
+                    None,
+                    "the scatter was estimated from these readings, so they cannot test it",
+                )
+            )
+        else:
+            told.append(Decision("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings"))
+        tested = self.active & self.checked
+        if tested.any():
+            worst = float(np.max(np.abs(self.statistic[tested])))
+            count = int(np.count_nonzero(self.suspects))
+            text = "no reading stands out" if not count else f"{count} of the values used stand out: look at them"
+            told.append(Decision(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
+        else:
+            told.append(Decision("outliers", float("nan"), float("nan"), None, "no reading is checked by the others"))
+        return tuple(told)
+
+    def state(self, reasons: Sequence[str]) -> tuple[str, ...]:
+        """(m,) of each value: used, suspect, rejected, or the reason why it was left out beforehand."""
+        suspects = self.suspects
+        return tuple(
+            f"left out: {reason}" if reason else SUSPECT if s else USED if a else REJECTED
+            for reason, s, a in zip(reasons, suspects, self.active, strict=True)
+        )
+
+
+def fit_readings(
+    observed: np.ndarray,
+    design: np.ndarray,
+    scatter: Scatter,
+    *,
+    names: Sequence[str],
+    effects: Sequence[Effect] = (),
+    active: np.ndarray | None = None,
+    together: np.ndarray | None = None,
+    reject: bool = False,
+    level: float = 0.05,
+) -> Fit:
+    """The parameters of a linear model that fit readings best.
+
+    observed   (m,)
+    design     (m, p) derivatives by the sought parameters
+    scatter    of the observed values
+    names      (p,) of the parameters, for messages
+    effects    systematic, with priors
+    active     (m,) bool: takes part at the start; all if None
+    together   (m,) labels: values of one label leave together, as both quadratures of a phasor
+    reject     leave out what the test rejects, worst first, one at a time
+    level      of the tests, chance of any false alarm among all
+
+    Returns a Fit. Raises EstimationError where the readings do not hold every parameter, or where a third of them
+    would have to go.
+
+    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model with priors); [BAARDA68] (w test), [POPE76] (tau test);
+    [PATTERSON71] (scatter from the readings).
+    """
+    m = len(observed)
+    on = np.ones(m, dtype=bool) if active is None else np.array(active, dtype=bool)
+    start = int(on.sum())
+    labels = np.arange(m) if together is None else np.asarray(together)
+    while True:
+        fit = _fitted(observed, design, scatter, names=names, effects=effects, on=on, level=level)
+        if not reject or not fit.suspects.any():
+            return fit
+        worst = int(np.argmax(np.where(fit.suspects, np.abs(fit.statistic), -1.0)))
+        on = on & (labels != labels[worst])
+        if start - on.sum() > MOST_REJECTED * start:
+            raise EstimationError(
+                f"more than {MOST_REJECTED:.0%} of the readings would have to be rejected: they do not follow the "
+                "model, or their uncertainties are too small; calibrate without --reject and look at the residuals"
+            )
+
+
+def _fitted(
+    observed: np.ndarray,
+    design: np.ndarray,
+    scatter: Scatter,
+    *,
+    names: Sequence[str],
+    effects: Sequence[Effect],
+    on: np.ndarray,
+    level: float,
+) -> Fit:
+    acting = [e for e in effects if e.u > 0.0]
+    p, q = design.shape[1], len(acting)
+    wide = np.column_stack([design, *(e.column for e in acting)])
+    covariance, components = scatter.claimed, {}
+    if scatter.unknown:
+        shared = sum((e.u**2 * np.outer(e.column, e.column) for e in acting), np.zeros_like(covariance))
+        block = np.ix_(on, on)
+        variances = restricted_likelihood(
+            observed[on],
+            design[on],
+            [matrix[block] for matrix in scatter.unknown.values()],
+            (scatter.claimed + shared)[block],
+        )
+        components = {name: float(np.sqrt(v)) for name, v in zip(scatter.unknown, variances, strict=True)}
+        covariance = covariance + sum(v * matrix for v, matrix in zip(variances, scatter.unknown.values(), strict=True))
+    groups = [Linear("readings", observed, covariance, np.arange(p + q), wide)]
+    if q:
+        variance = np.array([e.u for e in acting]) ** 2
+        groups.append(Linear("effects", np.zeros(q), variance, p + np.arange(q), np.eye(q)))
+    solution = adjust(
+        np.zeros(p + q),
+        groups,
+        active=[on, np.ones(q, dtype=bool)][: len(groups)],
+        names=[*names, *(e.name for e in acting)],
+    ).require_converged()
+    degrees = np.full(p, np.inf)
+    if components:
+        acted = [q[np.ix_(on, on)] for q, v in zip(scatter.unknown.values(), components.values(), strict=True) if v]
+        degrees = effective_degrees(design[on], acted, covariance[np.ix_(on, on)])
+    return _outcome(solution, groups[0], [e.name for e in acting], components, on=on, level=level, effective=degrees)
+
+
+def _outcome(
+    solution: Solution,
+    readings: Linear,
+    acting: Sequence[str],
+    components: dict[str, float],
+    *,
+    on: np.ndarray,
+    level: float,
+    effective: np.ndarray,
+) -> Fit:
+    found, p = solution.fits[0], len(effective)
+    full = solution.covariance
+    block = np.ix_(on, on)
+    design = readings.matrix[:, :p]
+    weight = np.linalg.inv(readings.covariance[block])
+    scattered = np.linalg.inv(design[on].T @ weight @ design[on])
+    degrees = float(np.sum(found.redundancy[on]))
+    factor = found.pvv / degrees if degrees > 1e-6 else float("nan")
+    tested = checked(found) & on
+    single = single_level(level, max(int(tested.sum()), 1))
+    estimated = bool(components) and degrees > 1.5
+    critical = tau_critical(single, degrees) if estimated else w_critical(single)
+    statistic = found.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
+    return Fit(
+        x=solution.x[:p],
+        covariance=full[:p, :p],
+        scattered=scattered,
+        effects={name: (float(solution.x[p + k]), float(np.sqrt(full[p + k, p + k]))) for k, name in enumerate(acting)},
+        components=components,
+        residual=found.residual,
+        predicted=design @ solution.x[:p],
+        sigma=found.sigma,
+        statistic=statistic,
+        active=on,
+        checked=checked(found),
+        test="tau" if components else "w",
+        critical=critical,
+        variance_factor=float("nan") if components else factor,
+        degrees_of_freedom=degrees,
+        effective=effective,
+    )

@@ -1,0 +1,75 @@
+"""What a kind of calibration is: a layout of table and sheet, and the recipe that makes a Calibration of them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catseye.records.readings import Layout, Readings
+from catseye.reduction.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.fit import Fit
+
+PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "report")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of calibration.
+
+    about     what it finds, one line for the command line
+    layout    of its table and sheet
+    recipe    function (readings, reject) -> Calibration; reject: leave out what the tests reject
+    """
+
+    about: str
+    layout: Layout
+    recipe: Callable[[Readings, bool], Calibration]
+
+
+def provenance(readings: Readings) -> dict[str, Any]:
+    """Who measured what with which files, then every other key of the sheet as it was given."""
+    sheet = readings.sheet
+    said = {key: getattr(sheet, key) for key in PROVENANCE}
+    rest = {
+        key: value
+        for key, value in sheet.model_dump().items()
+        if key not in said and key not in ("format", "kind") and value is not None
+    }
+    return {**said, "inputs_sha256": dict(readings.hashes), "sheet": rest}
+
+
+def quantities(
+    keys: Sequence[tuple[str, str, str]], values: np.ndarray, covariance: np.ndarray
+) -> tuple[Quantity, ...]:
+    """Quantities from (key, unit, meaning), values and covariance in the units."""
+    u = np.sqrt(np.diag(covariance))
+    return tuple(
+        Quantity(key, float(v), float(s), unit, meaning)
+        for (key, unit, meaning), v, s in zip(keys, values, u, strict=True)
+    )
+
+
+def scatter_notes(fit: Fit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
+    """How the readings scatter and from how many degrees of freedom, in a unit of `scale` SI units.
+
+    sought   how many of the first parameters are of interest; all if None
+    """
+    from scipy.special import stdtrit
+
+    told = []
+    for name, deviation in fit.components.items():
+        told.append(f"{name}: {deviation / scale:.3g} {unit} (standard deviation, estimated from the readings)")
+    least = float(np.min(fit.effective[:sought]))
+    if np.isfinite(least):
+        factor = float(stdtrit(least, 0.975))
+        told.append(
+            f"the estimated scatter has {least:.3g} effective degrees of freedom: for it alone the coverage factor of "
+            f"95 % is {factor:.2f}, where the intervals here use 2"
+        )
+    if fit.suspects.any():
+        told.append(
+            f"{np.count_nonzero(fit.suspects)} suspect values are still used; --reject leaves them out, or a reason in "
+            "the column left_out"
+        )
+    return tuple(told)

@@ -1,0 +1,118 @@
+"""calibrate as programs call it: statuses, streams, files whole or not at all; the examples tell their truth."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from catseye.cli.commands import app
+from catseye.cli.terminal import attempt
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "calibrations"
+# The truth of each example stands in the comment of its sheet.
+TRUTH = {
+    "reference-distance": {"d0_mm": 180.685},
+    "leakage": {"leakage_amplitude_volt": 0.03104, "leakage_phase_rad": 4.3574},
+    "leakage-lit": {"leakage_amplitude_volt": 0.03104, "leakage_phase_rad": 4.3574},
+    "linearity": {
+        "zero_mm": 0.035,
+        "scale_ppm": 0.4,
+        "cyclic_cosine_1_mm": 0.006,
+        "cyclic_sine_1_mm": -0.009,
+        "cyclic_cosine_2_mm": -0.0025,
+        "cyclic_sine_2_mm": 0.0015,
+    },
+    "retroreflector": {"pc_ball-7_mm": -173.715, "pc_prism-12_mm": -33.4937},
+    "amplitude-to-phase": {"amplitude_to_phase_rad": -1.8e-3},
+}
+WRONG = {
+    "reference-distance": 13, "leakage": 29, "leakage-lit": None, "linearity": 77, "retroreflector": 41,
+    "amplitude-to-phase": 9,
+}  # fmt: skip
+
+
+@pytest.fixture
+def catseye(capsys):
+    """The command in this process: exit status, what it said, what it complained of."""
+    import typer
+
+    import catseye.cli.calibrate  # noqa: F401
+
+    def run(*arguments):
+        command = typer.main.get_command(app)
+        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
+        said = capsys.readouterr()
+        return status, said.out, said.err
+
+    return run
+
+
+@pytest.mark.parametrize("kind", TRUTH)
+def test_an_example_finds_its_truth_and_its_one_wrong_reading(catseye, kind):
+    status, out, err = catseye("calibrate", kind, EXAMPLES / f"{kind}.csv", "--reject", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out, parse_constant=pytest.fail)
+    assert found["not_used"] == ([] if WRONG[kind] is None else [WRONG[kind]])
+    for key, value in TRUTH[kind].items():
+        each = found["quantities"][key]
+        assert abs(each["value"] - value) < 3.5 * each["u"], key
+    assert all(d["passed"] is not False for d in found["decisions"]), found["decisions"]
+
+
+def test_without_reject_nothing_is_left_out_and_the_tests_say_so(catseye):
+    status, out, _ = catseye("calibrate", "linearity", EXAMPLES / "linearity.csv", "--json")
+    found = json.loads(out)
+    assert (status, found["not_used"]) == (0, [])
+    assert found["readings"][77]["state"] == "suspect"
+    assert {d["name"]: d["passed"] for d in found["decisions"]}["outliers: largest |w|"] is False
+
+
+def test_files_appear_whole_and_only_where_catseye_may_write(catseye, tmp_path):
+    record, page = tmp_path / "r.toml", tmp_path / "c.html"
+    arguments = ("calibrate", "leakage", EXAMPLES / "leakage.csv", "--write", record, "--certificate", page)
+    status, out, err = catseye(*arguments)
+    assert (status, err) == (0, "")
+    assert "leakage_amplitude_volt" in out
+    assert tomllib.loads(record.read_text(encoding="utf-8"))["format"] == "catseye-calibration-1"
+    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert catseye(*arguments, "--quiet") == (0, "", "")  # our own files may be replaced
+    page.write_text("somebody's", encoding="utf-8")
+    before = record.stat().st_mtime_ns
+    status, out, err = catseye(*arguments)
+    assert (status, out) == (1, "")
+    assert "exists and is not catseye's" in err
+    assert len(err.splitlines()) == 1
+    assert record.stat().st_mtime_ns == before  # neither is begun
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.html", "r.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("leakage", "no.csv"), "no.toml: missing"),
+        (("leakage", EXAMPLES / "linearity.csv"), "linearity.toml"),
+        (("leakage", EXAMPLES / "leakage.csv", "--sheet", EXAMPLES / "linearity.toml"), "linearity.toml"),
+        (
+            ("leakage", EXAMPLES / "leakage.csv", "--write", EXAMPLES / "leakage.toml"),
+            "is an input of this calibration",
+        ),
+        (("leakage", EXAMPLES / "leakage.csv", "--write", "x", "--certificate", "x"), "is the --certificate too"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line_and_status_1(catseye, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = catseye("calibrate", *arguments)
+    assert (status, out) == (1, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_kind_is_wrong_usage_and_help_has_an_example(catseye):
+    status, out, err = catseye("calibrate", "bogus", "x.csv")
+    assert status == 2
+    assert "'bogus' is not one of reference-distance, leakage" in " ".join((out + err).split())
+    status, out, _ = catseye("calibrate", "--help")
+    assert status == 0
+    assert "catseye calibrate linearity examples/calibrations/linearity.csv" in out

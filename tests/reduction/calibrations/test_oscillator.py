@@ -1,0 +1,46 @@
+"""The oscillator test on made phases: what was planted comes out, in ranges too."""
+
+import numpy as np
+import pytest
+
+from catseye.errors import InputError
+from catseye.reduction.calibrations.oscillator import KIND, OscillatorSheet, measure_oscillator
+from reduction.calibrations.length_scene import readings
+
+
+def phases(seed=1, spur=2e-3):
+    rng = np.random.default_rng(seed)
+    time = np.arange(8192) * 1e-3
+    return 3.0 + 0.01 * rng.normal(size=8192) + spur * np.sin(2 * np.pi * 57.0 * time)
+
+
+def test_noise_spur_and_the_range_that_averages_128_cycles():
+    found = measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()}, interval_s=0.001))
+    assert found.value("white_mrad2") == pytest.approx(100.0, abs=4 * found.u("white_mrad2"))
+    expected = 0.01 / np.sqrt(128) * 99.93e3 / (2 * np.pi)  # µm
+    assert found.value("white_range_um") == pytest.approx(expected, abs=4 * found.u("white_range_um"))
+    assert not found.decisions[0].passed
+    assert "57" in found.decisions[0].text
+    quiet = measure_oscillator(
+        readings(OscillatorSheet, KIND, numbers={"phase_rad": phases(spur=0.0)}, interval_s=0.001)
+    )
+    assert quiet.decisions[0].passed
+
+
+def test_phases_that_wrap_are_unwrapped():
+    plain = readings(OscillatorSheet, KIND, numbers={"phase_rad": phases() + 3.2}, interval_s=0.001)
+    wrapped = readings(
+        OscillatorSheet, KIND, numbers={"phase_rad": np.mod(phases() + 3.2, 2 * np.pi)}, interval_s=0.001
+    )
+    assert measure_oscillator(wrapped).value("white_mrad2") == pytest.approx(
+        measure_oscillator(plain).value("white_mrad2"), rel=1e-6
+    )
+
+
+def test_series_with_holes_or_too_short_are_refused():
+    left_out = ("",) * 99 + ("bump",)
+    holed = readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()[:100]}, left_out=left_out, interval_s=0.001)
+    with pytest.raises(InputError, match="line 101, is left out"):
+        measure_oscillator(holed)
+    with pytest.raises(InputError, match="at least 64"):
+        measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()[:20]}, interval_s=0.001))
