@@ -124,7 +124,7 @@ SOURCES: dict[str, Source] = {
     "FOERSTNER16": Source(
         title="W. Förstner and B. P. Wrobel, Photogrammetric Computer Vision, Springer, 2016",
         locator="doi:10.1007/978-3-319-11550-4",
-        used="chapters 3 and 4: tests of hypotheses, Gauss-Markov model, evaluation of the result, robust estimation and outlier detection",
+        used="chapters 3 and 4: tests of hypotheses, Gauss-Markov model, evaluation, robust estimation, outliers",
     ),
     "HUBER09": Source(
         title="P. J. Huber and E. M. Ronchetti, Robust Statistics, second edition, Wiley, 2009",
@@ -134,7 +134,7 @@ SOURCES: dict[str, Source] = {
     "JCGM100": Source(
         title="JCGM, Evaluation of measurement data: guide to the expression of uncertainty in measurement, 2008",
         locator="JCGM 100:2008",
-        used="4.2.3 (mean), eqs. 10, 13, 16 and G.2b (combined uncertainty, degrees of freedom), 5.1.3, annexes G and H.1",
+        used="4.2.3, 5.1.3, eqs. 10, 13, 16 and G.2b (combined uncertainty, degrees of freedom), annex H.1",
     ),
     "BAARDA73": Source(
         title="W. Baarda, S-transformations and criterion matrices, Netherlands Geodetic Commission, 1973",

@@ -9,7 +9,7 @@ from catseye.errors import InputError
 from catseye.records.baseline import Baseline, baseline_text, read_baseline, read_heights, read_observations
 
 VECTORS = Path(__file__).parents[1] / "vectors" / "baselines"
-TS30 = VECTORS / "busselton" / "ts30-baseline-observations.csv"
+TS30 = Path(__file__).parents[2] / "examples" / "baselines" / "busselton" / "ts30-baseline-observations.csv"
 RELEASED = VECTORS / "baseline-1.toml"
 
 

@@ -14,7 +14,7 @@ from catseye.records.baseline import FORMAT, Baseline, baseline_text, read_basel
 from catseye.reduction.baseline import calibrate_baseline, record_values
 from catseye.reduction.baseline_lengths import BaselineSettings
 
-DATA = Path(__file__).parents[1] / "vectors" / "baselines" / "busselton"
+DATA = Path(__file__).parents[2] / "examples" / "baselines" / "busselton"
 TS30, TS16 = "ts30-baseline-observations.csv", "ts16-calibration-observations.csv"
 
 

@@ -50,7 +50,7 @@ def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float =
 
     Raises ValidityError where the sets do not separate the two scatters.
 
-    Source: [ISO5725] part 2, 7.4 (unequal sets too); moments, exact for equal sets.
+    Source: [ISO19] part 2, 7.4 (unequal sets too); moments, exact for equal sets.
 
     >>> found = repeatability([1.0, 1.2, 2.0, 2.2], ["a", "a", "b", "b"])
     >>> round(found.within, 6), round(found.between, 6), round(found.mean, 6)

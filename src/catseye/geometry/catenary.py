@@ -102,7 +102,7 @@ def expanded(length: ArrayLike, temperature_c: ArrayLike, expansion_per_c: Array
     temperature_c     °C
     expansion_per_c   1/°C: 11.5e-6 steel, 0.6e-6 Invar, say
 
-    Source: definition of the mean coefficient; [ISO1] for 20 °C. As good as the coefficient is constant.
+    Source: definition of the mean coefficient; [ISO22] for 20 °C. As good as the coefficient is constant.
 
     >>> round(float(expanded(100.0, 23.0, 11.5e-6)), 5)
     100.00345

@@ -28,8 +28,8 @@ class Phases:
 
     phasor      V, complex, free of leakage
     u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter, the two taken as alike
-    u_across    V, of the quadrature that turns the phasor, noise that is alike in neighbouring cycles allowed for; below
-                16 cycles u_phasor itself
+    u_across    V, of the quadrature that turns the phasor, noise alike in neighbouring cycles allowed for; below 16
+                cycles u_phasor itself
     offset      V
     harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
     largest     V, largest magnitude of a sample

@@ -180,8 +180,8 @@ def _told(
             "fit": (count, np.zeros(len(count))),
         },
         axes=("reading", "residual (µm)"),
-        method="Readings of the glass are taken to 20 °C and averaged with the offsets of gauge and thermometer and the "
-        "expansion as parameters with priors. The constants follow from the dimensions and the ratio of the group "
+        method="Readings of the glass are taken to 20 °C and averaged with the offsets of gauge and thermometer and "
+        "the expansion as parameters with priors. The constants follow from the dimensions and the ratio of the group "
         "indices of glass and air.",
         record={key: float(value) for key, value in record.items()},
     )
