@@ -44,9 +44,10 @@ SOURCES: dict[str, Source] = {
     "GOLDMAN00": Source(
         title="M. A. Goldman, Calibration of the GBT triplet retroreflector units, 2000",
         locator="National Radio Astronomy Observatory, 29 June 2000",
-        used="eqs. 3.8-3.10, 3.14, 3.17, B.1, figure 10",
+        used="eqs. 3.4, 3.5, 3.8-3.10, 3.13, 3.14, 3.16, 3.17, B.1, figure 10",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
+            "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
             "D.3 gives n_air at 20.5 C, the value belongs to 20.0 C; D.4 prints -0.985e-6, -0.895887e-6 is right",
         ),
@@ -359,5 +360,16 @@ SOURCES: dict[str, Source] = {
         title="M. G. Kenward, J. H. Roger, Small sample inference for fixed effects from restricted likelihood, 1997",
         locator="doi:10.2307/2533558",
         used="what estimated variance components add to the covariance of the parameters",
+    ),
+    "TEUNISSEN95": Source(
+        title="P. J. G. Teunissen, The least-squares ambiguity decorrelation adjustment, Journal of Geodesy 70, 1995",
+        locator="doi:10.1007/BF00863419",
+        used="section 2.2: integer least squares",
+    ),
+    "LOEFDAHL01": Source(
+        title="M. G. Löfdahl and H. Eriksson, An algorithm for resolving 2 pi ambiguities in interferometric "
+        "measurements by use of multiple wavelengths, 2001",
+        locator="Optical Engineering 40, 2001",
+        used="the problem of one length from phases at several wavelengths",
     ),
 }

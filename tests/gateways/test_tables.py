@@ -28,7 +28,7 @@ def test_rejected_shots_stay_with_their_reason_and_only_they_have_one(ranges, re
 
 
 def test_the_corrections_one_by_one_add_up_to_the_range(ranges):
-    parts = ("air_mm", "d0_mm", "zero_mm", "glass_mm", "obliquity_mm", "leakage_mm")
+    parts = ("air_mm", "d0_mm", "zero_mm", "glass_mm", "obliquity_mm", "leakage_mm", "head_mm")
     ranged = [row for row in ranges if row["range_m"]]
     assert len(ranged) > 600
     for row in ranged:

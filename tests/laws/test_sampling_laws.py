@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
+from catseye.signal.frequency_plan import FrequencyPlan
 from catseye.signal.phase import detect
 from catseye.signal.sampling import (
-    FrequencyPlan,
     Sampling,
     aliasing_harmonics,
     buffer_mean,

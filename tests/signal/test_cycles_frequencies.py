@@ -7,7 +7,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.signal.cascade import cascade_length
-from catseye.signal.frequencies import choose_frequencies, frequency_plan
+from catseye.signal.frequencies import choose_frequencies, modulation_set
 from catseye.signal.joint_length import JointStatus, joint_length
 
 C = 299_792_458.0
@@ -104,17 +104,17 @@ def test_phases_that_fit_no_length_are_a_misfit_and_no_number_is_unknown():
 def test_a_plan_repeats_itself_after_half_the_wavelength_of_the_greatest_common_divisor():
     for f, divisor in (([1500e6, 1510e6], 10e6), ([1500e6, 1506e6, 1515e6], 3e6), ([1500e6, 1500.5e6], 0.5e6)):
         beat = C / (2 * divisor)
-        alias = frequency_plan(f, u_phase=1e-6, span=beat * 1.001)
+        alias = modulation_set(f, u_phase=1e-6, span=beat * 1.001)
         assert not alias.unambiguous
         assert alias.first_alias == pytest.approx(beat, rel=1e-12)
         assert alias.separation == pytest.approx(0.0, abs=1e-3)
-        assert frequency_plan(f, u_phase=1e-6, span=beat * 0.999).unambiguous
+        assert modulation_set(f, u_phase=1e-6, span=beat * 0.999).unambiguous
 
 
 def test_two_frequencies_are_told_apart_by_their_difference_in_phase():
     # by hand: one cycle of the beat up, the phases of 1500 and 1510 MHz miss each other by 2 pi / 151 per carrier cycle
     u, f = 1e-3, np.array([1500e6, 1510e6])
-    plan = frequency_plan(f, u_phase=u, span=10.0)
+    plan = modulation_set(f, u_phase=u, span=10.0)
     gap = C / (2 * 1500e6) - C / (2 * 1510e6)  # after one cycle of each
     us = u * C / (4 * np.pi * f)
     assert plan.separation == pytest.approx(gap / np.hypot(*us), rel=1e-9)
@@ -128,9 +128,9 @@ def test_frequencies_that_cannot_tell_lengths_apart_are_refused():
         joint_length(phases(np.array([20.0]), PLAN[:2]), PLAN[:2], u_phase=1e-3, within=(5.0, 200.0))
     for f in ([1500e6], [1500e6, 1500e6], [1500e6, -1.0]):
         with pytest.raises(ValidityError, match="two or more are expected"):
-            frequency_plan(f, u_phase=1e-3, span=10.0)
+            modulation_set(f, u_phase=1e-3, span=10.0)
     with pytest.raises(ValidityError, match=r"u_phase 0\.0 rad is not above 0"):
-        frequency_plan(PLAN, u_phase=0.0, span=10.0)
+        modulation_set(PLAN, u_phase=0.0, span=10.0)
     with pytest.raises(ValidityError, match=r"limits 10\.0 to 5\.0 m"):
         joint_length(phases(np.array([20.0]), PLAN), PLAN, u_phase=1e-3, within=(10.0, 5.0))
 
@@ -143,7 +143,7 @@ def test_the_fewest_frequencies_are_chosen_and_pass(span, u_phase, count):
     assert plan.slip_probability < 1e-5  # five sigma, a handful of neighbours
     assert all(f % 1e3 == 0 for f in plan.frequencies_hz)
     assert max(plan.frequencies_hz) <= 1.55e9
-    again = frequency_plan(plan.frequencies_hz, u_phase=u_phase, span=span)
+    again = modulation_set(plan.frequencies_hz, u_phase=u_phase, span=span)
     assert again == plan
 
 

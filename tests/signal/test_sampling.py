@@ -9,9 +9,9 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
 from catseye.signal.cycles import unwrapped_length, whole_cycles
+from catseye.signal.frequency_plan import FrequencyPlan, synthetic_half_wavelength, unambiguous_range
 from catseye.signal.phase import detect
 from catseye.signal.sampling import (
-    FrequencyPlan,
     Sampling,
     aliasing_harmonics,
     buffer_mean,
@@ -19,9 +19,7 @@ from catseye.signal.sampling import (
     jitter_u_phase,
     modulation_response,
     motion_effect,
-    synthetic_half_wavelength,
     tone_response,
-    unambiguous_range,
 )
 
 N_AIR = 1.000253246815  # group index at 20 C, 933 hPa, 50 %: recomputed value of [PARKER04] 1.49

@@ -24,6 +24,7 @@ RANGES = [
     "difference_rad",
     "cycles",
     "margin_mm",
+    "thin",
     "vacuum_length_m",
     "refractivity_ppm",
     "air_mm",
@@ -33,6 +34,7 @@ RANGES = [
     "incidence_deg",
     "obliquity_mm",
     "leakage_mm",
+    "head_mm",
     "range_m",
     "u_range_mm",
     "residual_mm",
@@ -64,8 +66,9 @@ OTHERS = 4  # decimals of numbers without a unit
 def ranges_csv(reduction: Reduction) -> str:
     """Every shot in the campaign's order, with every correction to its range.
 
-    vacuum_length + air + d0 + zero + glass + obliquity + leakage = range: the length that the phase stands for in
-    vacuum, carried into air, then the constants. Cells stay empty where a shot got no phase or saw the internal cube.
+    vacuum_length + air + d0 + zero + glass + obliquity + leakage + head = range: the length that the phase stands
+    for in vacuum, carried into air, then the constants. Cells stay empty where a shot got no phase or saw the internal
+    cube.
     """
     campaign, phases, ranges = reduction.campaign, reduction.phases, reduction.coordinates.ranges
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
@@ -94,6 +97,7 @@ def ranges_csv(reduction: Reduction) -> str:
                 "difference_rad": ranges.phase[row],
                 "cycles": int(ranges.cycles[row]),
                 "margin_mm": ranges.margin[row] / MILLIMETRE,
+                "thin": "thin" if ranges.thin[row] else "",
                 "vacuum_length_m": vacuum[row],
                 "refractivity_ppm": ranges.refractivity[row] / PPM,
                 "air_mm": air[row] / MILLIMETRE,
@@ -102,6 +106,7 @@ def ranges_csv(reduction: Reduction) -> str:
                 "incidence_deg": ranges.incidence[row] / DEGREE,
                 "obliquity_mm": ranges.obliquity[row] / MILLIMETRE,
                 "leakage_mm": ranges.leakage[row] / MILLIMETRE,
+                "head_mm": ranges.head[row] / MILLIMETRE,
                 "range_m": ranges.range_[row],
                 "u_range_mm": ranges.u_range[row] / MILLIMETRE,
                 "residual_mm": ranges.residual[row] / MILLIMETRE,

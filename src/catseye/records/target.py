@@ -10,12 +10,14 @@ FrameName = Literal["ground", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
 GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink
+PositionUncertainty = Annotated[float, Within(0, 2000, above=True)]  # mm, each coordinate; farther off is lost
 
 
 class Target(Record):
     """One retroreflector; the keys from normal on belong to a prism, and only to a prism.
 
     position_mm     approximate, in the named frame
+    u_position_mm   of each of its coordinates; without it the reduction's setting, 10 mm, counts
     normal          outward normal of the entry face, same frame
     height_mm, u_height_mm   of the prism; hrp_mm from the entry face down to the reference point
     pc_mm           prism constant, negative
@@ -25,6 +27,7 @@ class Target(Record):
     type: Literal["prism", "hollow"]
     frame: FrameName
     position_mm: Position
+    u_position_mm: PositionUncertainty | None = None
     material: Literal["BK7"] | None = None
     normal: UnitVector | None = None
     height_mm: PrismHeight | None = None
@@ -53,11 +56,15 @@ class Targets(Record):
 
 
 class FeedArmRanger(Record):
-    """A ranger on the feed arm: its scan point is known nominally, in the reflector frame."""
+    """A ranger on the feed arm: its scan point is known nominally, in the reflector frame.
+
+    u_position_mm   of each coordinate of the scan point; without it the reduction's setting, 10 mm, counts
+    """
 
     name: Name
     zp: Name
     nominal_scan_point_mm: Position
+    u_position_mm: PositionUncertainty | None = None
 
 
 class AimPoint(Record):

@@ -15,7 +15,14 @@ from catseye.records.record import (
     Within,
     broken_rule,
 )
-from catseye.records.target import FrameName, GlassConstant, PrismHeight, PrismReference, refuse_deep_reference
+from catseye.records.target import (
+    FrameName,
+    GlassConstant,
+    PositionUncertainty,
+    PrismHeight,
+    PrismReference,
+    refuse_deep_reference,
+)
 
 MOST_COSINE = 0.1  # between normal and axis, which is in the plate: 6 degrees is more than any data sheet's tenths
 Small = Annotated[float, Within(-20, 20)]  # mm
@@ -57,6 +64,7 @@ class Triplet(Certificate):
     """A triplet unit.
 
     nominal_position_mm     approximate centre of the ball, in the named frame
+    u_position_mm           of each of its coordinates; without it the reduction's setting, 10 mm, counts
     normal                  of the top plate, towards the prism side
     axis                    unit vector from the left to the right prism
     d12_mm                  between the prisms, with u_d12_mm
@@ -69,6 +77,7 @@ class Triplet(Certificate):
     triplet: Name
     frame: FrameName
     nominal_position_mm: Position
+    u_position_mm: PositionUncertainty | None = None
     normal: UnitVector
     axis: UnitVector
     d12_mm: Annotated[float, Within(50, 10_000)]

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE, PPM
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.adjustment import Fit, Solution, adjust
+from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
 from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.robust import CHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
+from catseye.reduction.cycles import KEPT, Resolved, resolve_cycles, without_shots
 from catseye.reduction.dish import dish_advice
 from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.places import Place
@@ -38,6 +39,7 @@ class RangeShots:
     incidence         rad, on a prism's face; 0 for others
     glass, obliquity  Pc (with what was estimated of it) and dPc, metres
     zero, leakage     estimated corrections of the ranger's zero and of the rest of its leakage, to the range
+    head              what the mirror's axes, the coupling of amplitude to phase and cyclic terms add to the range
     range_            distance scan point to target as this shot gives it, all corrections applied
     u_range           its standard uncertainty: noise, electronics and path; systematic parameters not counted
     residual          range_ minus the adjusted distance
@@ -46,6 +48,9 @@ class RangeShots:
     detectable        smallest error that a test at the level 0.1 % finds four times in five, m; rejection at |w| = 3.5
                       asks for 5 % more
     used              took part
+    thin              its whole cycles are not beyond doubt: what all other observations and records predict of this
+                      range misses it by so much, or is so uncertain, that misfit and five standard uncertainties reach
+                      a quarter wavelength
     """
 
     shot: np.ndarray
@@ -61,6 +66,7 @@ class RangeShots:
     obliquity: np.ndarray
     zero: np.ndarray
     leakage: np.ndarray
+    head: np.ndarray
     range_: np.ndarray
     u_range: np.ndarray
     residual: np.ndarray
@@ -68,6 +74,7 @@ class RangeShots:
     redundancy: np.ndarray
     detectable: np.ndarray
     used: np.ndarray
+    thin: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +94,7 @@ class Coordinates:
     variance_factor, degrees_of_freedom   of everything but the typed positions
     fits         of all groups, for reports
     notes        what a person should know, one line each
+    unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
     """
 
     points: tuple[str, ...]
@@ -105,6 +113,7 @@ class Coordinates:
     status: str
     fits: tuple[Fit, ...]
     notes: tuple[str, ...]
+    unresolved: dict[int, str]
 
     def index(self, name: str) -> int:
         """Row of a point."""
@@ -127,16 +136,22 @@ def adjust_coordinates(
 
     Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
     until they no longer change. Wrong shots are searched for in the first pass, and in the second once more with what
-    the dish then says of its own prisms; later passes keep the choice.
+    the dish then says of its own prisms; later passes keep the choice. Before the first pass `resolve_cycles` looks
+    after points that are typed too badly for the nearest integer.
 
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
     """
-    network = build_network(campaign, phases, electronics, settings)
+    resolved = resolve_cycles(campaign, phases, electronics, settings, progress)
+    network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings)
     if not network.rangers:
-        raise InputError("shots.csv: no shot on any target has a usable phase and reference; nothing to adjust")
+        why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
+        raise InputError(f"shots.csv: {why}; nothing to adjust")
     layout = network.layout
     x = np.array(layout.start)
+    for name, where in resolved.starts.items():
+        if name in layout.at:
+            x[layout.columns(name)] = where
     free = np.array(layout.free)
     points = [layout.columns(name) for name in network.places if name in layout.at]
     coordinates = np.concatenate(points)
@@ -180,10 +195,10 @@ def adjust_coordinates(
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
-    return _coordinates(network, solution, [parts for _, parts in shots])
+    return _coordinates(network, solution, [parts for _, parts in shots], resolved)
 
 
-def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -> Coordinates:
+def _coordinates(network: Network, solution: Solution, parts: list[ShotParts], resolved: Resolved) -> Coordinates:
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
     columns = np.concatenate([layout.columns(n) for n in names])
@@ -217,14 +232,16 @@ def _coordinates(network: Network, solution: Solution, parts: list[ShotParts]) -
         degrees_of_freedom=degrees,
         status=solution.status,
         fits=solution.fits,
-        notes=(*_notes(network, solution, air, count), *_losses(ranges)),
+        notes=(*_notes(network, solution, air, count), *_losses(ranges), *resolved.notes, *_thin_notes(ranges)),
+        unresolved=resolved.rejected,
     )
 
 
 def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> RangeShots:
     x, layout = solution.x, network.layout
     fits = solution.fits[: len(parts)]
-    zero, leakage, glass, range_, u_range, residual, detectable = [], [], [], [], [], [], []
+    zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []
+    quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
     for part, fit in zip(parts, fits, strict=True):
         n = 1.0 + part.refractivity
         own_zero = np.full(len(n), x[layout.at[f"zero {part.name}"]])
@@ -238,6 +255,7 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
         u_range.append(fit.sigma / n)
         detectable.append(fit.detectable_error / n)
+        thin.append(np.abs(fit.estimated_error) + KEPT * fit.detectable_error / NONCENTRALITY >= quarter)
     join = np.concatenate
     return RangeShots(
         shot=join([p.electronics.shots for p in parts]),
@@ -253,6 +271,7 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         obliquity=join([p.obliquity for p in parts]),
         zero=join(zero),
         leakage=join(leakage),
+        head=join([p.head.at(x) for p in parts]),
         range_=join(range_),
         u_range=join(u_range),
         residual=join(residual),
@@ -260,7 +279,23 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         redundancy=join([f.redundancy for f in fits]),
         detectable=join(detectable),
         used=join([f.active for f in fits]),
+        thin=join(thin),
     )
+
+
+def _thin_notes(ranges: RangeShots) -> list[str]:
+    """Points on which the whole cycles of used shots hang on little."""
+    target = np.array(ranges.target)
+    notes = []
+    for name in sorted(set(ranges.target)):
+        mine = (target == name) & ranges.used
+        doubtful = mine & ranges.thin
+        if doubtful.any():
+            notes.append(
+                f"{name}: the whole cycles of {doubtful.sum()} of its {mine.sum()} shots are not beyond doubt: without "
+                "each, position and other shots do not say its range to a quarter wavelength at five sigma"
+            )
+    return notes
 
 
 def _losses(ranges: RangeShots) -> list[str]:
@@ -314,7 +349,11 @@ def _notes(
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
     unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
     usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
-    wrong = {unit.get(n, n): d for n, d in zip(typed, moved, strict=True) if d > 4.0 * usual}
+    wrong = {
+        unit.get(n, n): d
+        for n, d in zip(typed, moved, strict=True)
+        if d > 4.0 * max(usual, network.places[n].u_start or 0.0)
+    }
     notes += [
         f"{n}: its typed position is {d / MILLIMETRE:.0f} mm off, the others' some {np.median(moved) / MILLIMETRE:.0f}"
         for n, d in wrong.items()

@@ -47,7 +47,7 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
         electronics, wrong = follow_electronics(campaign, phases)
         coordinates = adjust_coordinates(campaign, phases, electronics, settings, progress)
         surface, missing = fit_surface(campaign, coordinates)
-    reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong
+    reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved
     ranges = coordinates.ranges
     for row, k in enumerate(ranges.shot):
         if not ranges.used[row]:

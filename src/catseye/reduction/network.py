@@ -134,7 +134,8 @@ def _priors(
     if typed:
         columns = np.concatenate([layout.columns(n) for n in typed])
         where = np.concatenate([seen[n].start for n in typed])
-        priors.append(_independent(APPROXIMATE, columns, where, np.full(len(columns), settings.u_position)))
+        u_start = np.repeat([seen[n].u_typed(settings.u_position) for n in typed], 3)
+        priors.append(_independent(APPROXIMATE, columns, where, u_start))
     for triplet in campaign.triplets.values():
         if triplet.ball.target in seen:
             priors.extend(_triplet(triplet, seen, layout, settings))

@@ -27,6 +27,7 @@ class Place:
     u_constant m, its standard uncertainty from that of the glass's dimensions, shared by all shots on it
     group      what its normal's error is shared with: its own name, or its triplet's; "" for none
     typed      its start is an approximate position that somebody typed
+    u_start    m, each coordinate of the start, as its record says; None where it says nothing: `Settings.u_position`
     """
 
     name: str
@@ -38,6 +39,11 @@ class Place:
     u_constant: float = 0.0
     group: str = ""
     typed: bool = True
+    u_start: float | None = None
+
+    def u_typed(self, usual: float) -> float:
+        """Standard uncertainty of each coordinate of the start, m: the record's, else the usual one."""
+        return usual if self.u_start is None else self.u_start
 
 
 def nominal_frame(campaign: Campaign) -> Transform:
@@ -75,7 +81,7 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
         )
     for ranger in campaign.feedarm.ranger:
         where = to_ground["reflector"].points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE)
-        places[ranger.name] = Place(ranger.name, "ranger", where)
+        places[ranger.name] = Place(ranger.name, "ranger", where, u_start=_metres(ranger.u_position_mm))
     for target in campaign.targets.values():
         frame = to_ground[target.frame]
         where = frame.points(np.array(target.position_mm) * MILLIMETRE)
@@ -89,9 +95,10 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
                 target.pc_mm * MILLIMETRE,
                 n * (target.u_height_mm or 0.0) * MILLIMETRE,
                 target.name,
+                u_start=_metres(target.u_position_mm),
             )
         else:
-            places[target.name] = Place(target.name, "hollow", where)
+            places[target.name] = Place(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
     for triplet in campaign.triplets.values():
         frame = to_ground[triplet.frame]
         ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
@@ -108,6 +115,7 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
                 side.pc_mm * MILLIMETRE,
                 n * side.u_height_mm * MILLIMETRE,
                 triplet.triplet,
+                u_start=_metres(triplet.u_position_mm),
             )
         places[triplet.ball.target] = Place(
             triplet.ball.target,
@@ -115,8 +123,13 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
             ball,
             constant=triplet.ball.pc_b_mm * MILLIMETRE,
             u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
+            u_start=_metres(triplet.u_position_mm),
         )
     return places
+
+
+def _metres(value_mm: float | None) -> float | None:
+    return None if value_mm is None else value_mm * MILLIMETRE
 
 
 def sheet_notes(campaign: Campaign) -> list[str]:

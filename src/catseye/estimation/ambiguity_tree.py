@@ -1,0 +1,245 @@
+"""All sets of whole cycles that a prior position allows: the search behind `ambiguity`."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+SIGMAS = 6.0  # of the prior and of each prediction: one true position in ten million lies beyond in space
+STEPS = 6  # of Gauss-Newton at the first point of each branch: from metres off to below a micrometre it takes four
+ROOM = 200_000  # branches that are followed at once
+MOST_COMPARED = 40  # ranges among whose triples the best figure is sought
+WORSE = 50.0**2  # chi-square from which a branch need not be followed
+
+
+@dataclass(frozen=True, eq=False)
+class Ranged:
+    """A point with a prior and ranges modulo a period.
+
+    start         (3,) m
+    prior_root    (3, 3) m, Cholesky factor of the prior covariance
+    stations      (r, 3) m
+    lengths       (r,) m, up to whole periods
+    periods       (r,) m
+    root          (r, r) m, Cholesky factor of the ranges' covariance
+    """
+
+    start: np.ndarray
+    prior_root: np.ndarray
+    stations: np.ndarray
+    lengths: np.ndarray
+    periods: np.ndarray
+    root: np.ndarray
+
+    def ordered(self, rows: np.ndarray) -> "Ranged":
+        """Some of the ranges in another order."""
+        covariance = self.root @ self.root.T
+        root = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
+        return Ranged(self.start, self.prior_root, self.stations[rows], self.lengths[rows], self.periods[rows], root)
+
+
+@dataclass(frozen=True, eq=False)
+class Trunk:
+    """The points that the prior allows by the first ranges alone; several searches may grow from it.
+
+    rows          (q,) the ranges it stands on, three where there are three
+    cycles        (c, q)
+    x             (c, 3) m
+    information   (c, 3, 3) m^-2
+    chi_square    (c,) of the prior and these ranges
+    """
+
+    rows: np.ndarray
+    cycles: np.ndarray
+    x: np.ndarray
+    information: np.ndarray
+    chi_square: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """What the search found.
+
+    x            (c, 3) m, one a set of whole cycles
+    cycles       (c, r); of a range that did not take part the nearest
+    chi_square   (c,) of the prior and the ranges that took part
+    covariance   (3, 3) m^2 of the best one
+    floor        no set that is not listed has a smaller chi-square, inside the region of SIGMAS of the prior
+    tried        sets looked at
+    """
+
+    x: np.ndarray
+    cycles: np.ndarray
+    chi_square: np.ndarray
+    covariance: np.ndarray
+    floor: float
+    tried: int
+
+
+def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
+    """The first ranges' whole cycles wherever the prior allows; None where that would be more than `most`.
+
+    ranged   the problem
+    rows     the ranges that may take part
+    most     sets to look at before giving up
+
+    The three ranges of the best figure come first. Their integers are enumerated over the prior's ellipsoid, and each
+    set's point follows by Gauss-Newton with the prior.
+    """
+    first = _best_figure(ranged, rows)
+    mine = ranged.ordered(first)
+    cycles = _first_cycles(mine, len(first), most)
+    if cycles is None:
+        return None
+    x, information, square = _points(mine, cycles, mine.start + np.zeros((len(cycles), 3)))
+    inside = square <= SIGMAS**2
+    return Trunk(first, cycles[inside], x[inside], information[inside], square[inside])
+
+
+def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> Candidates | None:
+    """Every set of whole cycles of some ranges that grows from a trunk; None where that would be more than `most`.
+
+    ranged   the problem
+    rows     the ranges that take part, those of the trunk among them
+    base     from `trunk`
+    most     sets to look at before giving up
+
+    Each further range is predicted: its nearest integer goes on, and others where the prediction does not exclude them
+    by SIGMAS. The chi-square that those passed over would have had at least is kept, so that the second best is known
+    even where it was not followed.
+    """
+    rest = np.setdiff1d(rows, base.rows)
+    noise = np.linalg.norm(ranged.root, axis=1)
+    order = np.concatenate([base.rows, rest[np.argsort(noise[rest], kind="stable")]])
+    mine = ranged.ordered(order)
+    cycles, x, information, square = base.cycles, base.x, base.information, base.chi_square
+    tried, floor = len(cycles), np.inf
+    for k in range(len(base.rows), len(order)):
+        cycles, x, spared = _next_cycles(mine, k, cycles, x, information, square)
+        floor = min(floor, spared)
+        tried = max(tried, len(cycles))
+        if len(cycles) > most:
+            return None
+        x, information, square = _points(mine, cycles, x)
+    distance = np.linalg.norm(x[:, None] - ranged.stations, axis=2)
+    whole = np.rint((distance - ranged.lengths) / ranged.periods)
+    whole[:, order] = cycles
+    covariance = np.linalg.inv(information[np.argmin(square)]) if len(square) else np.full((3, 3), np.nan)
+    return Candidates(x, whole.astype(np.int64), square, covariance, floor, tried)
+
+
+def _best_figure(ranged: Ranged, rows: np.ndarray) -> np.ndarray:
+    """The three of some ranges that hold a point best, or all where there are fewer."""
+    if len(rows) < 3:
+        return rows
+    noise = np.linalg.norm(ranged.root, axis=1)
+    towards = ranged.start - ranged.stations
+    e = towards / np.linalg.norm(towards, axis=1)[:, None]
+    some = rows if len(rows) <= MOST_COMPARED else rows[np.linspace(0, len(rows) - 1, MOST_COMPARED).astype(int)]
+    triples = np.array(list(combinations(some, 3)))
+    volume = np.abs(np.linalg.det(e[triples])) / np.prod(noise[triples], axis=1)
+    return triples[int(np.argmax(volume))]
+
+
+def _first_cycles(ranged: Ranged, first: int, most: int) -> np.ndarray | None:
+    """Whole cycles (c, first) of the first ranges wherever the prior allows; a few beyond do no harm.
+
+    With z = root^-1 (x - start) the prior is the unit ball times SIGMAS; a distance changes in it by |root' e| SIGMAS
+    and, being curved, by t^2 / 2 D at most, t the prior's largest extent.
+    """
+    towards = ranged.start - ranged.stations[:first]
+    distance = np.linalg.norm(towards, axis=1)
+    e = towards / distance[:, None]
+    extent = SIGMAS * float(np.linalg.norm(ranged.prior_root, 2))
+    bend = np.minimum(extent**2 / (2.0 * np.maximum(distance - extent, 0.1 * distance)), 2.0 * extent)
+    slope = e @ ranged.prior_root
+    u = np.hypot(np.linalg.norm(slope, axis=1), np.linalg.norm(ranged.root[:first], axis=1))
+    reach = SIGMAS * u + bend
+    low = np.ceil((distance - reach - ranged.lengths[:first]) / ranged.periods[:first])
+    high = np.floor((distance + reach - ranged.lengths[:first]) / ranged.periods[:first])
+    counts = high - low + 1
+    if np.prod(counts) > 20.0 * most:
+        return None
+    kept = np.zeros((1, 0))
+    seen = slope @ slope.T + (ranged.root @ ranged.root.T)[:first, :first]
+    for k in range(first):  # one range after the other, so that corners of the box are never made
+        now = np.arange(low[k], high[k] + 1)
+        grid = np.concatenate([np.repeat(kept, len(now), axis=0), np.tile(now, len(kept))[:, None]], axis=1)
+        size = k + 1
+        off = ranged.lengths[:size] + grid * ranged.periods[:size] - distance[:size]
+        # what is excluded is excluded however the curvature turns out: its largest effect is taken off first
+        inverse = np.linalg.inv(np.linalg.cholesky(seen[:size, :size]))
+        far = np.linalg.norm(off @ inverse.T, axis=1) - np.linalg.norm(np.abs(inverse) @ bend[:size])
+        kept = grid[far <= SIGMAS]
+    return kept if len(kept) <= most else None
+
+
+def _points(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The points (c, 3) that fit the prior and the first ranges best, their information and chi-square."""
+    parts = [_converged(ranged, cycles[i : i + ROOM], x[i : i + ROOM]) for i in range(0, max(len(cycles), 1), ROOM)]
+    joined = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return joined[0], joined[1], joined[2]
+
+
+def _converged(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    k = cycles.shape[1]
+    whiten = np.linalg.inv(ranged.root[:k, :k])
+    prior = np.linalg.inv(ranged.prior_root)
+    known = prior.T @ prior
+    reached = ranged.lengths[:k] + cycles * ranged.periods[:k]
+
+    def misses(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        towards = at[:, None] - ranged.stations[:k]
+        distance = np.linalg.norm(towards, axis=2)
+        slope = np.einsum("ij,cja->cia", whiten, towards / distance[..., None])
+        return (reached - distance) @ whiten.T, slope
+
+    for _ in range(STEPS):
+        v, slope = misses(x)
+        information = known + np.einsum("cia,cib->cab", slope, slope)
+        gradient = np.einsum("cia,ci->ca", slope, v) + (ranged.start - x) @ known
+        step = np.linalg.solve(information, gradient[..., None])[..., 0]
+        x = x + step
+        if not len(x) or np.max(np.abs(step)) < 1e-9:
+            break
+    v, slope = misses(x)
+    information = known + np.einsum("cia,cib->cab", slope, slope)
+    square = np.sum(v**2, axis=1) + np.sum(((x - ranged.start) @ prior.T) ** 2, axis=1)
+    return x, information, square
+
+
+def _next_cycles(
+    ranged: Ranged, k: int, cycles: np.ndarray, x: np.ndarray, information: np.ndarray, square: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Each branch with the whole cycles of range k: the nearest, and others within SIGMAS of the prediction.
+
+    The third value is the least chi-square that any integer passed over would have had.
+    """
+    if not len(cycles):
+        return np.zeros((0, k + 1)), x, np.inf
+    row, own = ranged.root[k, :k], float(ranged.root[k, k])
+    whiten = np.linalg.inv(ranged.root[:k, :k])
+    towards = x[:, None] - ranged.stations[: k + 1]
+    distance = np.linalg.norm(towards, axis=2)
+    e = towards / distance[..., None]
+    noise = (ranged.lengths[:k] + cycles * ranged.periods[:k] - distance[:, :k]) @ whiten.T  # of the ranges before
+    slope = e[:, k] - np.einsum("j,cja->ca", row @ whiten, e[:, :k])
+    variance = own**2 + np.sum(slope * np.linalg.solve(information, slope[..., None])[..., 0], axis=1)
+    u = np.sqrt(variance)
+    period = float(ranged.periods[k])
+    exact = (distance[:, k] + noise @ row - ranged.lengths[k]) / period
+    nearest = np.rint(exact)
+    reach = SIGMAS * u / period
+    low, high = np.minimum(np.ceil(exact - reach), nearest), np.maximum(np.floor(exact + reach), nearest)
+    passed = np.minimum(exact - (low - 1.0), (high + 1.0) - exact) * period / u
+    floor = float(np.min(square + passed**2))
+    counts = (high - low + 1).astype(int)
+    parent = np.repeat(np.arange(len(cycles)), counts)
+    within = np.arange(len(parent)) - np.repeat(np.cumsum(counts) - counts, counts)
+    now = np.repeat(low, counts) + within
+    cost = square[parent] + ((now - exact[parent]) / u[parent] * period) ** 2
+    if len(cost) > 2:  # the second best stays, to say where it is
+        hopeless = cost > max(WORSE, float(np.partition(cost, 1)[1]))
+        floor = min(floor, float(np.min(cost[hopeless], initial=np.inf)))
+        parent, now = parent[~hopeless], now[~hopeless]
+    return np.concatenate([cycles[parent], now[:, None]], axis=1), x[parent], floor
