@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.campaign import REFERENCE
-from catseye.reduction.ranges import follow_electronics, measure_phases
+from catseye.reduction.ranges import follow_electronics, measure_phases, walk_notes
 from catseye.reduction.settings import Settings
 
 VOLT = 10.0 / 32768.0
@@ -172,3 +172,14 @@ def test_the_drift_is_known_best_beside_its_references(night_01, reduced_night_0
     between = np.sqrt(126.0 / 4 / 3600.0) * 0.010
     assert sigma.max() == pytest.approx(between, rel=0.35)  # the references' own noise adds 0.3 mrad
     assert np.linalg.eigvalsh(e.covariance).min() > -1e-18
+
+
+def test_a_site_whose_electronics_walk_otherwise_than_it_says_is_told(night_01):
+    phases = measure_phases(night_01, Settings())
+    _, wrong = follow_electronics(night_01, phases)
+    assert walk_notes(night_01, phases, wrong) == []
+    for claimed, word in ((3.0, "small"), (40.0, "large")):
+        ranging = night_01.site.ranging.model_copy(update={"electronic_drift_mrad_per_sqrt_hour": claimed})
+        told = dataclasses.replace(night_01, site=night_01.site.model_copy(update={"ranging": ranging}))
+        (note,) = walk_notes(told, phases, wrong)
+        assert f"not by the {claimed:g} of site.toml: u_range is too {word}" in note

@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from catseye.reduction.calibration import Calibration
 
 
+KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spares itself
+    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|prism-constant|"
+    "ball-constant|gauge-blocks|spacers|invar-wire"
+)
+
+
 def _known(kind: str) -> str:
     from catseye.reduction.calibrations import KINDS
 
@@ -28,7 +34,7 @@ def _known(kind: str) -> str:
 def calibrate(
     kind: Annotated[
         str,
-        typer.Argument(metavar="KIND", callback=_known, help="What is calibrated: reference-distance, leakage, ..."),
+        typer.Argument(metavar="KIND", callback=_known, help=f"What is calibrated: {KIND_NAMES.replace('|', ', ')}."),
     ],
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Table of readings.")],
     sheet: Annotated[

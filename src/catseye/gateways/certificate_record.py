@@ -48,13 +48,9 @@ def calibration_object(found: Calibration) -> dict[str, Any]:
             "decisions": [vars(decision) for decision in found.decisions],
             "notes": found.notes,
             "readings": [dict(zip(found.columns, row, strict=True)) for row in found.rows],
-            "not_used": [number for number, row in enumerate(found.rows) if not _used(row)],
+            "not_used": [number for number, state in enumerate(found.states) if state not in ("used", "suspect")],
         }
     )
-
-
-def _used(row: tuple[Any, ...]) -> bool:
-    return row[-1] in ("used", "suspect")
 
 
 def calibration_toml(found: Calibration) -> str:

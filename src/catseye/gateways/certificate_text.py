@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from catseye.gateways.certificate import rounded
 from catseye.reduction.calibration import Calibration
 
-STATE = "state"  # the last column, where rows are readings and not results
+SHOWN = 12  # readings named at most
 
 
 def passages(found: Calibration) -> Iterator[tuple[str, str]]:
@@ -23,16 +23,11 @@ def passages(found: Calibration) -> Iterator[tuple[str, str]]:
         outcome = {True: "passed", False: "FAILED", None: "not judged"}[decision.passed]
         numbers = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.limit == decision.limit else ""
         yield "" if number else "Tests", f"{decision.name}{numbers}: {outcome}; {decision.text}"
-    odd = (
-        []
-        if found.columns[-1] != STATE
-        else [number for number, row in enumerate(found.rows, start=1) if row[-1] != "used"]
-    )
+    odd = [f"{number} ({state})" for number, state in enumerate(found.states, start=1) if state != "used"]
     if odd:
-        states = ", ".join(f"{number} ({found.rows[number - 1][-1]})" for number in odd[:12])
-        more = f" and {len(odd) - 12} more" if len(odd) > 12 else ""
-        yield "Readings", f"{len(found.rows)}, of which {states}{more}"
-    elif found.columns[-1] == STATE:
+        more = f" and {len(odd) - SHOWN} more" if len(odd) > SHOWN else ""
+        yield "Readings", f"{len(found.rows)}, of which {', '.join(odd[:SHOWN])}{more}"
+    elif found.states:
         yield "Readings", f"{len(found.rows)}, all used"
     for number, note in enumerate(found.notes):
         yield "" if number else "Notes", note

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -80,6 +82,11 @@ class Calibration:
     method: str = ""
     record: dict[str, Any] = field(default_factory=dict)
     equal_axes: bool = False
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """What became of each reading; empty where the rows are results and no readings."""
+        return tuple(row[-1] for row in self.rows) if self.columns and self.columns[-1] == STATE else ()
 
     def value(self, key: str) -> float:
         """The quantity of that key; KeyError where there is none."""

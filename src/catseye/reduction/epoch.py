@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.coordinates import Coordinates, adjust_coordinates
 from catseye.reduction.places import sheet_notes
-from catseye.reduction.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases
+from catseye.reduction.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases, walk_notes
 from catseye.reduction.settings import Settings
 from catseye.reduction.surface import Surface, fit_surface
 
@@ -60,6 +60,7 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
         *coordinates.notes,
         *sheet_notes(campaign),
         *_weak_rangers(campaign, phases),
+        *walk_notes(campaign, phases, wrong),
         *([missing] if missing else []),
     ]
     return Reduction(

@@ -1,6 +1,6 @@
 """What a return should be: from the laser's power over target and optics to volts and the range's noise."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,8 +57,8 @@ class Link:
 
     def scaled(self, measured: "LinkBudget", amplitude_volt: float) -> "Link":
         """This link with the gain that makes a budget's amplitude the measured one."""
-        from dataclasses import replace
-
+        if not 0.0 < amplitude_volt < np.inf:
+            raise ValidityError(f"measured return {amplitude_volt} V is not above 0 and finite")
         return replace(self, volts_per_ampere=self.volts_per_ampere * amplitude_volt / measured.amplitude_volt)
 
 

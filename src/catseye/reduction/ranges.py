@@ -1,6 +1,6 @@
 """From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,11 @@ from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
 from catseye.signal.cycles import fraction
 from catseye.signal.drift import drift_at, reference_surprise
 from catseye.signal.leakage import subtract_leakage
+from catseye.signal.walk import estimate_walk, walk_test
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
 
+MRAD_PER_ROOT_HOUR = 1e-3 / 60.0  # rad per root second
 SURPRISE = 5.0  # standard uncertainties by which a reference may miss its neighbours' prediction
 WARM_UP = 0.03  # rad, more allowed at the ends of a ranger's block, where a transient is extrapolated
 BEND = 0.005  # rad, more allowed inside, where only its curvature counts
@@ -167,7 +169,7 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
     """
     shots = campaign.shots
     seconds = (shots.mjd_utc - shots.mjd_utc[0]) * SECONDS_PER_DAY
-    walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * 1e-3 / 60.0
+    walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR
     ranger, target = np.array(shots.ranger), np.array(shots.target)
     usable = np.array([not r for r in phases.reason])
     variance = np.where(usable, phases.u_phase, 0.0) ** 2
@@ -196,6 +198,40 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
         level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
         electronics[name] = Electronics(lit, phase, covariance, level * np.exp(1j * phase))
     return electronics, rejected
+
+
+def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> list[str]:
+    """A line where the good references of all rangers together walk otherwise than the site's figure says.
+
+    wrong   references that are left out, indices into the campaign's shots
+
+    Each ranger's first reference is left out too: a warm-up is no walk. Tested at one in a thousand.
+    """
+    shots = campaign.shots
+    good = np.array([t == REFERENCE for t in shots.target]) & np.array([not r for r in phases.reason])
+    good[list(wrong)] = False
+    rows = [np.flatnonzero(good & (np.array(shots.ranger) == name))[1:] for name in campaign.rangers]
+    rows = [r for r in rows if len(r) > 1]
+    if not rows:
+        return []
+    told = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
+    k = np.concatenate(rows)
+    references = (
+        (shots.mjd_utc[k] - shots.mjd_utc[0]) * SECONDS_PER_DAY,
+        np.concatenate([np.unwrap(np.angle(phases.phasor[r])) for r in rows]),
+        phases.u_phase[k] ** 2,
+    )
+    series = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+    test = walk_test(*references, random_walk=told * MRAD_PER_ROOT_HOUR, series=series, probability=0.999)
+    if test.passed:
+        return []
+    found = estimate_walk(*references, series=series)
+    low, high = (v / MRAD_PER_ROOT_HOUR for v in found.interval())
+    return [
+        f"the electronics walk by {found.random_walk / MRAD_PER_ROOT_HOUR:.1f} mrad per root hour between references "
+        f"(95 %: {low:.1f} to {high:.1f}), not by the {told:g} of site.toml: u_range is too "
+        f"{'small' if test.statistic > test.high else 'large'}"
+    ]
 
 
 def _wrong_references(
