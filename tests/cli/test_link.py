@@ -5,7 +5,7 @@ import json
 import pytest
 import typer
 
-import catseye.cli.link  # noqa: F401  it joins the app
+import catseye.cli.link
 from catseye.cli.commands import app
 from catseye.cli.terminal import attempt
 

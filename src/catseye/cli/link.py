@@ -1,13 +1,16 @@
 """The command of the link budget."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
 from catseye.constants import DEGREE
-from catseye.reduction.link_budget import Link, LinkBudget, Reflector
+from catseye.reduction.link import Link, Reflector
+
+if TYPE_CHECKING:
+    from catseye.reduction.link_budget import LinkBudget
 
 
 @app.command(epilog="\b\nExample: catseye link --distance 120 --incidence-deg 20 --measured-volt 4.5")
@@ -58,7 +61,7 @@ def link(
     )
     reflector = Reflector(aperture=aperture_mm * 1e-3, height=height_mm * 1e-3, index=index)
     if measured_volt is not None:
-        head = head.scaled(link_budget(head, reflector, distance), measured_volt)
+        head = head.scaled(link_budget(head, reflector, distance).amplitude_volt, measured_volt)
     light = {"incidence": incidence_deg * DEGREE, "background": background_uw * 1e-6}
     found = link_budget(head, reflector, distance, offset=offset_mm * 1e-3, **light)
     if json:
@@ -67,7 +70,7 @@ def link(
     _tell(found, head)
 
 
-def _object(found: LinkBudget, head: Link, distance: float) -> dict[str, object]:
+def _object(found: "LinkBudget", head: Link, distance: float) -> dict[str, object]:
     return {
         "distance": distance,
         "factors": found.factors,
@@ -83,7 +86,7 @@ def _object(found: LinkBudget, head: Link, distance: float) -> dict[str, object]
     }
 
 
-def _tell(found: LinkBudget, head: Link) -> None:
+def _tell(found: "LinkBudget", head: Link) -> None:
     import math
 
     say(f"{'laser':<32}{head.power * 1e3:10.4g} mW")

@@ -1,6 +1,6 @@
 """What a return should be: from the laser's power over target and optics to volts and the range's noise."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,73 +9,8 @@ from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import radius, returned_share, share_within
 from catseye.optics.prism import clear_share
 from catseye.optics.receiver import noise_density, signal_current, u_phase
+from catseye.reduction.link import Link, Reflector
 from catseye.signal.leakage import quadrature_range_error
-
-
-@dataclass(frozen=True)
-class Link:
-    """A head and its optics. The defaults are a plausible head of the 1990s, not a measured one: give your own.
-
-    power                 W, mean, of the laser; the notes' reference [78] speaks of 10 mW
-    depth                 modulation depth of the light
-    wavelength            m, of the light
-    modulation_hz         Hz
-    waist                 m, radius of the outgoing beam at 1/e^2, at the head
-    receiver              m, radius of the receiving lens
-    transmission          of all surfaces of the head, out and back together; a splitter counts twice
-    responsivity          A/W at the modulation frequency
-    amplifier             A/sqrt(Hz), input noise
-    intensity_noise_db_hz dB/Hz, of the laser near the modulation
-    volts_per_ampere      V at the converter for each A of signal current; from a return that was measured, see `scaled`
-    blocked_noise_volt    V, rms of the samples with the beam blocked, what light does not explain: oscillators, mixer,
-                          amplifiers after it; night-01's heads show 0.17 to 0.25 V
-    full_scale_volt       V, largest that the converter takes
-    samples_per_second    of the converter; with `bits` its rounding
-    duration              s, of one range
-    crosstalk             amplitude of what leaks within the head over that of a 1 V return, uncorrected rest
-    extinction_per_m      1/m, of the air
-    """
-
-    power: float = 10e-3
-    depth: float = 0.5
-    wavelength: float = 0.78e-6
-    modulation_hz: float = 1500e6
-    waist: float = 10e-3
-    receiver: float = 50e-3
-    transmission: float = 0.15
-    responsivity: float = 0.45
-    amplifier: float = 15e-12
-    intensity_noise_db_hz: float = -140.0
-    volts_per_ampere: float = 2.5e4
-    blocked_noise_volt: float = 0.2
-    full_scale_volt: float = 10.0
-    bits: int = 16
-    samples_per_second: float = 64_000.0
-    duration: float = 0.128
-    crosstalk: float = 1e-3
-    extinction_per_m: float = 1e-5
-
-    def scaled(self, measured: "LinkBudget", amplitude_volt: float) -> "Link":
-        """This link with the gain that makes a budget's amplitude the measured one."""
-        if not 0.0 < amplitude_volt < np.inf:
-            raise ValidityError(f"measured return {amplitude_volt} V is not above 0 and finite")
-        return replace(self, volts_per_ampere=self.volts_per_ampere * amplitude_volt / measured.amplitude_volt)
-
-
-@dataclass(frozen=True)
-class Reflector:
-    """A retroreflector as the beam meets it.
-
-    aperture     m, radius of the clear face; the GBT's prisms have 25.4 mm
-    height       m, of the corner behind the face
-    index        phase index of what fills it: 1 for a hollow cube
-    reflectance  of all its surfaces
-    """
-
-    aperture: float = 25.4e-3
-    height: float = 38.1e-3
-    index: float = 1.511
-    reflectance: float = 0.92
 
 
 @dataclass(frozen=True)
