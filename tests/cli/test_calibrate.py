@@ -4,6 +4,7 @@ import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from catseye.cli.commands import app
@@ -26,6 +27,7 @@ TRUTH = {
     "retroreflector": {"pc_ball-7_mm": -173.715, "pc_prism-12_mm": -33.4937},
     "amplitude-to-phase": {"amplitude_to_phase_rad": -1.8e-3},
     "oscillator": {"white_mrad2": 144.0, "flicker_mrad2": 0.0, "walk_mrad2": 0.04},
+    "repeatability": {"repeatability_um": 10.0, "between_um": 15.0, "intermediate_um": np.hypot(10.0, 15.0)},
     "prism-constant": {"height_mm": 38.2040, "hrp_mm": 25.01773, "pc_mm": -33.32272},
     "ball-constant": {"r1_mm": 50.0126, "r2_mm": 96.4946, "pc_b_mm": -173.71556},
     "gauge-blocks": {"zero_mm": 0.0042, "scale_ppm": 18.0},
@@ -34,8 +36,8 @@ TRUTH = {
 }
 WRONG = {
     "reference-distance": 13, "leakage": 29, "leakage-lit": None, "linearity": 77, "retroreflector": 41,
-    "amplitude-to-phase": 9, "oscillator": None, "prism-constant": 3, "ball-constant": None, "gauge-blocks": 12,
-    "spacers": None, "invar-wire": 6,
+    "amplitude-to-phase": 9, "oscillator": None, "repeatability": None, "prism-constant": 3,
+    "ball-constant": None, "gauge-blocks": 12, "spacers": None, "invar-wire": 6,
 }  # fmt: skip
 
 
@@ -66,6 +68,8 @@ def test_an_example_finds_its_truth_and_its_one_wrong_reading(catseye, kind):
         assert abs(each["value"] - value) < 3.5 * each["u"], key
     if kind == "oscillator":  # its line is no reading that could be left out
         assert found["decisions"][0]["text"] == "lines at 57 Hz"
+    elif kind == "repeatability":
+        assert found["decisions"][0]["passed"] is False  # its pointings differ
     else:
         assert all(d["passed"] is not False for d in found["decisions"]), found["decisions"]
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spares itself
-    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|prism-constant|"
-    "ball-constant|gauge-blocks|spacers|invar-wire"
+    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
+    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire"
 )
 
 

@@ -66,7 +66,7 @@ def test_a_known_distance_gives_back_the_wire():
 def test_the_claimed_uncertainty_is_the_scatter_of_all_that_is_not_known():
     rng = np.random.default_rng(3)
     found, u = [], []
-    for _ in range(300):
+    for _ in range(150):
         tension, warm = 100.0 + 0.1 * rng.normal(), 27.0 + 0.5 * rng.normal()
         made = hung(
             tension_n=[tension] * 4,
@@ -81,6 +81,6 @@ def test_the_claimed_uncertainty_is_the_scatter_of_all_that_is_not_known():
         )
         found.append(made.value("distance_mm"))
         u.append(made.u("distance_mm"))
-    assert np.std(found) == pytest.approx(np.mean(u), rel=0.13)
+    assert np.std(found) == pytest.approx(np.mean(u), rel=0.19)  # 150 runs: 6 %
     nominal = hung(tension_n=[100.0] * 4, temperature_c=27.0, height_difference_mm=800.0, u_reading_mm=0.03)
-    assert np.mean(found) == pytest.approx(nominal.value("distance_mm"), abs=4 * np.mean(u) / np.sqrt(300))
+    assert np.mean(found) == pytest.approx(nominal.value("distance_mm"), abs=4 * np.mean(u) / np.sqrt(150))

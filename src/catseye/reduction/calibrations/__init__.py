@@ -15,6 +15,7 @@ from catseye.reduction.calibrations import (
     linearity,
     oscillator,
     reference_distance,
+    repeatability,
     retroreflector,
 )
 from catseye.reduction.calibrations.kind import Kind
@@ -27,6 +28,7 @@ KINDS: dict[str, Kind] = {
     "retroreflector": retroreflector.RECIPE,
     "amplitude-to-phase": amplitude.RECIPE,
     "oscillator": oscillator.RECIPE,
+    "repeatability": repeatability.RECIPE,
     "prism-constant": glass_constants.PRISM_RECIPE,
     "ball-constant": glass_constants.BALL_RECIPE,
     "gauge-blocks": gauge_blocks.BLOCKS_RECIPE,
