@@ -211,7 +211,7 @@ def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> li
     good = np.array([t == REFERENCE for t in shots.target]) & np.array([not r for r in phases.reason])
     good[list(wrong)] = False
     rows = [np.flatnonzero(good & (np.array(shots.ranger) == name))[1:] for name in campaign.rangers]
-    rows = [r for r in rows if len(r) > 1]
+    rows = [r for r in rows if len(r) > 1 and np.ptp(shots.mjd_utc[r]) > 0.0]
     if not rows:
         return []
     told = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
