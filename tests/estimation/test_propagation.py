@@ -11,6 +11,7 @@ from catseye.estimation.propagation import (
     SAMPLERS,
     Input,
     adaptive_monte_carlo,
+    agreement,
     agrees,
     draw_inputs,
     effective_degrees_of_freedom,
@@ -236,3 +237,21 @@ def test_a_result_without_any_uncertainty_has_no_shares():
     assert (budget.u, budget.expanded) == (0.0, 0.0)
     assert np.isnan(budget.share).all()
     assert numerical_tolerance(0.0) == 0.0
+
+
+def test_too_few_draws_decide_nothing():
+    """A linear normal model, whose budget is exact: a thousand draws would have said that it is wrong."""
+    inputs = [Input("x", 0.0, 70.0)]
+    budget = propagate(inputs, np.ones(1), value=0.0)
+    said = {
+        draws: [
+            agreement(budget, monte_carlo(lambda x: x[:, 0], drawing(inputs), draws=draws, generator=rng(seed)), 1)
+            for seed in range(20)
+        ]
+        for draws in (1_000, 100_000)
+    }
+    assert said[1_000] == [None] * 20
+    assert said[100_000] == [True] * 20
+    wrong = propagate([Input("x", 0.0, 60.0)], np.ones(1), value=0.0)
+    far = monte_carlo(lambda x: x[:, 0], drawing(inputs), draws=100_000, generator=rng(1))
+    assert agreement(wrong, far, 1) is False

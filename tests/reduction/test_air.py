@@ -172,3 +172,16 @@ def test_a_bend_of_one_degree_is_one_degree_warmer_half_way_and_nothing_at_the_s
     warmth, pressure = np.array([10.0, 12.0, 12.0]), 900.0 - 0.11 * (level[:, 2] - 25.0)  # half-way 11 on the line
     expected = group_refractivity(warmth, pressure, 50.0, wavelength_um=0.78, model="rueger1990")
     np.testing.assert_allclose(bent.refractivity, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("humidity", "expected"), [(100.0, 100.0), (0.0, 0.0)])
+def test_fog_and_dry_air_are_humidities_too(night_01, humidity, expected):
+    """Weights sum to one only to rounding: 100.00000000000001 % was refused, and with it the whole night."""
+    campaign, start = weathered(
+        night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 37.0), lambda s, i: 10.0, humidity=humidity
+    )
+    field = AirField.of(campaign, Settings())
+    times = at(start, *np.linspace(0.0, 3600.0, 500))
+    assert np.all(np.abs(field.smoothed(times)[:, :, 2] - expected) < 1e-9)
+    ends = np.zeros((500, 3)), np.tile([50.0, 0.0, 30.0], (500, 1))
+    assert np.all(np.isfinite(field.along(times, *ends, np.zeros(3)).refractivity))

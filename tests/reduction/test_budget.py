@@ -19,6 +19,8 @@ from catseye.reduction.network import build_network
 from catseye.reduction.ranges import follow_electronics, measure_phases
 from catseye.reduction.settings import Settings
 from catseye.reduction.shots import shot_group
+from catseye.signal.buffers import inspect_buffers
+from catseye.signal.cycle_scatter import _turned
 
 PRISM, BALL, HOLLOW, GROUND = 3, 700, 2, 700  # shots of night-01; 2 is between two feed-arm rangers
 
@@ -397,7 +399,7 @@ def test_without_an_adjustment_the_records_places_decide_the_cycles(night_01, re
     found = explain_shot(night_01, BALL)
     assert (found.status, found.reason, found.adjusted) == ("not adjusted", "", None)
     assert found.coarse == "the records' places"
-    assert found.notes == ("the campaign cannot be adjusted: no answer today",)
+    assert found.notes[0] == "the campaign cannot be adjusted: no answer today"
     settled = explain_shot(night_01, BALL, reduction=reduced_night_01)
     assert int(found.cycles.cycles) == int(settled.cycles.cycles)
     assert found.budget.value == pytest.approx(settled.budget.value, abs=1e-6)  # air and incidence along 20 mm off
@@ -426,3 +428,37 @@ def test_a_radian_is_half_a_wavelength_over_two_pi(night_01, sight):
     slope = slope_of(items_of(scene), "noise")
     assert slope == pytest.approx(-0.0999305 / 1.00025 * 1.00025 / TWO_PI, rel=3e-4)  # phase falls, distance grows
     assert slope_of(items_of(scene), "walk") == -slope
+
+
+def test_the_degrees_of_freedom_are_those_of_the_uncertainty_that_is_claimed(night_01, sight):
+    """A weak return whose leakage turns along and across: noise slow across the light, not across the raw phasor."""
+    mirror = night_01.mirror_of("ZY116")
+    leakage = mirror.leakage_amplitude_volt * np.exp(1j * mirror.leakage_phase_rad)
+    code, length = 10.0 / 2**15, 8192
+    row = int(np.flatnonzero(night_01.shots.shot == PRISM)[0])
+    rng = np.random.default_rng(1)
+    told = set()
+    for phase in np.arange(0.0, TWO_PI, 0.39):
+        turn = np.exp(1j * phase)
+        slow = np.repeat(rng.normal(size=8), length // 8) * 0.0012
+        wave = (0.04 * turn + leakage + 1j * turn * slow) * np.exp(-1j * TWO_PI * np.arange(length) / 64)
+        frames = np.array(night_01.frames)
+        frames[night_01.shots.frame[row]] = np.rint((wave.real + rng.normal(0.0, 0.035, length)) / code)
+        campaign = dataclasses.replace(night_01, frames=frames)
+        scene = sight(campaign, PRISM)
+        degrees = next(i for i in items_of(scene) if i.key == "noise").given.degrees_of_freedom
+        seen = inspect_buffers(frames[night_01.shots.frame[[row]]], 64, code).detection.scatter
+        white = np.sqrt(_turned(seen.total, np.array([scene.phasor]))[0, 1] / (127 * 128))
+        assert (degrees == 127.0) == (scene.u_across == pytest.approx(white, rel=1e-9))
+        told.add(degrees)
+    assert told == {7.0, 127.0}
+
+
+def test_what_the_sheet_does_not_say_is_named(night_01, reduced_night_01):
+    (note,) = explain_shot(night_01, PRISM, reduction=reduced_night_01, draws=0).notes
+    assert note.startswith("not in this budget")
+    assert "cyclic terms" in note
+    sheet = night_01.mirror_of("ZY116")
+    said = sheet.model_copy(update={"u_cyclic_mm": 0.01, "u_amplitude_to_phase_rad": 0.001})
+    told = dataclasses.replace(night_01, mirrors={**night_01.mirrors, sheet.zp: said})
+    assert explain_shot(told, PRISM, draws=0).notes == ()

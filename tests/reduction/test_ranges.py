@@ -183,3 +183,29 @@ def test_a_site_whose_electronics_walk_otherwise_than_it_says_is_told(night_01):
         told = dataclasses.replace(night_01, site=night_01.site.model_copy(update={"ranging": ranging}))
         (note,) = walk_notes(told, phases, wrong)
         assert f"not by the {claimed:g} of site.toml: u_range is too {word}" in note
+
+
+def test_a_walk_that_one_difference_contradicts_is_a_note_and_no_failure(night_01):
+    phases = measure_phases(night_01, Settings())
+    shots = night_01.shots
+    wrong = [
+        k
+        for name in night_01.rangers
+        for k in [
+            k for k, (r, t) in enumerate(zip(shots.ranger, shots.target, strict=True)) if (r, t) == (name, REFERENCE)
+        ][3 if name == "ZY116" else 2 :]
+    ]
+    ranging = night_01.site.ranging.model_copy(update={"electronic_drift_mrad_per_sqrt_hour": 0.5})
+    told = dataclasses.replace(night_01, site=night_01.site.model_copy(update={"ranging": ranging}))
+    (note,) = walk_notes(told, phases, wrong)
+    assert "not by the 0.5 of site.toml: u_range is too small" in note
+
+
+def test_electronics_that_stand_still_are_told_without_limits_that_mean_nothing(night_01):
+    phases = measure_phases(night_01, Settings())
+    reference = np.array([t == REFERENCE for t in night_01.shots.target])
+    noise = 3e-4 * np.random.default_rng(0).normal(size=len(reference))
+    still = np.where(reference, phases.amplitude * np.exp(1j * noise), phases.phasor)
+    (note,) = walk_notes(night_01, dataclasses.replace(phases, phasor=still), [])
+    assert "no walk" in note
+    assert "inf" not in note

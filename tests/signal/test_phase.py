@@ -342,3 +342,20 @@ def test_two_gigabytes_need_little_memory(tmp_path):
     assert peak < 400 * count + 50e6  # bytes: the answers, and numba when it is loaded here first
     assert float(shots.phase[-1]) == pytest.approx(0.5, abs=1e-4)
     assert not shots.phasor[:-1].any()
+
+
+@pytest.mark.parametrize("n", [8, 9, 16, 64])
+def test_clipping_moves_the_phase_no_more_than_the_module_says(n):
+    phases = np.linspace(0.0, 2 * np.pi, 721)
+    wave = np.cos(2 * np.pi * np.arange(n) / n - phases[:, None])
+    worst = {}
+    for level in (0.5, 0.6, 0.7, 0.8, 0.9, 1e-6):
+        for side, clipped in (("one", np.minimum(wave, level)), ("both", np.clip(wave, -level, level))):
+            error = np.abs(np.angle(detect(clipped, n).phasor * np.exp(-1j * phases))).max()
+            worst[side, level >= 0.5] = max(worst.get((side, level >= 0.5), 0.0), error)
+    assert worst["one", True] < 1.5 / n**2
+    assert worst["both", True] < 4.0 / n**2
+    assert worst["both", False] < 1.01 * np.pi / n
+    if n % 2 == 0:
+        assert worst["both", True] > 2.0 / n**2
+        assert worst["both", False] > 2.0 / n

@@ -300,6 +300,23 @@ def agrees(budget: Budget, scattered: Scattered, digits: int = 2) -> bool:
     return bool(np.all(np.abs(ends) <= numerical_tolerance(budget.u, digits)))
 
 
+def agreement(budget: Budget, scattered: Scattered, digits: int = 2) -> bool | None:
+    """As `agrees`; None where an end would come out elsewhere with other draws: too few to tell.
+
+    Source: [JCGM101] clauses 7.9.4 and 8.2: twice an end's standard deviation must be below the tolerance, here with
+    that deviation from the binomial scatter of its rank.
+    """
+    values, n = np.sort(scattered.values), len(scattered.values)
+    tail = 0.5 * (1.0 - scattered.probability)
+    for rank in (tail, 1.0 - tail):
+        low, high = (rank + sign * np.sqrt(tail * (1.0 - tail) / n) for sign in (-1.0, 1.0))
+        if low <= 0.0 or high >= 1.0:
+            return None
+        if values[int(high * n)] - values[int(low * n)] > numerical_tolerance(budget.u, digits):
+            return None
+    return agrees(budget, scattered, digits)
+
+
 def _summary(values: np.ndarray, probability: float, settled: bool = True) -> Scattered:
     """Mean, deviation and intervals; the values are large beside their scatter, so they are first reduced."""
     start = float(values[0])

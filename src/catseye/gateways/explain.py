@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.propagation import Input, agrees
+from catseye.estimation.propagation import Input, agreement
 from catseye.gateways.summary import MEANING, Passage
 from catseye.records.campaign import REFERENCE
 from catseye.reduction.budget import Explanation
@@ -22,7 +22,7 @@ def explanation_object(found: Explanation, seed: int | None = None) -> dict[str,
     seed   of the Monte Carlo, where there was one
 
     An input's value and standard uncertainty are in its unit, its sensitivity is metres a unit, its contribution
-    metres. Infinite degrees of freedom are null.
+    metres. Infinite degrees of freedom are null, and `agrees` where the draws are too few to tell.
     """
     budget, cycles = found.budget, found.cycles
     return {
@@ -100,7 +100,7 @@ def _monte_carlo(found: Explanation, seed: int | None) -> dict[str, Any] | None:
         "high": scattered.high,
         "shortest": list(scattered.shortest),
         "coverage_probability": scattered.probability,
-        "agrees": agrees(budget, scattered, digits=1),
+        "agrees": agreement(budget, scattered, digits=1),
     }
 
 
@@ -181,8 +181,9 @@ def _return(found: Explanation) -> str:
     if not np.isfinite(found.u_across) or amplitude == 0.0:
         return f"{amplitude:.4f} V after the leakage; its noise is unknown."
     return (
-        f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(found.phasor), 2.0 * np.pi):.4f} rad, both with "
-        f"the noise of the samples: {1e3 * found.u_across:.2f} mV, {1e3 * found.u_across / amplitude:.2f} mrad."
+        f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(found.phasor), 2.0 * np.pi):.4f} rad; "
+        f"noise of the samples across it {1e3 * found.u_across:.2f} mV, that is "
+        f"{1e3 * found.u_across / amplitude:.2f} mrad."
     )
 
 
@@ -223,8 +224,11 @@ def _scatter(found: Explanation) -> str:
     scattered, budget = found.scattered, found.budget
     assert scattered is not None
     assert budget is not None
-    same = agrees(budget, scattered, digits=1)
-    verdict = "the budget's interval agrees" if same else "the budget's interval differs: believe this one"
+    verdict = {
+        True: "the budget's interval agrees",
+        False: "the budget's interval differs: believe this one",
+        None: "too few draws to compare the budget's interval",
+    }[agreement(budget, scattered, digits=1)]
     u = f"u {micrometres(scattered.u)}" if np.isfinite(scattered.u) else "too few cycles for a u"
     return (
         f"{len(scattered.values)} draws of all inputs through the whole chain: {u}, "

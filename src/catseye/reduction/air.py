@@ -69,11 +69,16 @@ class AirField:
         )
 
     def smoothed(self, mjd_utc: np.ndarray) -> np.ndarray:
-        """Temperature °C, pressure hPa, humidity % of each station: (m, stations, 3), by local straight lines."""
+        """Temperature °C, pressure hPa, humidity % of each station: (m, stations, 3), by local straight lines.
+
+        Humidity stays within 0 to 100 %: a line through readings near an end, or rounding in fog, leads beyond.
+        """
         t = (np.asarray(mjd_utc, dtype=float) - self.start_mjd) * SECONDS_PER_DAY
-        return np.stack(
+        state = np.stack(
             [_local_line(when, values, t) for when, values in zip(self.seconds, self.readings, strict=True)], axis=1
         )
+        state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
+        return state
 
     def along(self, mjd_utc: np.ndarray, a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> PathAir:
         """Mean group refractivity of straight paths, by Gauss-Legendre quadrature along them.

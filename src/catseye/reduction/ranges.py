@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
+from catseye.errors import EstimationError
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.settings import Settings
 from catseye.signal.buffers import BufferStatus, inspect_buffers
@@ -225,12 +226,17 @@ def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> li
     test = walk_test(*references, random_walk=told * MRAD_PER_ROOT_HOUR, series=series, probability=0.999)
     if test.passed:
         return []
-    found = estimate_walk(*references, series=series)
+    verdict = f"not by the {told:g} of site.toml: u_range is too {'small' if test.statistic > test.high else 'large'}"
+    try:
+        found = estimate_walk(*references, series=series)
+    except EstimationError:  # the test needs one difference of references, an estimate two
+        return [f"the electronics walk between references, but {verdict}"]
+    if found.random_walk == 0.0:
+        return [f"the electronics show no walk between references beyond their noise, {verdict}"]
     low, high = (v / MRAD_PER_ROOT_HOUR for v in found.interval())
     return [
         f"the electronics walk by {found.random_walk / MRAD_PER_ROOT_HOUR:.1f} mrad per root hour between references "
-        f"(95 %: {low:.1f} to {high:.1f}), not by the {told:g} of site.toml: u_range is too "
-        f"{'small' if test.statistic > test.high else 'large'}"
+        f"(95 %: {low:.1f} to {high:.1f}), {verdict}"
     ]
 
 

@@ -37,7 +37,7 @@ TEXTS = {
     BufferStatus.DROPOUT: "dropout: {dropped} of {cycles} cycles have less than half the amplitude; was the beam cut?",
     BufferStatus.STUCK: "stuck: a run of at least {run} equal samples (a cycle has {n}); look at the converter",
     BufferStatus.CLIPPED: "clipped: {clipped} samples at the converter's ends (largest {largest:.4g} V)",
-    BufferStatus.NOT_FINITE: "not finite: a sample is NaN or infinite",
+    BufferStatus.NOT_FINITE: "not finite: a sample is NaN, infinite, or too large to be squared",
     BufferStatus.WRONG_LENGTH: "wrong length: {length} samples, expected {expected}",
     BufferStatus.NOT_SAMPLES: "not samples: expected a row of integers or floats",
 }
@@ -111,7 +111,7 @@ def inspect_buffers(
     >>> seen.text(0), seen.text(1)
     ('good', 'wrong length: 100 samples, expected a whole number of cycles of 64')
     >>> seen.text(2)
-    'not finite: a sample is NaN or infinite'
+    'not finite: a sample is NaN, infinite, or too large to be squared'
     """
     if not 0.0 <= weakest < np.inf:
         raise ValidityError(f"weakest amplitude {weakest} V is not 0 or above and finite")
@@ -193,7 +193,8 @@ def _judged(found: Detection, stuck: NDArray[np.bool_], weakest: float) -> NDArr
     status[found.scatter.dropped > 0] = BufferStatus.DROPOUT
     status[stuck] = BufferStatus.STUCK
     status[found.clipped > 0] = BufferStatus.CLIPPED
-    status[~np.isfinite(found.phasor) | ~np.isfinite(found.largest)] = BufferStatus.NOT_FINITE
+    known = np.isfinite(found.phasor) & np.isfinite(found.largest) & ~np.isinf(found.u_phasor)
+    status[~known] = BufferStatus.NOT_FINITE
     return status
 
 

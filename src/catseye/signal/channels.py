@@ -125,7 +125,7 @@ def interleaved_phasors(
     [1.0, 2.0]
     """
     array = np.asarray(samples)
-    if array.ndim < 2:
+    if array.ndim < 2 or array.shape[-1] < 1:
         raise ValidityError(f"samples of shape {array.shape} are not (..., time, channels)")
     c = array.shape[-1]
     n, m = layout(np.moveaxis(array, -1, 0), samples_per_cycle)

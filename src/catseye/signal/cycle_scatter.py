@@ -13,8 +13,10 @@ Noise that is alike in neighbouring cycles does not average as m^(-1/2). So the 
 one after the other: white noise makes the variance between batches, m-fold that of their mean, equal to that within
 them, and their ratio, the *colour*, has Fisher's distribution. Where it exceeds what white noise exceeds once in a
 hundred, the scatter of the batches is claimed instead. That is honest for noise that forgets within a batch. For slower
-noise it is a lower limit, and colour below that threshold (2.8 at 128 cycles) can hide a factor of 1.5 in u; noise with
-a colour below 1 (a line that averages out) keeps the larger claim.
+noise it is a lower limit: a factor of 2 to 3 may be missing, mostly without the threshold (2.8 at 128 cycles) being
+passed, and below it noise that does forget can hide a factor of 1.5 too. What is slower than a buffer shows between
+buffers: see `walk` and the calibration "oscillator". Noise with a colour below 1 (a line that averages out) keeps the
+larger claim.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ def layout(array: NDArray[np.generic], samples_per_cycle: int) -> tuple[int, int
     """Samples a cycle n and cycles m of buffers (..., m n); ValidityError where they do not fit."""
     if array.dtype.kind not in "iuf":
         raise ValidityError(f"samples are of type {array.dtype}, expected integers or floats")
-    if samples_per_cycle != int(samples_per_cycle) or samples_per_cycle < 3:
+    if not np.isfinite(samples_per_cycle) or samples_per_cycle != int(samples_per_cycle) or samples_per_cycle < 3:
         raise ValidityError(f"{samples_per_cycle} samples a cycle do not show a phase; at least 3 do")
     n = int(samples_per_cycle)
     length = array.shape[-1] if array.ndim else 0

@@ -7,7 +7,8 @@ samples scatter. Large arrays of 16-bit samples go to the compiled form in `phas
 What lies at the fundamental cannot be told from the signal. Harmonic k is rejected exactly unless n divides k - 1 or
 k + 1: with n samples a cycle harmonic n - 1 is the fundamental's mirror image, so that B cos((n-1) x - psi) adds
 B exp(-i psi) to the phasor. Clipping makes a sine smaller but leaves it even about its crest, on one side or on both:
-its phase moves only by the harmonics n - 1, n + 1, 2 n - 1, ... that fold back, less than 1/n^2 rad.
+its phase moves only by the harmonics n - 1, n + 1, 2 n - 1, ... that fold back: up to 1.5/n^2 rad clipped on one side
+at half the amplitude or above, 4/n^2 rad on both; towards a square wave it is pi/n.
 """
 
 from collections.abc import Sequence
@@ -136,7 +137,7 @@ def detect(
     array = np.asarray(samples)
     n, m = _checked(array, samples_per_cycle, volts_per_code)
     wanted = tuple(harmonics)
-    if any(k != int(k) or k < 2 for k in wanted):
+    if any(not np.isfinite(k) or k != int(k) or k < 2 for k in wanted):
         raise ValidityError(f"harmonics {list(wanted)} are not whole numbers of at least 2")
     if converter_ends is None and array.dtype.kind in "iu":
         limits = np.iinfo(array.dtype)
@@ -145,7 +146,7 @@ def detect(
     buffers = array.reshape(-1, m * n)
     found = _Codes.of(len(buffers), len(wanted))
     step = max(1, (16 if fast else 1) * BLOCK_SAMPLES // (m * n))
-    with np.errstate(invalid="ignore"):  # a buffer that holds NaN or infinity answers NaN
+    with np.errstate(invalid="ignore", over="ignore"):  # NaN, infinity and 1e300 V answer NaN or infinity
         for start in range(0, len(buffers), step):
             block = buffers[start : start + step].reshape(-1, m, n)
             part = found.rows(start, len(block))

@@ -8,6 +8,7 @@ from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
 from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.mirror import Mirror
 from catseye.reduction.budget.chain import drawing, measurement
 from catseye.reduction.budget.inputs import Item, correlation_of, items_of
 from catseye.reduction.budget.scene import Assumptions, Scene, scene_of
@@ -185,8 +186,22 @@ def _budgeted(
         cycles=cycles,
         coarse=coarse,
         scattered=scatter_of(scene, items, draws, seed) if draws else None,
+        notes=(*known.notes, *_unsaid(scene.mirror, known.ranger in scene.campaign.monuments)),
         references=tuple((int(shots.shot[k]), float(after), float(weight)) for k, after, weight in neighbours),
     )
+
+
+def _unsaid(mirror: Mirror, turns_known: bool) -> list[str]:
+    """What the mirror's sheet could have said of its head, and did not: the budget cannot count it."""
+    effects = {
+        "u_amplitude_to_phase_rad": "coupling of amplitude to phase",
+        "u_cyclic_mm": "cyclic terms",
+        **({"u_axis_mm": "offsets of axes and beam"} if turns_known else {}),
+    }
+    missing = [effect for key, effect in effects.items() if getattr(mirror, key) is None]
+    if not missing:
+        return []
+    return [f"not in this budget, as mirrors/{mirror.zp}.toml says nothing of them: {', '.join(missing)}"]
 
 
 def _status(

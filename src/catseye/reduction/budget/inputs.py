@@ -77,18 +77,20 @@ def _phase_slope(scene: Scene) -> tuple[float, float]:
     return s + float(cyclic_slope(scene.phase, cosine, sine)), s
 
 
-def _noise(scene: Scene, row: int) -> tuple[str, float]:
+def _noise(scene: Scene, row: int, phasor: complex) -> tuple[str, float]:
     """Distribution and degrees of freedom of the noise across a buffer's phasor, as `measure_phases` finds it.
 
     From 16 cycles on it is that of one quadrature, of fewer degrees where the noise is coloured; of both below that;
     one cycle alone is judged about its mean and three harmonics.
+
+    phasor   of the light: a leakage turns what is along and across
     """
     shots = scene.campaign.shots
     m, n = int(shots.cycles[row]), int(shots.samples_per_cycle[row])
     if m < FEWEST_FOR_BATCHES:
         return STUDENT, float(2 * (m - 1) if m > 1 else n - 7)
     found = inspect_buffers(scene.campaign.frames[shots.frame[[row]], : m * n], n).detection
-    _, degrees = found.scatter.variance(found.phasor)
+    _, degrees = found.scatter.variance(np.array([phasor]))
     return STUDENT, float(degrees[0, 1])
 
 
@@ -104,7 +106,7 @@ def _samples(scene: Scene) -> list[Item]:
     rounded = count if rms >= DITHERED * code else int(shots.samples_per_cycle[row])
     u_steps = code / np.sqrt(12.0) * np.sqrt(2.0 / rounded)
     u_rest = float(np.sqrt(max(scene.u_across**2 - u_steps**2, 0.0)))
-    kind, degrees = _noise(scene, row)
+    kind, degrees = _noise(scene, row, scene.phasor)
     noise = f"frames.npy row {shots.frame[row]}: scatter of {shots.cycles[row]} cycles, less the converter's steps"
     phase = float(np.mod(np.angle(scene.phasor), TWO_PI))
     coupling = scene.mirror.amplitude_to_phase_rad
@@ -133,7 +135,7 @@ def _electronics(scene: Scene) -> list[Item]:
     items = []
     for k in np.flatnonzero(np.abs(references.weight) >= NAMED):
         row = int(references.shots[k])
-        kind, degrees = _noise(scene, row)
+        kind, degrees = _noise(scene, row, complex(references.phasor[k]))
         after = references.seconds[k] - scene.seconds
         name = f"noise of reference shot {shots.shot[row]}"
         given = Input(name, float(references.unwrapped[k]), float(references.u_phase[k]), kind, degrees)
