@@ -185,3 +185,41 @@ def test_a_campaign_of_nothing_but_unknown_cycles_is_refused_with_the_reason(
         InputError, match=r"^shots\.csv: whole cycles unknown: DP005 is typed to 300 mm only; .*; nothing to adjust$"
     ):
         reduce_epoch(only)
+
+
+def test_repeats_on_one_line_do_not_vouch_for_each_others_cycles(night_01, part, targets_01, rangers_01):
+    reduction = reduce_epoch(part(night_01, ~((targets_01 == "ZAG731P") & (rangers_01 != "ZY101"))))
+    ranges = reduction.coordinates.ranges
+    mine = np.array(ranges.target) == "ZAG731P"
+    assert mine.sum() == 2  # from one coarse length, good to the typed 10 mm
+    assert ranges.thin[mine].all()
+    assert not ranges.thin[~mine].any()
+
+
+def test_a_point_with_some_shots_safe_and_some_unknown_starts_where_the_safe_ones_put_it(
+    night_01, reduced_night_01, adjusted
+):
+    # ZBM01: certified from ZY102, four shots; ZY103's two alone would not place it. The night must not notice
+    found, before = adjusted(target_off(night_01, "ZBM01")), reduced_night_01.coordinates
+    assert len(found.unresolved) == 2
+    assert {night_01.shots.ranger[k] for k in found.unresolved} == {"ZY103"}
+    both = np.isin(before.ranges.shot, found.ranges.shot)
+    np.testing.assert_array_equal(before.ranges.cycles[both], found.ranges.cycles)
+    np.testing.assert_array_equal(before.ranges.used[both], found.ranges.used)
+    others = np.repeat(np.array(before.points) != "ZBM01", 3).reshape(-1, 3)
+    assert np.abs(found.x - before.x)[others].max() < 5e-6  # two shots fewer
+
+
+def test_a_certified_distance_overrules_a_typed_position_that_contradicts_it(night_01, reduced_night_01, adjusted):
+    # 0.3 m off and claiming 10 mm: four shots, alike by the same wrong cycles, used to outvote the certificate
+    found, before = adjusted(target_off(night_01, "ZBM02", u=None)), reduced_night_01.coordinates
+    np.testing.assert_array_equal(before.ranges.cycles, found.ranges.cycles)
+    np.testing.assert_array_equal(before.ranges.used, found.ranges.used)
+    assert any(n.startswith("ZBM02: its typed position is") for n in found.notes)
+
+
+def test_a_point_none_of_whose_shots_fits_is_named(night_01, adjusted):
+    found = adjusted(target_off(night_01, "DP012", u=None))
+    mine = np.array(found.ranges.target) == "DP012"
+    assert not found.ranges.used[mine].any()
+    assert any(n.startswith(f"DP012: none of its {mine.sum()} shots fits") for n in found.notes)

@@ -437,3 +437,13 @@ def test_coordinates_of_nights_whose_heads_are_off_their_sheets_scatter_as_claim
     # points of a night share air, scale and survey: some 40 independent directions a night
     assert 0.85 < rms["admitted"] < 1.15
     assert rms["denied"] > 1.15 * rms["admitted"]
+
+
+def test_a_sheet_that_the_ranges_contradict_is_named(night_01, reduced_night_01):
+    # 2 mm of an axis offset that is not there, to 10 um as claimed: no shot is rejected for it
+    r, zp = reduced_night_01, night_01.mirror_of("ZY101").zp
+    mirror = night_01.mirrors[zp].model_copy(update={"axis_offset_mm": 2.0, "u_axis_mm": 0.01})
+    campaign = dataclasses.replace(night_01, mirrors=night_01.mirrors | {zp: mirror})
+    notes = adjust_coordinates(campaign, r.phases, r.electronics, r.settings).notes
+    assert any(n.startswith("axes ZY101 axis offset: not the mirror sheet's") for n in notes)
+    assert not any("not the mirror sheet's" in n for n in r.notes)

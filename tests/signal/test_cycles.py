@@ -68,6 +68,7 @@ def test_the_probability_of_a_slip_is_the_sum_over_all_other_integers(share):
 
 def test_half_way_between_two_integers_either_is_as_likely():
     assert float(slip_probability(0.5 * HALF, 1e-4, HALF)) == pytest.approx(0.5, abs=1e-12)
+    assert float(slip_probability(0.05, 0.0, 0.1)) == 0.5
 
 
 def test_slips_are_as_frequent_as_claimed():

@@ -179,3 +179,28 @@ def test_the_cascades_steps_have_the_margins_that_the_beats_leave():
     expected = [np.hypot(np.hypot(half[0], half[1]), half[0] - half[1]), np.hypot(half[1], half[1] + half[2])]
     np.testing.assert_allclose(stepped.u[0], expected, rtol=1e-9)
     assert stepped.thin.tolist() == [False]
+
+
+def test_the_cascade_flags_lengths_so_near_a_limit_that_noise_carries_them_to_the_other():
+    rng = np.random.default_rng(12)
+    length = np.full(500, 5.02)  # 20 mm above the limit; the longest beat says it to 67 mm
+    found = cascade_length(phases(length, PLAN, 1.0, 1e-3 * rng.standard_normal((500, 3))), PLAN, u_phase=1e-3, low=5.0)
+    wrong = np.abs(found.length - length) > 0.01
+    assert 0.2 < wrong.mean() < 0.6
+    assert found.thin.all()
+
+
+def test_no_number_is_thin_in_the_cascade_and_spoils_no_other():
+    good = phases(50.0, PLAN, 1.0)
+    found = cascade_length([good, [np.nan, 1.0, 2.0]], PLAN, u_phase=1e-3, low=5.0)
+    assert found.thin.tolist() == [False, True]
+    assert found.length[0] == pytest.approx(50.0, abs=1e-9)
+    assert np.isnan(found.length[1])
+    assert not found.cycles[1].any()
+
+
+def test_no_shots_give_no_lengths_and_an_uncertainty_that_is_no_number_is_refused():
+    assert joint_length(np.zeros((0, 3)), PLAN, u_phase=1e-3, within=(5.0, 200.0)).cycles.shape == (0, 3)
+    for u in (np.nan, np.inf):
+        with pytest.raises(ValidityError, match=r"u_phase .* is not finite"):
+            modulation_set(PLAN, u_phase=u, span=200.0)

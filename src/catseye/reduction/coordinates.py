@@ -7,13 +7,13 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
-from catseye.estimation.observations import Linear, Observations
+from catseye.estimation.adjustment import Fit, Solution, adjust
+from catseye.estimation.observations import Distances, Linear, Observations
 from catseye.estimation.robust import CHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
-from catseye.reduction.cycles import KEPT, Resolved, resolve_cycles, without_shots
+from catseye.reduction.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.dish import dish_advice
-from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, THERMOMETERS, ZEROS, Network, build_network
+from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, HEADS, THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
 from catseye.reduction.settings import Settings
@@ -48,9 +48,9 @@ class RangeShots:
     detectable        smallest error that a test at the level 0.1 % finds four times in five, m; rejection at |w| = 3.5
                       asks for 5 % more
     used              took part
-    thin              its whole cycles are not beyond doubt: what all other observations and records predict of this
-                      range misses it by so much, or is so uncertain, that misfit and five standard uncertainties reach
-                      a quarter wavelength
+    thin              its whole cycles are not beyond doubt: what all other lines and the records predict of this range
+                      misses it by so much, or is so uncertain, that misfit and five standard uncertainties reach a
+                      quarter wavelength; repeats on one line share their cycles and do not check each other
     """
 
     shot: np.ndarray
@@ -195,14 +195,16 @@ def adjust_coordinates(
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
-    return _coordinates(network, solution, [parts for _, parts in shots], resolved)
+    return _coordinates(network, solution, shots, resolved)
 
 
-def _coordinates(network: Network, solution: Solution, parts: list[ShotParts], resolved: Resolved) -> Coordinates:
+def _coordinates(
+    network: Network, solution: Solution, shots: list[tuple[Distances, ShotParts]], resolved: Resolved
+) -> Coordinates:
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
     columns = np.concatenate([layout.columns(n) for n in names])
-    ranges = _ranges(network, solution, parts)
+    ranges = _ranges(network, solution, shots)
     count = dict.fromkeys(names, 0)
     for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
         count[ranger] += int(used)
@@ -237,12 +239,12 @@ def _coordinates(network: Network, solution: Solution, parts: list[ShotParts], r
     )
 
 
-def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> RangeShots:
-    x, layout = solution.x, network.layout
+def _ranges(network: Network, solution: Solution, shots: list[tuple[Distances, ShotParts]]) -> RangeShots:
+    x, layout, parts = solution.x, network.layout, [p for _, p in shots]
     fits = solution.fits[: len(parts)]
     zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []
     quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
-    for part, fit in zip(parts, fits, strict=True):
+    for (group, part), fit in zip(shots, fits, strict=True):
         n = 1.0 + part.refractivity
         own_zero = np.full(len(n), x[layout.at[f"zero {part.name}"]])
         at = x[layout.at[part.name] + np.arange(3)]
@@ -255,7 +257,8 @@ def _ranges(network: Network, solution: Solution, parts: list[ShotParts]) -> Ran
         range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
         u_range.append(fit.sigma / n)
         detectable.append(fit.detectable_error / n)
-        thin.append(np.abs(fit.estimated_error) + KEPT * fit.detectable_error / NONCENTRALITY >= quarter)
+        error, u = line_errors(group, part.target, fit, solution)
+        thin.append(np.abs(error) + KEPT * u >= quarter)
     join = np.concatenate
     return RangeShots(
         shot=join([p.electronics.shots for p in parts]),
@@ -299,13 +302,18 @@ def _thin_notes(ranges: RangeShots) -> list[str]:
 
 
 def _losses(ranges: RangeShots) -> list[str]:
-    """Targets that lost shots and hang on one that no other checks; rangers that lost most of theirs."""
+    """Targets that lost all shots, or hang on one that no other checks; rangers that lost most of theirs."""
     notes = []
     target = np.array(ranges.target)
     for name in sorted(set(ranges.target)):
         mine = target == name
         lost, alone = mine & ~ranges.used, mine & ranges.used & (ranges.detectable >= CHECKED * ranges.u_range)
-        if lost.any() and alone.any():
+        if not (mine & ranges.used).any():
+            notes.append(
+                f"{name}: none of its {mine.sum()} shots fits the others and its typed position: its coordinates here "
+                "are not measured; check its typed position or say how bad it is (u_position_mm)"
+            )
+        elif lost.any() and alone.any():
             notes.append(
                 f"{name}: {lost.sum()} of its {mine.sum()} shots contradict the rest and nothing checks {alone.sum()} "
                 "of those left: it may be further off than its uncertainty says; range it again"
@@ -339,6 +347,14 @@ def _notes(
                         f"{name}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
                         f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(name).zp}"
                     )
+    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
+        if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
+            worst = int(np.argmax(np.abs(fit.standardised)))
+            called = network.layout.names[int(np.ravel(group.columns)[worst])]
+            notes.append(
+                f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
+                f"{network.settings.critical}); check the sheet's value and u"
+            )
     steepest = network.field.steepest(np.array([air[n][0] for n in network.field.names[:-1]]))
     if abs(steepest) > STEEP:
         notes.append(

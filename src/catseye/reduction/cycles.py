@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
-from catseye.estimation.adjustment import NONCENTRALITY, adjust
+from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
 from catseye.estimation.ambiguity import AmbiguityStatus, Located
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations import Distances, Observations
 from catseye.estimation.robust import adjust_robustly
+from catseye.estimation.rows import full_jacobian
 from catseye.records.campaign import Campaign
 from catseye.reduction.cycle_search import Scene, search, spread
 from catseye.reduction.network import THERMOMETERS, ZEROS, Network, build_network
@@ -96,19 +97,27 @@ def resolve_cycles(
     if progress is not None:
         progress("whole cycles", ROUNDS, ROUNDS)
     lost = sorted({name for k in waiting for name in ends[k] & doubtful})
-    starts = {name: x[network.layout.columns(name)] for name in sorted(asked.difference(lost))}
+    starts = {name: x[network.layout.columns(name)] for name in sorted(asked)}  # a lost one may have safe shots as well
     rejected = {k: _reason(network, settings, sorted(ends[k] & doubtful), last) for k in sorted(waiting)}
     notes = [*_found_notes(network, settings, found_as), *_lost_notes(network, settings, lost, last)]
     return Resolved(starts, rejected, tuple(notes))
 
 
 def doubtful_points(network: Network) -> set[str]:
-    """Typed points whose uncertainty does not keep five standard uncertainties within a quarter wavelength."""
-    return {
-        n
-        for n, p in network.places.items()
-        if p.typed and _too_wide(network, p.u_typed(network.settings.u_position) ** 2 * np.eye(3))
-    }
+    """Typed points whose uncertainty does not keep five standard uncertainties within a quarter wavelength.
+
+    So are those that contradict a certified distance, whatever they claim.
+    """
+    usual, places = network.settings.u_position, network.places
+    wide = {n for n, p in places.items() if p.typed and _too_wide(network, p.u_typed(usual) ** 2 * np.eye(3))}
+    for b in network.campaign.benchmarks:
+        if b.target in places and b.ranger in places:
+            ends = places[b.target], places[b.ranger]
+            typed = [p for p in ends if p.typed]
+            miss = float(np.linalg.norm(ends[0].start - ends[1].start)) - b.certified_distance_mm * MILLIMETRE
+            u = float(np.linalg.norm([b.u_mm * MILLIMETRE, *(p.u_typed(usual) for p in typed)]))
+            wide |= {p.name for p in typed if abs(miss) > KEPT * ROUNDED * u}
+    return wide
 
 
 def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[str, Electronics]:
@@ -124,6 +133,29 @@ def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[st
             reference=e.reference[keep],
         )
     return left
+
+
+def line_errors(
+    group: Distances, targets: tuple[str, ...], fit: Fit, solution: Solution
+) -> tuple[np.ndarray, np.ndarray]:
+    """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
+
+    Used repeats on one line come from one coarse length, so that their whole cycles are wrong together: the error they
+    have in common is e'Pv / e'P_v e, e being 1 for them, as `adjust` has it for a single shot.
+    """
+    error, u = fit.estimated_error.copy(), fit.detectable_error / NONCENTRALITY
+    on = np.flatnonzero(fit.active)
+    lines = {name: np.array([targets[k] == name for k in on], dtype=bool) for name in {targets[k] for k in on}}
+    repeated = [mine for mine in lines.values() if mine.sum() > 1]
+    if repeated:
+        weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
+        weighed = weight @ full_jacobian(group, solution.x)[on]
+        rest = weight @ fit.residual[on]
+        for mine in repeated:
+            own, seen = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
+            visible = max(own - seen @ solution.covariance @ seen, 1e-12 * own)
+            error[on[mine]], u[on[mine]] = rest[mine].sum() / visible, visible**-0.5
+    return error, u
 
 
 def _too_wide(network: Network, covariance: np.ndarray) -> bool:

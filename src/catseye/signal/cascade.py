@@ -19,7 +19,8 @@ class CascadeLength:
     cycles   (..., k) N of each frequency
     margin   (..., k - 1) m of length in air, by step after the longest beat: how much further it may have been off
     u        (..., k - 1) m, standard uncertainty of each step's misfit
-    thin     (...) a step whose misfit and SURE times u go beyond its margin
+    thin     (...) a step whose misfit and SURE times u go beyond its margin, or the longest beat's length so near to a
+             limit that noise may have carried it over to the other one; or an input that is not finite (N is then 0)
     """
 
     length: NDArray[np.float64]
@@ -70,17 +71,20 @@ def cascade_length(
     first = -turned[..., 0] / TWO_PI * half[0]
     optical_low = low * n
     length = first + np.ceil((optical_low - first) / half[0]) * half[0]
-    margins, us, thin = [], [], np.zeros(length.shape, dtype=bool)
+    u_first = u * float(np.linalg.norm(by_phase[0]))
+    edge = np.minimum(length - optical_low, optical_low + half[0] - length)
+    margins, us, thin = [], [], np.asarray(~(edge > SURE * u_first))  # NaN is thin too
     for before, now in pairwise(range(k)):
         cycles, margin = whole_cycles(length, turned[..., now], half[now])
         u_step = u * float(np.linalg.norm(by_phase[before] - by_phase[now]))
-        thin |= margin <= SURE * u_step
+        thin = thin | ~(margin > SURE * u_step)
         margins.append(margin / n)
         us.append(np.full(length.shape, u_step) / n)
         length = (cycles - turned[..., now] / TWO_PI) * half[now]
     own = SPEED_OF_LIGHT / (2.0 * f)
-    cycles = np.rint(length[..., None] / own + phase / TWO_PI).astype(np.int64)
-    each = (cycles - phase / TWO_PI) * own
+    whole = np.rint(length[..., None] / own + phase / TWO_PI)
+    each = (whole - phase / TWO_PI) * own
+    cycles = np.where(np.isfinite(whole), whole, 0.0).astype(np.int64)
     weight = own**-2.0 / np.sum(own**-2.0)  # the same u_phase for all: u of length goes with the half wavelength
     back = np.argsort(order)
     return CascadeLength(

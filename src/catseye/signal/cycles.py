@@ -182,7 +182,7 @@ def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         narrow = np.minimum(s, period)[..., None]
         excess = k * period[..., None] * (2.0 * m[..., None] + k * period[..., None])  # (m + kL)^2 - m^2, never below 0
-        others = np.sum(np.where(narrow > 0.0, np.exp(-0.5 * excess / narrow**2), 0.5 * (excess <= 0.0)), axis=-1)
+        others = np.sum(np.where(narrow > 0.0, np.exp(-0.5 * excess / narrow**2), 1.0 * (excess <= 0.0)), axis=-1)
         few = others / (1.0 + others)
         turn = TWO_PI / period
         waves = sum(2.0 * np.exp(-0.5 * (j * turn * s) ** 2) * np.cos(j * turn * m) for j in (1, 2))

@@ -63,6 +63,8 @@ def modulation_set(
         raise ValidityError(f"span {span} m and group index {group_index}: both are above 0")
     half = SPEED_OF_LIGHT / (2.0 * f)
     u = checked_u_phase(u_phase, f) * half / TWO_PI
+    if not np.isfinite(u).all():
+        raise ValidityError(f"u_phase {u_phase!r} rad is not finite")
     candidates = cycle_sets(np.zeros((1, len(f))), half, 1.0 / u[None] ** 2, (0.0, span * group_index))
     other = np.any(candidates.cycles[0] != 0, axis=-1) & candidates.inside[0]
     lengths, square = candidates.length[0, other] / group_index, candidates.misfit[0, other]

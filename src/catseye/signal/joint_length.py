@@ -180,7 +180,7 @@ class _Answer:
 
     def shaped(self, shape: tuple[int, ...]) -> JointLength:
         length, u_length, misfit, following, apart, slip = (v.reshape(shape) for v in self.floats)
-        cycles = self.cycles.reshape(*shape, -1)
+        cycles = self.cycles.reshape(*shape, self.cycles.shape[1])
         return JointLength(length, u_length, cycles, misfit, following, apart, slip, self.status.reshape(shape))
 
 
