@@ -118,6 +118,8 @@ def test_quiet_is_quiet(catseye):
         ([TS30, "--specified-mm", "0"], 2, "above zero"),
         ([TS30, "--measured-on", "yesterday"], 2, "yesterday"),
         ([TS30, "--level", "5"], 2, "probability"),
+        ([TS30, "--reference-height-m", "-8e6"], 2, "-9000 to 9000 m"),
+        ([TS30, "--reference-height-m", "10"], 1, "needs --heights"),
         ([], 2, "OBSERVATIONS.csv"),
     ],
 )
@@ -136,3 +138,24 @@ def test_another_programs_file_is_not_overwritten(catseye, tmp_path):
     status, out, complaint = catseye(TS30, "--write", mine)
     assert (status, out, complaint.count("\n")) == (1, "", 1)
     assert mine.read_text() == "precious = true\n"
+    out_dir = tmp_path / "out"
+    assert catseye(TS30, "--write", mine, "--out", out_dir, "--quiet")[0] == 1
+    assert list(tmp_path.iterdir()) == [mine]
+
+
+def test_known_pillars_are_not_replaced_by_what_used_them(catseye, tmp_path):
+    toml = tmp_path / "b.toml"
+    assert catseye(TS30, "--heights", HEIGHTS, "--write", toml, "--quiet")[0] == 0
+    before = toml.read_text()
+    status, _, complaint = catseye(TS16, "--heights", HEIGHTS, "--against", toml, "--write", toml)
+    assert (status, complaint.count("\n")) == (1, 1)
+    assert "is an input" in complaint
+    assert toml.read_text() == before
+
+
+def test_a_pillar_named_like_a_parameter_is_named_in_the_message(catseye, tmp_path):
+    rows = ["A,B,0,0,100,15,1000,50", "A,C,0,0,250,15,1000,50", "B,C,0,0,150,15,1000,50", "A,x 99,0,0,300,15,1000,50"]
+    (tmp_path / "o.csv").write_text("\n".join([TS16.read_text().splitlines()[0], *rows]) + "\n")
+    status, _, complaint = catseye(tmp_path / "o.csv")
+    assert status == 1
+    assert "pillar x 99 has 1 distances to the others" in complaint

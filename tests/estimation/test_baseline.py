@@ -233,6 +233,40 @@ def test_the_place_of_a_pillar_seen_once_is_not_guessed():
         places_in_line([0, 0, 1, 1], [1, 2, 2, 3], [20.0, 120.0, 100.0, 30.0], 4)
 
 
+def test_the_whole_and_its_parts_place_the_pillars_and_tell_the_zero():
+    """No pillar between the ends has two distances to pillars placed before it."""
+    pairs = [(0, 3), (0, 1), (1, 2), (2, 3), (3, 0), (1, 0), (2, 1), (3, 2)]
+    x = np.array([0.0, 100.0, 250.0, 400.0])
+    s = sights(x, np.zeros(4), pairs, zero=0.0021)
+    assert places_in_line(s.start, s.end, s.distance, 4) == pytest.approx(x, abs=0.01)
+    assert adjust_baseline(s, x, np.zeros(4), noise=TINY).of("zero")[0] == pytest.approx(0.0021, abs=1e-9)
+
+
+def test_a_pillar_that_may_stand_on_either_side_is_not_guessed():
+    with pytest.raises(EstimationError, match="on which side pillar number"):
+        places_in_line([0, 0, 1, 1, 2], [1, 2, 2, 3, 3], [200.0, 100.0, 100.0, 50.0, 50.0 * 5**0.5], 4)
+
+
+def test_a_set_that_nothing_controls_has_no_standardised_residual():
+    pairs = [(0, 1), (0, 2), (1, 2), (1, 0), (2, 0), (2, 1), (0, 3)]
+    s = sights(np.array([0.0, 100.0, 250.0, 400.0]), np.zeros(4), pairs, noise=1e-3, rng=np.random.default_rng(1))
+    found = adjust_baseline(s, [0.0, 100.0, 250.0, 400.0], np.zeros(4), noise=TINY)
+    assert np.isnan(found.w_set[-1])
+    assert np.isfinite(found.w_set[:-1]).all()
+
+
+def test_known_uncertainties_have_no_degrees_of_freedom():
+    """All of it scatter: those of the sets; a tenth of the variance: a hundred times as many."""
+    rng, plain = np.random.default_rng(9), sights(SEVEN, np.zeros(7), BOTH)
+    s = replace(plain, distance=plain.distance + 3e-4 * rng.standard_normal(42))
+    alone = adjust_baseline(s, SEVEN, np.zeros(7))
+    assert alone.freedom_of("zero") == pytest.approx(35.0)
+    part = alone.of("zero")[1]
+    s = replace(s, systematic=np.full((42, 1), 3.0 * part), effects=("zero",))
+    assert adjust_baseline(s, SEVEN, np.zeros(7)).freedom_of("zero") == pytest.approx(3500.0, rel=0.05)
+    assert adjust_baseline(s, SEVEN, np.zeros(7), noise=TINY).freedom_of("zero") == np.inf
+
+
 @given(st.permutations(range(7)))
 def test_places_follow_from_distances_in_any_numbering(order):
     order = np.array(order)

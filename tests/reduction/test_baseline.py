@@ -9,9 +9,12 @@ import pytest
 from catseye.atmosphere.air import group_refractivity
 from catseye.atmosphere.velocity import EARTH_RADIUS
 from catseye.errors import EstimationError, InputError, ValidityError
+from catseye.estimation.baseline import adjust_baseline
+from catseye.estimation.baseline_model import Claim, Sights
 from catseye.records.baseline import FORMAT, Baseline, read_heights, read_observations
 from catseye.reduction.baseline import calibrate_baseline, record_values
-from catseye.reduction.baseline_lengths import BaselineSettings, horizontal_distance
+from catseye.reduction.baseline_lengths import BaselineSettings, horizontal_distance, reduce_lengths
+from catseye.reduction.baseline_tests import suspects_of
 
 NAMES = ("A", "B", "C", "D", "E", "F")
 ALONG = np.array([0.0, 20.4, 122.4, 306.0, 448.8, 510.0])
@@ -167,6 +170,7 @@ def test_lengths_corrected_in_the_field_are_told_from_raw_ones(tmp_path, heights
         assert found.weather[0] == pytest.approx(share, abs=3 * found.weather[1])
         assert found.weather[1] < 0.15
         assert {d.name: d.passed for d in found.decisions}["the light follows the weather as read"] is (share == 1.0)
+        assert any("no u here contains that" in note for note in found.notes) is (share == 0.0)
 
 
 def test_a_shot_and_a_set_that_are_wrong_are_named_and_left_out_only_when_asked(tmp_path, heights):
@@ -194,6 +198,67 @@ def test_good_data_are_accused_in_five_of_a_hundred(tmp_path, heights):
         )
         accused += bool(found.suspects)
     assert accused <= 6
+
+
+def test_few_good_data_are_accused_in_five_of_a_hundred():
+    """4 pillars, 2 redundant sets, the maker's claim as noise: 500 tables, three standard deviations above 5 %."""
+    x, pairs = ALONG[:4], np.array([(i, j) for i in range(4) for j in range(i + 1, 4)])
+    rng, accused = np.random.default_rng(6), 0
+    for _ in range(500):
+        d = x[pairs[:, 1]] - x[pairs[:, 0]] + 6e-4 * rng.standard_normal(6)
+        none = np.full(6, np.nan)
+        s = Sights(*pairs.T, np.arange(6), pairs[:, 0], d, np.ones(6), np.zeros((6, 0)), (), none, none)
+        found = adjust_baseline(s, x, np.zeros(4), claim=Claim(3.6e-9, 3.6e-7, 0.0))
+        accused += bool(suspects_of(found, np.arange(6), 0.05))
+    assert accused <= 40
+
+
+def test_one_redundant_set_is_enough_to_accuse(tmp_path):
+    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]
+    faulty = [((4, r), 0.02) for r in range(3)]
+    found = calibrate_baseline(table(tmp_path / "o.csv", pairs=pairs, faulty=faulty, aimed=False))
+    assert found.solution.freedom_sets == 1
+    assert found.suspects
+
+
+def test_of_two_sets_that_contradict_each_other_neither_is_left_out(tmp_path, heights):
+    """E has two sets; one is 50 mm wrong: nothing tells which."""
+    pairs = [*permutations(range(4), 2), (4, 0), (4, 2)]
+    rng = np.random.default_rng(3)
+    seen = table(tmp_path / "o.csv", rng, pairs=pairs, shot=1e-4, one=3e-4, aimed=False,
+                 faulty=[((13, r), 0.05) for r in range(3)])  # fmt: skip
+    found = calibrate_baseline(seen, heights(), settings=replace(EXACT, reject=True))
+    assert found.keep.all()
+    assert {s.rows for s in found.suspects} == {(36, 37, 38), (39, 40, 41)}
+    assert all(set(s.rows + s.twins) == set(range(36, 42)) for s in found.suspects)
+    assert any("nothing tells which is wrong" in note for note in found.notes)
+
+
+def test_a_wrong_pillar_is_refused_with_its_line(tmp_path, heights):
+    text = (table(tmp_path / "o.csv", repeats=1), (tmp_path / "o.csv").read_text())[1]
+    (tmp_path / "o.csv").write_text(text.replace("\nA,B,", "\nA,C,"))
+    with pytest.raises(EstimationError, match=r"o.csv: shots contradict .* at line 2 first"):
+        calibrate_baseline(read_observations(tmp_path / "o.csv"), heights(), settings=EXACT)
+
+
+def test_second_velocity_and_chord_shorten_a_long_line(tmp_path):
+    """11 km, k = 0.13: -k (1 - k) d³/12R² = -0.309 mm and -k² d³/24R² = -0.023 mm by hand; none for k = 0."""
+    seen, level = table(tmp_path / "o.csv", pairs=[(0, 1)], aimed=False), np.zeros(2)
+    seen.slope = seen.slope * 0.0 + 11_000.0
+    settings = replace(EXACT, corrected=True)
+    bent = reduce_lengths(seen, level, level, 0.0, replace(settings, refraction=0.13)).distance
+    assert bent - reduce_lengths(seen, level, level, 0.0, settings).distance == pytest.approx(-0.332e-3, abs=2e-6)
+
+
+def test_weather_works_on_the_slope(tmp_path, heights):
+    """Against the distance in air 0.1 °C warmer, on a line of 45 degrees."""
+    seen, tops = table(tmp_path / "o.csv", pairs=[(0, 2)], aimed=False), np.array([0.0, 86.6])
+    settings = replace(EXACT, u_temperature_c=0.1)
+    base = reduce_lengths(seen, tops, np.zeros(2), 0.0, settings)
+    seen.temperature_c = seen.temperature_c + 0.1
+    moved = reduce_lengths(seen, tops, np.zeros(2), 0.0, settings)
+    assert base.stretch[0] > 1.4
+    assert moved.distance - base.distance == pytest.approx(base.systematic[:, 0], rel=1e-3)
 
 
 def campaigns(path, tops, runs, seed):
@@ -243,6 +308,8 @@ def test_tables_that_do_not_join_are_refused_in_one_line(tmp_path, heights):
         calibrate_baseline(read_observations(tmp_path / "x.csv"), None, best, settings=EXACT)
     with pytest.raises(InputError, match="reference-height"):
         calibrate_baseline(seen, heights(), best, settings=replace(EXACT, reference_height=100.0))
+    with pytest.raises(InputError, match="reference-height-m needs --heights"):
+        calibrate_baseline(seen, None, settings=replace(EXACT, reference_height=100.0))
     tops = heights()
     tops.height["B"] = 60.0
     with pytest.raises(InputError, match=r"o.csv: line 2, heights differ by 55.4"):

@@ -10,6 +10,7 @@ import typer
 from catseye.cli.commands import MODELS, Json, Quiet, _known_model, _uncertainty, app
 from catseye.cli.networks import Out, _level
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.records.baseline import Baseline, Heights, Observations
@@ -28,6 +29,12 @@ def _above_zero(value: float | None) -> float | None:
 def _finite(value: float | None) -> float | None:
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def _height(value: float | None) -> float | None:
+    if value is not None and not (-9000.0 <= value <= 9000.0):
+        raise typer.BadParameter(f"{value} is not a height (expected -9000 to 9000 m).")
     return value
 
 
@@ -78,7 +85,7 @@ def baseline(
     ] = 0.13,
     reference_height_m: Annotated[
         float | None,
-        typer.Option("--reference-height-m", callback=_finite, help="Height of the distances; the first pillar's."),
+        typer.Option("--reference-height-m", callback=_height, help="Height of the distances; the first pillar's."),
     ] = None,
     u_temperature_c: Annotated[float, _u("--u-temperature-c", "Common to all shots, °C (1σ).")] = 0.5,
     u_pressure_hpa: Annotated[float, _u("--u-pressure-hpa", "Common to all shots, hPa (1σ).")] = 0.3,
@@ -139,7 +146,17 @@ def baseline(
 
         for source in sources:
             refuse_output(out, source)
+    if write is not None and any(write.resolve() == source.resolve() for source in sources):
+        raise InputError(f"--write {write}: is an input (expected another file: the same shots would count twice)")
     progress = ProgressLine(quiet)
+
+    def keep() -> None:
+        if write is not None:
+            from catseye.gateways.baseline_files import write_record
+
+            day = None if measured_on is None else date.fromisoformat(measured_on)
+            write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
+
     try:
         found, inputs = _calibrated(observations, heights, against, settings, progress)
         if out is not None:
@@ -148,11 +165,9 @@ def baseline(
 
             with whole_directory(out, observations) as directory:
                 write_calibration(found, directory, inputs, progress)
-        if write is not None:
-            from catseye.gateways.baseline_files import write_record
-
-            day = None if measured_on is None else date.fromisoformat(measured_on)
-            write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
+                keep()  # no directory without the record that was asked for, too
+        else:
+            keep()
     finally:
         progress.clear()
     _tell(found, json, quiet, out, write)

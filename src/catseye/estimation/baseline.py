@@ -23,6 +23,9 @@ CEILING = np.array([0.1, 0.1, 1e-3]) ** 2
 LEAST_FREEDOM = 4  # between sets; with less their scatter says too little, the claim stands for it
 SEPARABLE = 1e-3  # least singular value of columns of length 1: below it terms tell too little from each other
 STEP = 1e-9  # m, that ends the iteration
+CONTROLLED = 1e-9  # share of a set's variance that its residual shows; less is rounding
+NEARLY = 0.05  # m, by which one order of the pillars must fit better than any other
+ORDERS = 256  # of the pillars, followed at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,8 @@ class Solution:
     u_noise      (3,) their standard uncertainties; nan where not estimated from these data
     residual     (M,) of the sets' means, observed minus adjusted, m
     redundancy   (M,) share of an error of a set that shows in its own residual
-    w_set        (M,) standardised residual of each set
+    w_set        (M,) standardised residual of each set; nan where nothing controls it
+    alike        (M, M) correlation of these: sets of 1 or -1 cannot be told from each other
     w_shot       (m,) of each shot; nan where it is alone in its set
     freedom_sets, freedom_shots   redundant sets, redundant shots within sets
     sets_squares      weighted squares of all but the scatter within sets; without directions chi² of freedom_sets
@@ -56,6 +60,7 @@ class Solution:
     residual: np.ndarray
     redundancy: np.ndarray
     w_set: np.ndarray
+    alike: np.ndarray
     w_shot: np.ndarray
     freedom_sets: int
     freedom_shots: int
@@ -70,6 +75,17 @@ class Solution:
             return float("nan"), float("nan")
         at = self.names.index(name)
         return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
+
+    def freedom_of(self, name: str) -> float:
+        """Degrees of freedom of a parameter's u: those of the sets for what their scatter gives it, the rest is known.
+
+        Infinite where the noise is not estimated from these data. Source: [JCGM100] G.4.1, Welch and Satterthwaite.
+        """
+        at = self.names.index(name)
+        if not np.isfinite(self.u_noise).any():
+            return float("inf")
+        estimated = self.parts["noise"][at] ** 2 + self.parts["noise, as it is estimated"][at] ** 2
+        return max(self.freedom_sets, 1) * float(self.covariance[at, at] / max(estimated, 1e-300)) ** 2
 
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
@@ -206,7 +222,10 @@ def _solution(model: Model, values, noise: Claim, u_noise: np.ndarray, normal: N
     extra = _of_estimated_noise(model, noise, u_noise, normal)
     misclosure, _ = model.rows(values)
     py, diagonal = normal.p @ misclosure, np.diag(normal.p)
-    w_set = py[:m] / np.sqrt(np.maximum(diagonal[:m], 1e-300))
+    p = normal.p[:m, :m]
+    seen = diagonal[:m] * np.diag(normal.v)[:m] > CONTROLLED
+    size = np.sqrt(np.where(seen, diagonal[:m], np.nan))
+    w_set = py[:m] / size
     repeats = len(sights) - m
     n = model.shots[sights.set]
     w_shot = np.full(len(sights), np.nan)
@@ -233,6 +252,7 @@ def _solution(model: Model, values, noise: Claim, u_noise: np.ndarray, normal: N
         residual=misclosure[:m],
         redundancy=np.einsum("ij,ji->i", normal.p[:m], normal.v[:, :m]),
         w_set=w_set,
+        alike=p / size[:, None] / size,
         w_shot=w_shot,
         freedom_sets=model.freedom_sets,
         freedom_shots=repeats,
@@ -273,22 +293,38 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, count: in
 
     Raises EstimationError for a pillar whose side the distances do not tell.
 
+    Pillars are placed one after the other, on either side of those before them; the distances that close tell which.
     >>> places_in_line([0, 0, 1], [1, 2, 2], [20.0, 120.0, 100.0], 3)
     array([  0.,  20., 120.])
     """
     length: dict[tuple[int, int], float] = {}
     for i, j, d in zip(start, end, distance, strict=True):
         length[(int(i), int(j))] = length[(int(j), int(i))] = float(d)
+    for p in range(count):
+        ties = sum((p, q) in length for q in range(count))
+        if ties < 2 < count:
+            raise EstimationError(f"pillar number {p} has {ties} distances to the others: measure it to two at least")
     (low, high), longest = max(length.items(), key=lambda item: (item[1], -item[0][0]))
     low, high = min(low, high), max(low, high)
-    place = {low: 0.0, high: longest}
-    while len(place) < count:
-        tied = {p: [(q, length[(p, q)]) for q in place if (p, q) in length] for p in range(count) if p not in place}
+    orders = [(0.0, {low: 0.0, high: longest})]
+    while len(done := orders[0][1]) < count:
+        tied = {p: [(q, length[(p, q)]) for q in done if (p, q) in length] for p in range(count) if p not in done}
         pillar = max(tied, key=lambda p: len(tied[p]))
-        if len(tied[pillar]) < 2:
-            raise EstimationError(
-                f"pillar number {pillar} has {len(tied[pillar])} distances to the others: measure it to two at least"
-            )
-        guesses = [place[q] + sign * d for q, d in tied[pillar] for sign in (1, -1)]
-        place[pillar] = min(guesses, key=lambda g: sum(abs(abs(g - place[q]) - d) for q, d in tied[pillar]))
-    return np.array([place[p] for p in range(count)])
+        if not tied[pillar]:
+            raise EstimationError(f"no distance joins pillar number {pillar} to pillar number {low}: measure one")
+        longer = []
+        for misfit, place in orders:
+            guesses: list[float] = []
+            for g in (place[q] + sign * d for q, d in tied[pillar] for sign in (1, -1)):
+                if all(abs(g - other) > NEARLY for other in guesses):
+                    guesses.append(g)
+            for g in guesses:
+                more = sum(abs(abs(g - place[q]) - d) for q, d in tied[pillar])
+                longer.append((misfit + more, {**place, pillar: g}))
+        orders = sorted(longer, key=lambda order: order[0])[:ORDERS]
+    if len(orders) > 1 and orders[1][0] < orders[0][0] + NEARLY:
+        side = next(p for p in range(count) if abs(orders[1][1][p] - orders[0][1][p]) > NEARLY)
+        raise EstimationError(
+            f"the distances do not tell on which side pillar number {side} stands: measure more pairs"
+        )
+    return np.array([orders[0][1][p] for p in range(count)])

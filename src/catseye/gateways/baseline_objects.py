@@ -78,7 +78,10 @@ def baseline_object(found: "BaselineCalibration") -> dict[str, Any]:
         "covariance": covariance,
         "correlation_zero_scale": _correlation(found),
         "budget": {cause: dict(zip(s.names, part.tolist(), strict=True)) for cause, part in s.parts.items()},
-        "suspects": [{"kind": x.kind, "rows": [r + 1 for r in x.rows], "w": x.w, "p": x.p} for x in found.suspects],
+        "suspects": [
+            {"kind": x.kind, "rows": [r + 1 for r in x.rows], "w": x.w, "p": x.p, "or_rows": [r + 1 for r in x.twins]}
+            for x in found.suspects
+        ],
         "rejected": {str(k + 1): why for k, why in enumerate(found.rejected) if why},
         "notes": found.notes,
     }

@@ -167,7 +167,7 @@ def _sets(found: "BaselineCalibration") -> str:
             f"{seen.temperature_c[row]:.1f}",
             f"{s.residual[k] / MILLIMETRE:+.3f}",
             f"{scatter[k] / MILLIMETRE:.3f}",
-            f"{s.w_set[k]:+.2f}",
+            f"{s.w_set[k]:+.2f}" if np.isfinite(s.w_set[k]) else "",
             f"{s.redundancy[k]:.2f}",
         )
         for k, row in enumerate(first)

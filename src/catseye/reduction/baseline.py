@@ -13,13 +13,13 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.baseline import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
+from catseye.estimation.baseline import CEILING, SEPARABLE, Solution, adjust_baseline, places_in_line, separation
 from catseye.estimation.baseline_iso17123 import FullTest, full_test
 from catseye.estimation.baseline_model import Claim, Extra, Known, Sights
 from catseye.records.baseline import Baseline, Heights, Observations, numbers_of
 from catseye.records.refusal import shown
 from catseye.reduction.baseline_lengths import BaselineSettings, Lengths, reduce_lengths
-from catseye.reduction.baseline_tests import Suspect, decisions_of, suspects_of
+from catseye.reduction.baseline_tests import FOLLOWS, Suspect, decisions_of, suspects_of
 from catseye.reduction.calibration import Decision
 
 Progress = Callable[[str, int, int], None]
@@ -108,6 +108,7 @@ def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Pr
     job = _Job(seen, lengths, settings, known, notes)
     keep, rejected, suspects, solution = job.cleaned(progress)
     solution, cyclic = job.with_cyclic(keep, solution)
+    _refuse_gross(solution, job, keep)
     test, claimed, all_shots = job.full_tests(solution)
     weather = job.weather(keep, solution, cyclic)
     decisions = decisions_of(
@@ -121,6 +122,12 @@ def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Pr
         suspects=suspects,
     )
     notes += _notes(seen, solution, settings, against)
+    if any(d.name == FOLLOWS and d.passed is False for d in decisions) and not settings.corrected:
+        share = np.mean((lengths.first / seen.slope)[keep]) / PPM
+        notes.append(
+            f"the light did not follow the weather: if the lengths were corrected in the field, all are wrong by "
+            f"{share:+.1f} ppm in the mean, and no u here contains that; compare with --corrected"
+        )
     return BaselineCalibration(
         seen,
         settings,
@@ -229,6 +236,13 @@ class _Job:
             if not (self.settings.reject and suspects):
                 break
             worst = suspects[0]
+            if worst.twins:
+                one, other = (", ".join(str(r + 1) for r in part) for part in (worst.rows, worst.twins))
+                self.notes.append(
+                    f"row {one} and row {other} contradict each other and nothing tells which is wrong: none is left "
+                    "out; measure them again"
+                )
+                break
             if np.sum(~keep) + len(worst.rows) > most:
                 self.notes.append(
                     f"no more than {most} of {len(keep)} shots are left out; the other suspects stay: look at them"
@@ -315,12 +329,27 @@ class _Job:
         return 1.0 - b, u
 
 
+def _refuse_gross(solution: Solution, job: _Job, keep: np.ndarray) -> None:
+    """A scatter at the ceiling of what is estimated is no noise; the row is the worst before anything was adjusted."""
+    noise = solution.noise
+    if np.isfinite(solution.u_noise).any() and np.any(np.array([noise.shot, noise.set, noise.air]) > 0.999 * CEILING):
+        seen, x, y = job.seen, job.x, job.y
+        straight = np.hypot(x[seen.end] - x[seen.start], y[seen.end] - y[seen.start])
+        worst = int(np.argmax(np.where(keep, np.abs(job.lengths.distance - straight), -1.0)))
+        raise EstimationError(
+            f"{seen.file}: shots contradict each other by more than any noise of a distance meter (0.1 m, 1000 ppm); "
+            f"look for a wrong pillar or digit, at {seen.where[worst]} first"
+        )
+
+
 def _named(text: str, names: tuple[str, ...]) -> str:
     """Numbers of pillars in a message become their names."""
     import re
 
-    text = re.sub(r"pillar number (\d+)", lambda m: f"pillar {names[int(m[1])]}", text)
-    return re.sub(r"\b([xy]) (\d+)\b", lambda m: f"{m[1]} of {names[int(m[2])]}", text)
+    def name(m: re.Match[str]) -> str:
+        return f"pillar {names[int(m[1])]}" if m[1] else f"{m[2]} of {names[int(m[3])]}"
+
+    return re.sub(r"pillar number (\d+)|\b([xy]) (\d+)\b", name, text)  # once: names may look like numbers
 
 
 def _ordered(seen: Observations, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
@@ -348,6 +377,8 @@ def _heights(seen, heights: Heights | None, against: Baseline | None, settings: 
     """Heights and their u by the pillars' numbers, and the reference height (None: unknown)."""
     n = len(seen.names)
     if heights is None:
+        if settings.reference_height is not None:
+            raise InputError("--reference-height-m needs --heights: without heights there is none to refer to")
         notes.append("no heights of pillars: they are taken for level, which makes lengths on a slope too long")
         return np.zeros(n), np.zeros(n), None
     touched = {seen.names[i] for i in (*seen.start, *seen.end)}

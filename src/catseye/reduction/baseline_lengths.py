@@ -140,18 +140,19 @@ def reduce_lengths(
         k = int(np.flatnonzero(~(np.abs(other - one) < straight))[0])
         raise refusal(seen.file, f"{seen.where[k]}, {problem}") from problem
     slopes = state.sensitivity
-    effects = {
-        "temperature": -distance / state.group_index * slopes.temperature_c * settings.u_temperature_c,
-        "pressure": -distance / state.group_index * slopes.pressure_hpa * settings.u_pressure_hpa,
-        "humidity": -distance / state.group_index * slopes.humidity_percent * settings.u_humidity_percent,
-        "formula of the index": -distance * state.standard_uncertainty,
-    }
     rise = other - one
+    stretch = distance * straight / ((straight - rise) * (straight + rise))
+    per_index = -(stretch**2) * distance / state.group_index  # a rate on the slope shows in D by 1/cos² of itself
+    effects = {
+        "temperature": per_index * slopes.temperature_c * settings.u_temperature_c,
+        "pressure": per_index * slopes.pressure_hpa * settings.u_pressure_hpa,
+        "humidity": per_index * slopes.humidity_percent * settings.u_humidity_percent,
+        "formula of the index": per_index * state.standard_uncertainty,
+    }
     for k in np.flatnonzero(u_height > 0.0).tolist():
         per_start = (rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.start == k)
         per_end = (-rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.end == k)
         effects[f"height of {seen.names[k]}"] = (per_start + per_end) * u_height[k]
     columns = np.stack(list(effects.values()), axis=1)
-    stretch = distance * straight / ((straight - rise) * (straight + rise))
     level = distance - straight
     return Lengths(state.group_index, first, second, chord, level, distance, stretch, columns, tuple(effects))

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from catseye.records.baseline import Baseline
     from catseye.reduction.baseline_lengths import BaselineSettings
 
+FOLLOWS = "the light follows the weather as read"
+ALIKE = 0.99  # correlation of standardised residuals from which on an error of one set is not told from the other's
+
 
 @dataclass(frozen=True)
 class Suspect:
@@ -23,12 +26,14 @@ class Suspect:
     rows   of the table, counted from 0
     w      standardised residual
     p      probability of one so large among all that were tested
+    twins  rows of other suspects that an error of these would look like: nothing tells which are wrong
     """
 
     kind: str
     rows: tuple[int, ...]
     w: float
     p: float
+    twins: tuple[int, ...] = ()
 
 
 def suspects_of(solution: Solution, rows: np.ndarray, level: float) -> tuple[Suspect, ...]:
@@ -38,29 +43,36 @@ def suspects_of(solution: Solution, rows: np.ndarray, level: float) -> tuple[Sus
     rows       (m,) where its shots stand in the table
     level      of all tests together
 
-    The components of the noise come from the same residuals, so w follows the tau distribution.
+    The components of the noise come from the same residuals, so w follows the tau distribution; where the maker's claim
+    stands for them, those of sets follow the normal one.
     Source: [BAARDA68] data snooping; [POPE76] tau.
     """
     used = solution.used
     found = []
     several = np.flatnonzero(np.isfinite(solution.w_shot))
     tests = len(several) + len(solution.w_set)
-    for freedom, w, who in (
-        (solution.freedom_shots + solution.freedom_sets, solution.w_shot[several], several),
-        (solution.freedom_sets, solution.w_set, None),
-    ):
-        for i, (value, p) in enumerate(zip(w, tests * _p_tau(w, freedom), strict=True)):
-            if p < level:
-                mine = rows[[who[i]]] if who is not None else rows[used.set == i]
-                kind = "shot" if who is not None else "set"
-                found.append(Suspect(kind, tuple(mine.tolist()), float(value), float(p)))
+    estimated = bool(np.isfinite(solution.u_noise[1:]).any())
+    of_shots = _p_tau(solution.w_shot[several], solution.freedom_shots + (solution.freedom_sets if estimated else 0))
+    for i, p in zip(several, tests * of_shots, strict=True):
+        if p < level:
+            pair = np.flatnonzero((used.set == used.set[i]) & (np.arange(len(used)) != i))
+            twins = rows[pair] if len(pair) == 1 else rows[:0]
+            found.append(Suspect("shot", (int(rows[i]),), float(solution.w_shot[i]), float(p), tuple(twins.tolist())))
+    of_sets = _p_tau(solution.w_set, solution.freedom_sets if estimated else np.inf)
+    wrong = tests * of_sets < level
+    for i in np.flatnonzero(wrong):
+        twin = wrong & (np.abs(solution.alike[i]) > ALIKE) & (np.arange(len(wrong)) != i)
+        mine, others = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
+        found.append(Suspect("set", mine, float(solution.w_set[i]), float(tests * of_sets[i]), others))
     return tuple(sorted(found, key=lambda s: (s.p, -abs(s.w))))
 
 
-def _p_tau(w: np.ndarray, freedom: int) -> np.ndarray:
-    """Two-sided probability of a studentised residual at least so large."""
-    from scipy.stats import t
+def _p_tau(w: np.ndarray, freedom: float) -> np.ndarray:
+    """Two-sided probability of a studentised residual at least so large; of a normal one for infinite freedom."""
+    from scipy.stats import norm, t
 
+    if np.isinf(freedom):
+        return 2.0 * norm.sf(np.abs(w))
     if freedom < 2:
         return np.ones(len(w))
     square = np.minimum(w**2, freedom * (1.0 - 1e-12))
@@ -149,7 +161,7 @@ def _setups(solution: Solution, level: float) -> Decision:
 
 
 def _weather(weather: tuple[float, float], freedom: int, level: float) -> Decision:
-    name = "the light follows the weather as read"
+    name = FOLLOWS
     share, u = weather
     if not np.isfinite(share):
         return Decision(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
@@ -165,7 +177,7 @@ def _instrument(solution: Solution, agreement: Solution, level: float) -> tuple[
     made = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)
-        test = is_nothing(value, u, max(solution.freedom_sets, 1), level)
+        test = is_nothing(value, u, solution.freedom_of(key), level)
         text = f"{key} {value / scale:+.3f} ± {u / scale:.3f} {unit} against the known pillars"
         made.append(Decision(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
     freedom = agreement.freedom_sets
