@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways.certificate import certificate, rounded
+from catseye.gateways.certificate import _cell, _form, certificate, rounded
 from catseye.gateways.certificate_record import MARK, calibration_object, calibration_toml
 from catseye.gateways.objects import json_line
 from catseye.records.calibration import CalibrationRecord
@@ -142,3 +142,8 @@ def test_rounding_keeps_two_digits_of_u():
     assert rounded(1.23456, 0.00123) == ("1.2346", "0.0012")
     assert rounded(12345.6, 9.96) == ("12346", "10")
     assert rounded(1.0, float("nan")) == ("1", "unknown")
+
+
+def test_lengths_in_a_table_show_what_their_residuals_show():
+    assert _cell(24003.09162, _form("distance_mm")) == "24003.09162"
+    assert _cell(24.00309162, _form("distance_m")) == "24.0030916"

@@ -91,3 +91,45 @@ def test_full_scale_and_grazing_light_are_told():
     ):
         with pytest.raises(ValidityError, match=r"is (not|below)"):
             link_budget(link, reflector, 100.0)
+
+
+def test_each_part_of_the_budget_is_its_hand_computation():
+    link = replace(LINK, extinction_per_m=1e-3, blocked_noise_volt=0.01, amplifier=40e-12, bits=12, crosstalk=2e-3)
+    found = link_budget(link, PRISM, 500.0, background=3e-6)
+    assert found.factors["air, there and back"] == pytest.approx(0.367879, abs=1e-6)  # 1/e over a kilometre
+    shot = 2 * 1.602176634e-19 * 0.45 * found.received  # A^2/Hz
+    shares = found.noise_shares
+    of_return = shares["shot noise of the return"]
+    assert shares["amplifier"] / of_return == pytest.approx(1.6e-21 / shot, rel=1e-9)
+    assert shares["shot noise of daylight"] / of_return == pytest.approx(3e-6 / found.received, rel=1e-9)
+    step = 20.0 / 4096  # of a converter of 12 bits over -10 to 10 V
+    rounding = shares["converter's rounding"] / shares["samples with the beam blocked"]
+    assert rounding == pytest.approx(step**2 / 12 / 1e-4, rel=1e-9)
+    turned = 2e-3 / found.amplitude_volt  # rad; half a wavelength, 99.93 mm, is a turn
+    assert found.crosstalk_range == pytest.approx(0.09993082 * turned / (2 * np.pi), rel=1e-4)
+
+
+def test_a_wide_beam_gives_a_tilted_prism_what_its_clear_area_catches():
+    wide = replace(LINK, waist=0.5)
+    straight, tilted = (link_budget(wide, PRISM, 100.0, incidence=i).factors for i in (0.0, 0.3))
+    share = clear_share(0.3, aperture=0.0254, height=0.0381, index=1.511)
+    assert tilted["hits the reflector"] / straight["hits the reflector"] == pytest.approx(share, rel=0.01)
+
+
+@pytest.mark.parametrize("off", [{"offset": -0.01}, {"offset": np.nan}, {"background": -1e-6}, {"background": np.inf}])
+def test_a_beam_off_by_less_than_nothing_and_dark_daylight_are_refused(off):
+    with pytest.raises(ValidityError, match="is not 0 or more and finite"):
+        link_budget(LINK, PRISM, 100.0, **off)
+
+
+def test_noise_that_is_no_number_and_light_that_never_returns_are_refused():
+    for noise in (np.nan, np.inf, -0.1):
+        with pytest.raises(ValidityError, match="blocked_noise_volt"):
+            link_budget(replace(LINK, blocked_noise_volt=noise), PRISM, 100.0)
+    with pytest.raises(ValidityError, match="no light comes back"):
+        link_budget(LINK, PRISM, 100.0, offset=5.0)
+    for size in ({"waist": np.inf}, {"receiver": np.inf}):
+        with pytest.raises(ValidityError, match="above 0 and finite"):
+            link_budget(replace(LINK, **size), PRISM, 100.0)
+    with pytest.raises(ValidityError, match="above 0 and finite"):
+        link_budget(LINK, PRISM, np.inf)

@@ -81,3 +81,19 @@ def test_lengths_that_do_not_fit_and_gaps_are_refused():
         allan_deviation([1.0, 2.0, np.nan, 1.0, 2.0])
     with pytest.raises(ValidityError, match="at least 4"):
         octaves(3)
+
+
+def test_degrees_of_freedom_of_flicker_are_those_of_the_scatter():
+    rng, n, sizes = np.random.default_rng(9), 512, [1, 4, 16, 64]
+    k = np.arange(1, 8 * n)
+    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])  # a half integral of white noise
+    filtered = np.fft.rfft(response, 16 * n)
+    squares, degrees = [], []
+    for _ in range(1500):
+        y = np.fft.irfft(np.fft.rfft(rng.normal(size=8 * n), 16 * n) * filtered)[7 * n : 8 * n]
+        found = allan_deviation(y, sizes)
+        squares.append(found.deviation**2)
+        degrees.append([d if kind == "flicker" else np.nan for d, kind in zip(found.degrees, found.kind, strict=True)])
+    squares = np.array(squares)
+    seen = 2.0 * squares.mean(axis=0) ** 2 / squares.var(axis=0)
+    assert np.nanmean(degrees, axis=0) == pytest.approx(seen, rel=0.3)  # [RILEY08] has them to some 10 to 20 %

@@ -112,3 +112,32 @@ def test_series_without_noise_or_with_gaps_are_refused():
         noise_spectrum(np.where(np.arange(100) == 7, np.inf, np.sin(np.arange(100))), 1.0)
     with pytest.raises(ValidityError, match="interval"):
         noise_spectrum(np.sin(np.arange(100.0)), 0.0)
+
+
+def test_a_steady_drift_is_neither_a_walk_nor_a_spur():
+    noise = 0.012 * np.random.default_rng(16).normal(size=4096)
+    still = noise_spectrum(noise, 0.001)
+    for drift in (1e-4, 3e-3, 0.1):  # of a reading: up to 400 in all, tens of thousands of standard deviations
+        found = noise_spectrum(noise + drift * np.arange(4096), 0.001)
+        assert not found.spurs
+        assert found.squares == pytest.approx(still.squares, rel=1e-4, abs=1e-12)
+        assert found.drift - still.drift == pytest.approx(drift / 0.001, rel=1e-9)
+
+
+def test_no_two_spurs_stand_at_one_place_and_rounding_is_none():
+    turn = np.arange(256)
+    bent = 1e-4 * (turn - 128.0) ** 2 + 1e-3 * np.random.default_rng(17).normal(size=256)
+    for y in (bent, np.sin(2 * np.pi * turn / 16), (turn // 2 % 2) * 1e-3):
+        found = noise_spectrum(y, 1.0)
+        places = np.sort([s.frequency_hz for s in found.spurs])
+        assert np.all(np.diff(places) >= 1.0 / 256)
+        assert all(s.amplitude > 1e-12 * np.ptp(y) for s in found.spurs)
+    with pytest.raises(ValidityError, match="straight line"):
+        noise_spectrum(0.01 * np.arange(256.0), 1.0)
+
+
+def test_the_density_times_its_band_is_the_variance():
+    y = np.random.default_rng(18).normal(size=8192)
+    found = noise_spectrum(y, 0.01)
+    for density in (found.density, found.model):
+        assert density.mean() * 50.0 == pytest.approx(1.0, rel=0.05)  # up to half of 100 Hz

@@ -178,9 +178,9 @@ def _inputs(found: Calibration, when: datetime) -> str:
 
 
 def _form(column: str) -> str:
-    """How a column's numbers are written: metres to a tenth of a micrometre, statistics with two decimals."""
-    if column.endswith("_m"):
-        return ".7f"
+    """How a column's numbers are written: lengths to 0.1 µm or finer, statistics with two decimals."""
+    if column.endswith(("_m", "_mm")):
+        return ".7f" if column.endswith("_m") else ".5f"
     if column.split("|")[-1] in ("w", "tau", ""):
         return ".2f"
     return "+.3f" if column.startswith("residual") else ".7g"

@@ -45,6 +45,9 @@ def share_within(aperture: ArrayLike, beam_radius: ArrayLike, offset: ArrayLike 
     (0.864665, 0.396499)
     """
     _positive(beam_radius=beam_radius)
+    for name, value in (("aperture", aperture), ("offset", offset)):
+        if not np.all(np.asarray(value, dtype=float) >= 0.0):
+            raise ValidityError(f"{name} = {np.min(np.asarray(value, dtype=float))} m is not 0 or more")
     a, w, d = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (aperture, beam_radius, offset)))
     from scipy.stats import ncx2
 
@@ -106,5 +109,7 @@ def _quadrature(edge: float, phase: float) -> tuple[NDArray[np.float64], NDArray
 
 def _positive(**values: ArrayLike) -> None:
     for name, value in values.items():
-        if not np.all(np.asarray(value, dtype=float) > 0.0):
-            raise ValidityError(f"{name} = {np.min(np.asarray(value, dtype=float))} m is not above 0")
+        given = np.asarray(value, dtype=float)
+        if not np.all((given > 0.0) & (given < np.inf)):
+            wrong = given[~((given > 0.0) & (given < np.inf))].flat[0]
+            raise ValidityError(f"{name} = {wrong} m is not above 0 and finite")

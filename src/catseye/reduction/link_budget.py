@@ -60,11 +60,12 @@ def link_budget(
     What returns is computed by diffraction for a centred circular aperture as large as what is left of the clear one
     at that incidence; a beam off centre is scaled by what it loses on the way out.
 
-    Raises ValidityError for values without meaning and for a near, wide aperture (see `returned_share`).
+    Raises ValidityError for values without meaning, for a near, wide aperture (see `returned_share`), and where no
+    light comes back.
 
     Source: [SIEGMAN86] and [GOODMAN05] for the beam, [YARIV97] for the noise, [RIFE74] for the phase: see each.
     """
-    _refuse_nonsense(link, reflector)
+    _refuse_nonsense(link, reflector, offset, background)
     if not 0.0 <= incidence < 0.5 * np.pi:
         raise ValidityError(f"incidence {incidence} rad is not within 0 and a right angle (expected below 1.5708)")
     clear = float(clear_share(incidence, aperture=reflector.aperture, height=reflector.height, index=reflector.index))
@@ -85,6 +86,8 @@ def link_budget(
     received = link.power * float(np.prod(list(factors.values())))
     amplitude = float(signal_current(received, depth=link.depth, responsivity=link.responsivity))
     amplitude *= link.volts_per_ampere
+    if not amplitude > 0.0:
+        raise ValidityError(f"no light comes back from {distance} m with the beam {offset} m off the reflector")
     parts = _noises(link, received, background)
     density = sum(parts.values())
     u = float(u_phase(amplitude, density, link.duration))
@@ -102,8 +105,8 @@ def link_budget(
     )
 
 
-def _refuse_nonsense(link: Link, reflector: Reflector) -> None:
-    """Factors of light lie above 0 and up to 1, what is divided by is above 0."""
+def _refuse_nonsense(link: Link, reflector: Reflector, offset: float, background: float) -> None:
+    """Factors of light lie above 0 and up to 1, what is divided by is above 0, noise and what is lost 0 or more."""
     shares = {"depth": link.depth, "transmission": link.transmission, "reflectance": reflector.reflectance}
     for name, share in shares.items():
         if not 0.0 < share <= 1.0:
@@ -121,8 +124,22 @@ def _refuse_nonsense(link: Link, reflector: Reflector) -> None:
     for name, size in sizes.items():
         if not 0.0 < size < np.inf:
             raise ValidityError(f"{name} {size} is not above 0 and finite")
-    if reflector.index < 1.0:
-        raise ValidityError(f"index {reflector.index} of the reflector is below 1, that of a hollow one")
+    parts = {
+        "offset": offset,
+        "background": background,
+        "blocked_noise_volt": link.blocked_noise_volt,
+        "full_scale_volt": link.full_scale_volt,
+        "amplifier": link.amplifier,
+        "crosstalk": link.crosstalk,
+        "extinction_per_m": link.extinction_per_m,
+    }
+    for name, size in parts.items():
+        if not 0.0 <= size < np.inf:
+            raise ValidityError(f"{name} {size} is not 0 or more and finite")
+    if not link.intensity_noise_db_hz < np.inf:
+        raise ValidityError(f"intensity_noise_db_hz {link.intensity_noise_db_hz} is not a finite number or -inf")
+    if not 1.0 <= reflector.index < np.inf:
+        raise ValidityError(f"index {reflector.index} of the reflector is not 1, that of a hollow one, or more")
 
 
 def _noises(link: Link, received: float, background: float) -> dict[str, float]:

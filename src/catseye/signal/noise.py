@@ -22,6 +22,7 @@ TAPER_CORRELATION = 1.0 + 2.0 * (2.0 / 3.0) ** 2 + 2.0 * (1.0 / 6.0) ** 2  # sum
 ITERATIONS = 50
 MOST_SPURS = 20
 CLIMBS = 100
+ROUNDING = 1e-13  # of the largest reading: what lines and drift leave below it is arithmetic, not noise
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class NoiseSpectrum:
     squares      (3,) white^2, flicker^2, walk^2, each 0 or more; unit of the series squared
     covariance   (3, 3) of these
     spurs        lines, strongest first
+    drift        of the straight line that was taken out first, unit of the series a second
     frequency    (k,) Hz; density (k,) of the tapered series with its lines, unit^2/Hz; model (k,) without them
     """
 
@@ -58,6 +60,7 @@ class NoiseSpectrum:
     frequency: NDArray[np.float64]
     density: NDArray[np.float64]
     model: NDArray[np.float64]
+    drift: float
 
     @property
     def white(self) -> float:
@@ -82,9 +85,11 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
     interval     s, above 0, from reading to reading
     false_alarm  probability of calling noise a spur, over the whole spectrum, 0 to 1
 
-    Likelihood of the tapered periodogram's ordinates, each exponential about the model; lines are found one by one,
-    strongest first, fitted together and taken out. A part that comes out negative is held at zero; its variance in
-    `covariance` is that at zero. The covariance counts the correlation that the taper makes.
+    A straight line (oscillators that differ in frequency, warming) is taken out first: it is no noise. Likelihood of
+    the tapered periodogram's ordinates, each exponential about the model; spurs are found one by one, strongest first,
+    fitted together and taken out; one that settles on another is none and ends the search. A part that comes out
+    negative is held at zero; its variance in `covariance` is that at zero. The covariance counts the correlation that
+    the taper makes.
 
     Raises ValidityError for a series that is too short, constant, or has gaps.
 
@@ -99,6 +104,11 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
     y = _checked(series, interval, false_alarm)
     n = y.size
     time = np.arange(n) - 0.5 * (n - 1)
+    slope = float(time @ y / (time @ time))
+    largest = float(np.max(np.abs(y)))
+    y = y - slope * time
+    if np.sqrt(np.mean(y**2)) <= ROUNDING * largest:
+        raise ValidityError(f"all {n} readings lie on a straight line: no noise shows (a dead channel?)")
     v = np.arange(FIRST_ORDINATE, (n + 1) // 2) / n
     basis = _basis(v)
     lines: list[float] = []
@@ -113,9 +123,12 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
         strength = ordinates / model
         top = int(np.argmax(strength))
         chance = float(-np.expm1(len(v) * np.log1p(-np.exp(-min(strength[top], 700.0)))))
-        if chance > false_alarm or len(lines) == MOST_SPURS:
+        if chance > false_alarm or len(lines) == MOST_SPURS or np.sqrt(np.mean(rest**2)) <= ROUNDING * largest:
             break
-        lines = _refined(y, time, [*lines, float(v[top])])
+        longer = _refined(y, time, [*lines, float(v[top])])
+        if np.any(np.diff(np.sort(longer)) < 1.0 / n):
+            break
+        lines = longer
         chances.append(chance)
     covariance = TAPER_CORRELATION * np.linalg.inv(information)
     assert first is not None
@@ -130,6 +143,7 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
         v / interval,
         first * interval,
         model * interval,
+        slope / interval,
     )
 
 

@@ -131,3 +131,17 @@ def test_an_alternative_value_leaves_with_its_partner():
     fit = fit_readings(y, design, Scatter(np.eye(12)), names=["p", "q"], reject=True, together=np.tile(np.arange(6), 2))
     assert np.flatnonzero(~fit.active).tolist() == [3, 9]
     assert fit.state(("",) * 12)[9] == "rejected"
+
+
+def test_groups_of_readings_that_agree_to_the_last_digit_say_what_is_missing():
+    same = np.kron(np.eye(3), np.ones((4, 4)))
+    scatter = Scatter(np.zeros((12, 12)), {"one": np.eye(12), "group": same})
+    with pytest.raises(EstimationError, match="of one group agree to the last digit"):
+        fit_readings(np.repeat([1.0, 1.1, 0.9], 4), np.ones((12, 1)), scatter, names=["mean"])
+
+
+def test_the_rounding_of_differences_is_no_scatter():
+    rounding = np.array([1.0, -2.0, 1.0, 3.0]) * 1e-16
+    scatter = Scatter(np.zeros((4, 4)), {"s": np.eye(4)}, size=3.0)
+    with pytest.raises(EstimationError, match="do not scatter at all"):
+        fit_readings(rounding, np.ones((4, 1)), scatter, names=["mean"])

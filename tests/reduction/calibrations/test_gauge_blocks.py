@@ -95,3 +95,34 @@ def test_unknown_and_repeated_blocks_are_refused():
         )
         with pytest.raises(InputError, match=f"line 2, blocks = .*{why}"):
             calibrate_against_blocks(made)
+
+
+def test_the_scale_of_the_instrument_and_the_warmth_are_taken_out_of_a_spacer_and_their_u_counts():
+    base = {"expansion_ppm_per_c": 20.0, "u_expansion_ppm_per_c": 0.0, "u_temperature_c": 0.0, "u_zero_mm": 0.0}
+    made = readings(
+        SpacersSheet, SPACERS, numbers={"reads_mm": [500.0]}, words={"spacer": ("A",)},
+        scale_ppm=100.0, u_scale_ppm=4.0, temperature_c=30.0, u_reading_mm=1e-6, **base,
+    )  # fmt: skip
+    found = calibrate_spacers(made)
+    assert found.value("A_mm") == pytest.approx(500.0 - 0.05 - 0.1, abs=2e-4)  # 100 ppm, and 20 ppm/°C over 10 °C
+    assert found.u("A_mm") == pytest.approx(500.0 * 4e-6, rel=1e-3)
+
+
+def test_the_doubt_of_the_films_falls_on_stacks_and_not_on_single_blocks():
+    blocks = [{"name": n, "length_mm": length, "u_mm": 1e-9} for n, length in CERTIFIED.items()]
+    steel = {**STEEL, "u_expansion_ppm_per_c": 0.0, "u_temperature_c": 0.0, "u_reading_mm": 1e-6}
+    for stack, films in (("100", 0), ("50+25+10", 2)):
+        made = readings(
+            BlocksSheet, BLOCKS, numbers={"reads_mm": [90.0]}, words={"blocks": (stack,)}, block=blocks,
+            temperature_c=20.0, u_film_um=0.05, estimate_scale=False, **steel,
+        )  # fmt: skip
+        assert calibrate_against_blocks(made).u("zero_mm") == pytest.approx(np.hypot(1e-6, films * 5e-5), rel=1e-3)
+
+
+def test_a_spacer_without_a_name_is_refused_with_its_line():
+    made = readings(
+        SpacersSheet, SPACERS, numbers={"reads_mm": [10.0, 10.0]}, words={"spacer": ("A", "")}, temperature_c=20.0,
+        u_zero_mm=0.0, u_scale_ppm=0.0, **STEEL,
+    )  # fmt: skip
+    with pytest.raises(InputError, match="line 3, spacer is empty"):
+        calibrate_spacers(made)

@@ -71,3 +71,17 @@ def test_a_part_that_is_none_is_refused_with_its_line():
     made = readings(GlassSheet, BALL, numbers={"radius_mm": [50.0]}, words={"part": ("R1",)}, **GLASS)
     with pytest.raises(InputError, match="line 2, part = 'R1'"):
         calibrate_ball(made)
+
+
+def test_what_the_index_and_the_expansion_leave_open_is_in_the_constants_of_a_prism():
+    sheet = {**GLASS, "u_index_ratio": 1e-3, "u_gauge_mm": 0.0, "u_temperature_c": 0.0}
+    heights = {"height_mm": [38.4] * 4}
+    found = calibrate_prism(readings(GlassSheet, PRISM, numbers=heights, u_reading_mm=1e-6, **sheet))
+    h, n, step = found.value("height_mm"), 1.527077, 1e-6
+    for key, constant in (("hrp_mm", lambda n: h / n), ("pc_mm", lambda n: -(n - 1 / n) * h)):
+        slope = (constant(n + step) - constant(n - step)) / (2 * step)
+        assert found.u(key) == pytest.approx(1e-3 * abs(slope), rel=1e-4)
+    assert found.covariance[1, 2] > 0  # a larger index: the point rises and the constant falls
+    sheet = {**GLASS, "u_gauge_mm": 0.0, "u_temperature_c": 0.0, "u_expansion_ppm_per_c": 2.0}
+    found = calibrate_prism(readings(GlassSheet, PRISM, numbers=heights, u_reading_mm=1e-9, **sheet))
+    assert found.u("height_mm") == pytest.approx(38.4 * 3.0 * 2e-6, rel=1e-3)  # 3 °C above 20 °C

@@ -37,6 +37,16 @@ def test_hung_as_certified_it_shows_its_certified_length_and_the_scales():
     assert found.value("distance_mm") == pytest.approx(24_003.25, abs=1e-8)
 
 
+def test_the_doubt_of_the_known_distance_is_that_of_the_wire():
+    exact = {key: 0.0 for key in WIRE if key.startswith("u_")}
+    found = hung(
+        **exact, tension_n=[100.0], temperature_c=20.0, u_reading_mm=1e-6, known_distance_mm=24_000.1,
+        u_known_distance_mm=0.03,
+    )  # fmt: skip
+    assert found.value("certified_mm") == pytest.approx(24_000.1, abs=1e-6)
+    assert found.u("certified_mm") == pytest.approx(0.03, rel=1e-3)  # not that of the certificate it replaces
+
+
 def test_tension_temperature_and_slope_correct_by_the_surveyors_formulas():
     found = hung(tension_n=[120.0] * 2, temperature_c=30.0, height_difference_mm=1200.0, u_reading_mm=0.02)
     length = 24_000.0

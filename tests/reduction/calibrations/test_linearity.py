@@ -5,7 +5,8 @@ import pytest
 
 from calibration_scene import HALF, RUNS, WEATHER
 from catseye.atmosphere.air import phase_refractivity
-from catseye.errors import InputError
+from catseye.errors import EstimationError, InputError
+from catseye.reduction.calibrations.air import phase_air
 from catseye.reduction.calibrations.linearity import LAYOUT, calibrate_linearity
 from catseye.reduction.calibrations.spectrum import spectrum
 from catseye.signal.cyclic import cyclic_range
@@ -210,3 +211,18 @@ def test_all_terms_scatter_as_claimed(table, scatters_as_claimed, runs):
         values.append([q.value for q in found.quantities])
         covariances.append(found.covariance)
     scatters_as_claimed(values, covariances, truth)
+
+
+def test_weather_at_the_ends_of_its_scales_has_slopes_from_the_side_that_there_is(table):
+    ends = {"temperature_c": [-40.0, 20.0, 50.0], "pressure_hpa": [900.0] * 3, "humidity_percent": [0.0, 50.0, 100.0]}
+    inside = {"temperature_c": [-39.5, 20.0, 49.5], "pressure_hpa": [900.0] * 3, "humidity_percent": [0.5, 50.0, 99.5]}
+    sheet = {key: value for key, value in BASE.items() if key not in ends}
+    numbers = {"range_m": [3.0, 4.0, 5.0], "interferometer_vacuum_m": [0.6, 1.6, 2.6]}
+    at, near = (phase_air(table(LAYOUT, {**numbers, **w}, **sheet), 0.633).slopes for w in (ends, inside))
+    assert at == pytest.approx(near, rel=0.08)  # over half a degree that of humidity grows by 5 % at -40 °C
+
+
+def test_readings_that_agree_to_the_last_digit_say_so(table):
+    length = np.arange(0.0, 3.0, 0.03)
+    with pytest.raises(EstimationError, match="do not scatter at all"):
+        calibrate_linearity(table(LAYOUT, {"range_m": 2.4 + length, "interferometer_m": length}, **BASE, **START))

@@ -202,3 +202,17 @@ def test_d0_and_scale_scatter_as_claimed(table, scatters_as_claimed, runs):
         values.append([q.value for q in found.quantities])
         covariances.append(found.covariance)
     scatters_as_claimed(values, covariances, [D0 * 1e3, 0.0])
+
+
+def test_whole_cycles_are_judged_by_the_readings_used_and_all_that_is_not_known_of_them(table):
+    distance = np.append(PLACES, 20.0)
+    rows = columns(distance)
+    rows["distance_m"] = np.append(PLACES, 20.047)  # a typing error, nearly half a wavelength
+    left_out = ("",) * len(PLACES) + ("typing error",)
+    good = calibrate_reference_distance(table(LAYOUT, rows, left_out=left_out, **BASE, u_distance_mm=0.01))
+    assert good.decisions[0].passed
+    assert good.decisions[0].limit == pytest.approx(5.0, rel=1e-3)
+    doubted = {**BASE, "u_distance_ppm": 200.0, "u_pc_mm": 3.0}
+    bad = calibrate_reference_distance(table(LAYOUT, columns(PLACES), **doubted, u_distance_mm=0.01))
+    assert not bad.decisions[0].passed  # 200 ppm of 60 m are 12 mm, five times that is more than half a half wavelength
+    assert bad.decisions[0].limit == pytest.approx(5.0 * np.sqrt(1.0 + 9.0 + 144.0), rel=1e-4)

@@ -72,21 +72,21 @@ def group_air(readings: Readings) -> Air:
 def phase_air(readings: Readings, wavelength_um: float) -> Air:
     """Phase index of an interferometer's light in the same air."""
     sheet = readings.sheet
+    model = MODELS[sheet.air_model]
     weather = [readings.get(name) for name in SENSORS]
 
-    def index(shift: np.ndarray) -> np.ndarray:
-        moved = [w + s for w, s in zip(weather, shift, strict=True)]
-        return np.asarray(phase_refractivity(*moved, wavelength_um=wavelength_um, model=sheet.air_model))
+    def refractivity(at: list[np.ndarray]) -> np.ndarray:
+        return np.asarray(phase_refractivity(*at, wavelength_um=wavelength_um, model=sheet.air_model))
 
     slopes = []
-    for k, step in enumerate(STEPS):
-        up, down = np.zeros(3), np.zeros(3)
-        # Humidity may stand at either end of its scale: then the difference is one-sided.
-        room = 100.0 if k == 2 else np.inf
-        up[k] = step if np.all(weather[k] + step <= room) else 0.0
-        down[k] = -step if k < 2 or np.all(weather[k] >= step) else 0.0
-        slopes.append((index(up) - index(down)) / (up[k] - down[k]))
-    return Air(1.0 + index(np.zeros(3)), np.array(slopes), MODELS[sheet.air_model].standard_uncertainty)
+    for k, (name, step) in enumerate(zip(SENSORS, STEPS, strict=True)):
+        # A reading may stand at either end of where the formula holds: there its difference is one-sided.
+        limit = model.limits[name]
+        low = np.maximum(weather[k] - step, limit.lower)
+        high = np.minimum(weather[k] + step, limit.upper)
+        below, above = [[*weather[:k], at, *weather[k + 1 :]] for at in (low, high)]
+        slopes.append((refractivity(above) - refractivity(below)) / (high - low))
+    return Air(1.0 + refractivity(weather), np.array(slopes), model.standard_uncertainty)
 
 
 def half_wavelength(readings: Readings, state: Air) -> np.ndarray:

@@ -29,7 +29,7 @@ class AmplitudeSheet(Sheet):
 
     reference_amplitude_volt        where nothing is added: the return of the internal cube
     u_phasor_volt                   of each quadrature of one phasor, if known: u of phase is this over the amplitude
-    u_phase_rad                     of each phase instead; a column where they differ
+    u_phase_rad                     of each phase, less the reference's where given, instead; a column where they differ
     u_leakage_volt                  of each quadrature of the leakage that was taken out
     random_walk_rad_per_sqrt_hour   of the electronics, where no reference phases are given; needs mjd_utc
     quadratic                       a term in the square of the logarithm is sought too

@@ -42,10 +42,12 @@ class Scatter:
 
     claimed      (m, m) covariance, known beforehand
     unknown      what scatters -> (m, m) matrix Q; its variance factor is estimated
+    size         of the numbers whose differences are observed: scatter that is their rounding is none
     """
 
     claimed: np.ndarray
     unknown: dict[str, np.ndarray] = field(default_factory=dict)
+    size: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +206,7 @@ def _fitted(
             design[on],
             [matrix[block] for matrix in scatter.unknown.values()],
             (scatter.claimed + shared)[block],
+            size=scatter.size,
         )
         components = {name: float(np.sqrt(v)) for name, v in zip(scatter.unknown, variances, strict=True)}
         covariance = covariance + sum(v * matrix for v, matrix in zip(variances, scatter.unknown.values(), strict=True))

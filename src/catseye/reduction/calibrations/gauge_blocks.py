@@ -145,6 +145,8 @@ def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
     """
     sheet, m = readings.sheet, len(readings)
     names = list(dict.fromkeys(readings.words["spacer"]))
+    if "" in names:
+        raise readings.refuse(readings.words["spacer"].index(""), "spacer is empty (expected its name)")
     design = np.array([[float(name == spacer) for name in names] for spacer in readings.words["spacer"]])
     temperature = readings.get("temperature_c")
     grown = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)

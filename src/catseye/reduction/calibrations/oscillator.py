@@ -66,6 +66,7 @@ def measure_oscillator(readings: Readings, reject: bool = False) -> Calibration:
     )  # fmt: skip
     time = allan.size * sheet.interval_s
     white = found.white / np.sqrt(allan.size)
+    shown, line = allan.deviation > 0.0, np.full(len(time), found.white > 0.0)  # what has a logarithm
     return Calibration(
         kind=KIND,
         title=f"Oscillator test of {sheet.instrument}",
@@ -91,12 +92,16 @@ def measure_oscillator(readings: Readings, reject: bool = False) -> Calibration:
                 for s in found.spurs[:SHOWN]
             ),
             "spurs above half the sampling rate show folded below it",
+            f"a drift of {found.drift:+.3g} rad/s was taken out before the spectrum; the Allan deviation has it",
         ),
-        curve={"readings": (np.log10(time), np.log10(allan.deviation)), "fit": (np.log10(time), np.log10(white))},
+        curve={
+            "readings": (np.log10(time[shown]), np.log10(allan.deviation[shown])),
+            "fit": (np.log10(time[line]), np.log10(white[line])),
+        },
         axes=("averaging time (log10 of s)", "Allan deviation (log10 of rad)"),
-        method="The spectrum of the unwrapped phases is fitted with white, flicker and random-walk noise by the "
-        "likelihood of its ordinates, lines taken out one by one. Beside it the overlapping Allan deviation of "
-        "averages, with 95 % limits; the line in the figure is what white noise alone would do.",
+        method="The spectrum of the unwrapped phases, a straight line taken out, is fitted with white, flicker and "
+        "random-walk noise by the likelihood of its ordinates, spurs taken out one by one. Beside it the overlapping "
+        "Allan deviation of averages, with 95 % limits; the line in the figure is what white noise alone would do.",
         record={q.key: q.value for q in quantity},
     )
 

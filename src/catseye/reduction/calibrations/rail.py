@@ -159,4 +159,4 @@ def _scatter(readings: Readings) -> Scatter:
     if readings.has("u_range_mm"):
         variance = (np.hypot(readings.get("u_range_mm"), sheet.u_abbe_mm) * MILLIMETRE) ** 2
         return Scatter(claimed + np.diag(variance))
-    return Scatter(claimed, {SCATTER: np.eye(m)})
+    return Scatter(claimed, {SCATTER: np.eye(m)}, size=float(np.max(readings.get("range_m"))))

@@ -116,7 +116,9 @@ def _scatter(readings: Readings, half: np.ndarray) -> Scatter:
         variance = variance + (readings.get("u_phase_rad") * half / TWO_PI) ** 2
     if variance.any():
         return Scatter(np.diag(variance))
-    return Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+    return Scatter(
+        np.zeros((m, m)), {"scatter of one reading": np.eye(m)}, size=float(np.max(readings.get("distance_m")))
+    )
 
 
 def _effects(
@@ -169,7 +171,7 @@ def _told(readings: Readings, fit: Fit, *, observed: np.ndarray, cycles: np.ndar
         covariance=covariance,
         columns=("distance_m", "cycles", "margin_mm", "d0_mm", "residual_um", fit.test, "state"),
         rows=rows,
-        decisions=(_cycles_decision(readings, margin), *fit.decisions()),
+        decisions=(_cycles_decision(readings, margin, on), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -192,14 +194,15 @@ def _told(readings: Readings, fit: Fit, *, observed: np.ndarray, cycles: np.ndar
     )
 
 
-def _cycles_decision(readings: Readings, margin: np.ndarray) -> Decision:
-    """Is every whole number of cycles safe? The margin is compared with the doubt about the coarse length."""
+def _cycles_decision(readings: Readings, margin: np.ndarray, on: np.ndarray) -> Decision:
+    """Is the whole number of cycles of every reading used safe? The margin against the doubt of the coarse length."""
     sheet = readings.sheet
-    doubt = np.hypot(sheet.u_d0_nominal_mm, sheet.u_distance_common_mm)
+    common = np.hypot(np.hypot(sheet.u_d0_nominal_mm, sheet.u_distance_common_mm), sheet.u_pc_mm)
+    doubt = np.hypot(common, readings.get("distance_m") * sheet.u_distance_ppm * PPM / MILLIMETRE)
     if readings.has("u_distance_mm"):
         doubt = np.hypot(doubt, readings.get("u_distance_mm"))
-    least = int(np.argmin(margin / doubt))
-    limit = SAFE * float(np.broadcast_to(doubt, margin.shape)[least])
+    least = int(np.argmin(np.where(on, margin / doubt, np.inf)))
+    limit = SAFE * float(doubt[least])
     worst = float(margin[least]) / MILLIMETRE
     return Decision(
         "whole cycles: smallest margin, mm",

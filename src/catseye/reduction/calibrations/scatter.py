@@ -13,7 +13,12 @@ NEGLIGIBLE = 1e-12  # of the total variance: a component below it is none
 
 
 def restricted_likelihood(
-    observed: np.ndarray, design: np.ndarray, components: Sequence[np.ndarray], claimed: np.ndarray
+    observed: np.ndarray,
+    design: np.ndarray,
+    components: Sequence[np.ndarray],
+    claimed: np.ndarray,
+    *,
+    size: float = 0.0,
 ) -> np.ndarray:
     """Variance factors (k,) of the components of a covariance, none below zero.
 
@@ -21,10 +26,12 @@ def restricted_likelihood(
     design       (m, p) derivatives by the parameters of the mean
     components   k matrices Q (m, m); the first must be of full rank
     claimed      (m, m) the part of the covariance that is known
+    size         of the numbers that `observed` are differences of, for their rounding
 
     C = claimed + sum of theta_k Q_k; with P the projection C^-1 - C^-1 A (A' C^-1 A)^-1 A' C^-1 the estimate solves
     y' P Q_k P y = tr(P Q_k) for each k, by Fisher scoring with halved steps. Unbiased for one component of white noise.
-    Raises EstimationError where nothing is redundant or the search does not end.
+    Raises EstimationError where nothing is redundant, where readings (or those of each group) agree to the last digit,
+    or where the search does not end.
 
     Source: [PATTERSON71] (restricted maximum likelihood and its information).
 
@@ -43,7 +50,7 @@ def restricted_likelihood(
     parts = [basis @ q @ basis.T for q in components]
     known = basis @ claimed @ basis.T
     total = float(z @ z) / len(z)
-    if np.sqrt(total) <= ROUNDING * float(np.max(np.abs(observed))):
+    if np.sqrt(total) <= ROUNDING * max(size, float(np.max(np.abs(observed)))):
         raise EstimationError("the readings do not scatter at all; state the scatter's standard uncertainty")
     theta = np.array([total / len(parts) / max(np.trace(q) / len(z), 1e-300) for q in parts])
     floor = NEGLIGIBLE * theta
@@ -58,6 +65,11 @@ def restricted_likelihood(
         moved = np.abs(trial - theta)
         theta, value = trial, better
         if np.all(moved <= STEP * np.maximum(theta, floor)):
+            if len(theta) > 1 and theta[0] <= 2.0 * floor[0] and np.linalg.matrix_rank(known) < len(z):
+                raise EstimationError(
+                    "readings of one group agree to the last digit, only groups differ; state the standard uncertainty "
+                    "of one reading (that of its last digit at least)"
+                )
             return np.where(theta <= 2.0 * floor, 0.0, theta) if len(theta) > 1 else theta
     raise EstimationError("the scatter of the readings was not found: state its standard uncertainty in the sheet")
 
