@@ -19,6 +19,7 @@ class Repeatability:
     intermediate       of one reading at another time: root of within^2 + between^2
     f, f_limit         ratio of the mean squares and its limit at `level`; above it the sets differ
     degrees_within, degrees_between
+    usual              readings a set, as unequal sets count
     """
 
     mean: float
@@ -29,6 +30,7 @@ class Repeatability:
     f_limit: float
     degrees_within: int
     degrees_between: int
+    usual: float
 
     @property
     def intermediate(self) -> float:
@@ -67,6 +69,8 @@ def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float =
         raise ValidityError(f"{n} readings in {k} sets do not tell scatter within from scatter between sets")
     means = np.array([y[r].mean() for r in rows])
     square_within = float(sum(np.sum((y[r] - m) ** 2) for r, m in zip(rows, means, strict=True)) / (n - k))
+    if square_within == 0.0:
+        raise ValidityError("readings agree to the last digit within every set: give more digits")
     square_between = float(np.sum(count * (means - y.mean()) ** 2) / (k - 1))
     usual = (n - float(np.sum(count**2)) / n) / (k - 1)
     between = max(0.0, (square_between - square_within) / usual)
@@ -76,16 +80,15 @@ def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float =
         u_mean=u_mean,
         within=float(np.sqrt(square_within)),
         between=float(np.sqrt(between)),
-        f=square_between / square_within if square_within > 0.0 else float("inf"),
+        f=square_between / square_within,
         f_limit=_f_limit(level, k - 1, n - k),
         degrees_within=n - k,
         degrees_between=k - 1,
+        usual=usual,
     )
 
 
 def _weighted(means: NDArray[np.float64], variance: NDArray[np.float64]) -> tuple[float, float]:
-    if np.any(variance <= 0.0):  # readings that agree to the last digit
-        return float(means.mean()), float(means.std(ddof=1) / np.sqrt(means.size))
     weight = 1.0 / variance
     return float(weight @ means / weight.sum()), float(1.0 / np.sqrt(weight.sum()))
 

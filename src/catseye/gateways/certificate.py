@@ -6,7 +6,7 @@ from html import escape
 from typing import Any
 
 from catseye.gateways.certificate_figure import calibration_figure
-from catseye.gateways.certificate_record import COVERAGE, record_lines
+from catseye.gateways.certificate_record import record_lines
 from catseye.gateways.objects import versions
 from catseye.gateways.page import folded, page, paragraph, picture, section, table
 from catseye.reduction.calibration import Calibration, Decision, Quantity
@@ -75,14 +75,14 @@ def _results(found: Calibration) -> str:
         "results",
         "Results",
         table(
-            ("quantity", "value", "u", f"U (k = {COVERAGE:g})", "interval", "unit", "what it is"),
+            ("quantity", "value", "u", "k", "U = k u", "interval", "unit", "what it is"),
             [_result(q) for q in found.quantities],
-            "tnnnntw",
+            "tnnnnntw",
         ),
         paragraph(
-            f"u is the standard uncertainty (1σ) of all known causes together, U = {COVERAGE:g} u the expanded "
-            "uncertainty; the interval holds the quantity with a probability of about 95 % if it is normally "
-            "distributed.",
+            "u is the standard uncertainty (1σ) of all known causes together, U = k u the expanded uncertainty; the "
+            "interval holds the quantity with a probability of about 95 %. k is 2 for a normal quantity, more where u "
+            "rests on few readings (Student).",
             "faint",
         ),
         _correlations(found),
@@ -93,12 +93,13 @@ def _results(found: Calibration) -> str:
 def _result(q: Quantity) -> tuple[str, ...]:
     value, u = rounded(q.value, q.u)
     places = len(value.partition(".")[2])
-    low, high = q.value - COVERAGE * q.u, q.value + COVERAGE * q.u
+    low, high = q.value - q.coverage * q.u, q.value + q.coverage * q.u
     return (
         q.key,
         value,
         u,
-        f"{COVERAGE * q.u:.{places}f}",
+        f"{q.coverage:.2f}",
+        f"{q.coverage * q.u:.{places}f}",
         f"{low:.{places}f} to {high:.{places}f}",
         q.unit,
         q.meaning,

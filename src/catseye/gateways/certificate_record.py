@@ -16,7 +16,6 @@ from catseye.reduction.calibrations.kind import PROVENANCE
 
 FORMAT = "catseye-calibration-1"
 MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
-COVERAGE = 2.0  # factor of the interval that a certificate states
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -32,8 +31,9 @@ def calibration_object(found: Calibration) -> dict[str, Any]:
                 q.key: {
                     "value": q.value,
                     "u": q.u,
-                    "low": q.value - COVERAGE * q.u,
-                    "high": q.value + COVERAGE * q.u,
+                    "low": q.value - q.coverage * q.u,
+                    "high": q.value + q.coverage * q.u,
+                    "coverage_factor": q.coverage,
                     "unit": q.unit,
                     "meaning": q.meaning,
                 }
@@ -41,7 +41,6 @@ def calibration_object(found: Calibration) -> dict[str, Any]:
             },
             "covariance_order": [q.key for q in found.quantities],
             "covariance": found.covariance,
-            "coverage_factor": COVERAGE,
             "record": found.record,
             "variance_factor": found.variance_factor,
             "degrees_of_freedom": found.degrees_of_freedom,

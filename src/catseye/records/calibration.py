@@ -14,13 +14,17 @@ AGREES = 1e-9  # relative: u² and the diagonal are two roundings of one number
 
 
 class CalibratedQuantity(Record):
-    """One number: its key with the unit in it, value and standard uncertainty in that unit, and what it means."""
+    """One number: its key with the unit in it, value and standard uncertainty in that unit, and what it means.
+
+    coverage   factor of u for an interval of 95.45 %; 2 where the record does not say
+    """
 
     key: Words
     value: float
     u: Positive
     unit: str
     meaning: str
+    coverage: Positive = 2.0
 
 
 class CovarianceTable(Record):

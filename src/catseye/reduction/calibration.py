@@ -17,6 +17,7 @@ class Quantity:
     u        standard uncertainty, in that unit, all known causes together
     unit     for people: "mm"
     meaning  one line for the certificate
+    coverage factor k of the interval value ± k u that holds it with 95.45 %: 2, more where u rests on few readings
     """
 
     key: str
@@ -24,6 +25,7 @@ class Quantity:
     u: float
     unit: str
     meaning: str
+    coverage: float = 2.0
 
 
 @dataclass(frozen=True)

@@ -85,3 +85,20 @@ def test_what_the_index_and_the_expansion_leave_open_is_in_the_constants_of_a_pr
     sheet = {**GLASS, "u_gauge_mm": 0.0, "u_temperature_c": 0.0, "u_expansion_ppm_per_c": 2.0}
     found = calibrate_prism(readings(GlassSheet, PRISM, numbers=heights, u_reading_mm=1e-9, **sheet))
     assert found.u("height_mm") == pytest.approx(38.4 * 3.0 * 2e-6, rel=1e-3)  # 3 °C above 20 °C
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_the_interval_holds_the_height_as_often_as_it_says_even_from_two_readings(count):
+    rng = np.random.default_rng(count)
+    held = 0
+    sheet = {**GLASS, "u_gauge_mm": 0.0, "u_temperature_c": 0.0, "temperature_c": 20.0}
+    for _ in range(1000):
+        height = 38.2 + 0.002 * rng.normal(size=count)
+        (h, *_) = calibrate_prism(readings(GlassSheet, PRISM, numbers={"height_mm": height}, **sheet)).quantities
+        held += abs(h.value - 38.2) <= h.coverage * h.u
+    assert abs(held - 954.5) < 27  # four standard deviations of a count
+
+
+def test_what_is_known_keeps_the_factor_two():
+    known = readings(GlassSheet, PRISM, numbers={"height_mm": [38.2, 38.201]}, u_reading_mm=0.001, **GLASS)
+    assert {q.coverage for q in calibrate_prism(known).quantities} == {2.0}

@@ -175,3 +175,11 @@ def test_lit_leakage_scatters_as_claimed(table, scatters_as_claimed, known, runs
         values.append([q.value for q in found.quantities])
         covariances.append(found.covariance)
     scatters_as_claimed(values, covariances, POLAR)
+
+
+def test_few_sessions_are_said_to_tell_little(table):
+    rng = np.random.default_rng(3)
+    for count, passed in ((2, False), (6, True)):
+        z = TRUE + 3e-4 * noise(rng, 4 * count)
+        decision = leakage.calibrate_leakage(blocked(table, z, np.arange(4 * count) // 4)).decisions[0]
+        assert (decision.name, decision.passed) == ("sessions", passed)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from catseye.errors import InputError, ValidityError
 from catseye.reduction.calibrations.repeatability import KIND, RepeatabilitySheet, measure_repeatability
 from reduction.calibrations.length_scene import readings
 
@@ -30,3 +31,23 @@ def test_sets_that_agree_have_nothing_between_them():
     assert c.value("between_um") == 0.0
     assert c.decisions[0].passed
     assert c.value("repeatability_um") == pytest.approx(10.0)
+    assert c.u("between_um") > 1.0  # zero was found, not known
+
+
+def test_readings_that_tell_nothing_are_refused_and_a_set_left_out_is_no_warning():
+    same = readings(RepeatabilitySheet, KIND, numbers={"range_m": [1.0] * 4}, words={"set": ("a", "a", "b", "b")})
+    with pytest.raises(ValidityError, match="agree to the last digit"):
+        measure_repeatability(same)
+    named = readings(RepeatabilitySheet, KIND, numbers={"range_m": [1.0] * 3}, words={"set": ("a", "a", "")})
+    with pytest.raises(InputError, match="line 4, set is empty"):
+        measure_repeatability(named)
+    out = readings(
+        RepeatabilitySheet,
+        KIND,
+        numbers={"range_m": [1.0, 1.1, 1.2, 1.4, 9.0]},
+        words={"set": ("a", "a", "b", "b", "c")},
+        left_out=("", "", "", "", "bumped"),
+    )
+    found = measure_repeatability(out)
+    assert found.states[-1] == "left out: bumped"
+    assert found.decisions[0].limit == pytest.approx(18.51, abs=0.01)  # F of 1 and 2 degrees

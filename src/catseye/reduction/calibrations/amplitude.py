@@ -137,7 +137,7 @@ def _told(readings: Readings, fit: Fit, observed: np.ndarray, level: np.ndarray,
         ("amplitude_to_phase_quadratic_rad", "rad", "the same for its square"),
     ][: len(keep)]
     covariance = fit.covariance[np.ix_(keep, keep)]
-    found = quantities(keys, fit.x[keep], covariance)
+    found = quantities(keys, fit.x[keep], covariance, fit=fit, turn=np.eye(len(fit.x))[keep])
     amplitude = readings.get("amplitude_target_volt")
     weakest = float(np.min(np.log(amplitude[on] / sheet.reference_amplitude_volt)))
     effect = float(fit.x[0] * weakest + (fit.x[2] * weakest**2 if sheet.quadratic else 0.0))

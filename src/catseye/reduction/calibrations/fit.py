@@ -222,8 +222,9 @@ def _fitted(
     ).require_converged()
     degrees = np.full(p, np.inf)
     if components:
-        acted = [q[np.ix_(on, on)] for q, v in zip(scatter.unknown.values(), components.values(), strict=True) if v]
-        degrees = effective_degrees(design[on], acted, covariance[np.ix_(on, on)])
+        block = np.ix_(on, on)
+        acting_on = [q[block] for q in scatter.unknown.values()]  # one that came out as zero is no less uncertain
+        degrees = effective_degrees(design[on], acting_on, covariance[block])
     return _outcome(solution, groups[0], [e.name for e in acting], components, on=on, level=level, effective=degrees)
 
 

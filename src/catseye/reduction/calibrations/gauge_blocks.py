@@ -125,7 +125,7 @@ def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibr
     return Calibration(
         kind=BLOCKS,
         title=f"{sheet.instrument} against gauge blocks",
-        quantities=quantities(keys, fit.x, fit.covariance),
+        quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
         covariance=fit.covariance,
         curve=_curve(length, fit, fit.predicted),
         axes=("length of the stack (mm)", "reads minus length (µm)"),
@@ -170,7 +170,7 @@ def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
     return Calibration(
         kind=SPACERS,
         title=f"Spacers {', '.join(names)}" if len(names) < 5 else f"{len(names)} spacers",
-        quantities=quantities(keys, fit.x, fit.covariance),
+        quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
         covariance=fit.covariance,
         curve=_curve(np.arange(1.0, m + 1.0), fit, np.zeros(m)),  # lengths differ: residuals alone share an axis
         axes=("reading", "residual (µm)"),

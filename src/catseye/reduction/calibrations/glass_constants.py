@@ -162,7 +162,7 @@ def _told(
         kind=kind,
         title=f"{what} constants of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=quantities(keys, values, covariance),
+        quantities=quantities(keys, values, covariance, fit=fit, turn=by_size),
         covariance=covariance,
         columns=(*readings.words, "size_at_20_c_mm", "residual_um", fit.test, "state"),
         rows=rows,

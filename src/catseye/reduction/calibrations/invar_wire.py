@@ -197,7 +197,7 @@ def _told(readings: Readings, fit: Fit, seen: np.ndarray) -> Calibration:
         kind=KIND,
         title=f"{'Distance by' if known is None else 'Length of'} Invar wire {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=quantities([(key, "mm", meaning)], np.array([value]), fit.covariance),
+        quantities=quantities([(key, "mm", meaning)], np.array([value]), fit.covariance, fit=fit),
         covariance=fit.covariance,
         columns=(*readings.numbers, "distance_mm", "residual_um", fit.test, "state"),
         rows=rows,

@@ -40,14 +40,39 @@ def provenance(readings: Readings) -> dict[str, Any]:
 
 
 def quantities(
-    keys: Sequence[tuple[str, str, str]], values: np.ndarray, covariance: np.ndarray
+    keys: Sequence[tuple[str, str, str]],
+    values: np.ndarray,
+    covariance: np.ndarray,
+    *,
+    fit: Fit | None = None,
+    turn: np.ndarray | None = None,
 ) -> tuple[Quantity, ...]:
-    """Quantities from (key, unit, meaning), values and covariance in the units."""
-    u = np.sqrt(np.diag(covariance))
+    """Quantities from (key, unit, meaning), values and covariance in the units.
+
+    fit, turn   what they come from, and the derivatives (q, p) by its parameters: the part of u that was estimated from
+                few readings widens the interval
+
+    Source: [JCGM100] G.4.1, Welch and Satterthwaite; the scatter's own degrees as `effective_degrees` has them.
+    """
+    variance = np.diag(covariance)
+    coverage = np.full(len(variance), 2.0)
+    if fit is not None and np.isfinite(fit.effective).any():
+        slope = np.eye(len(variance)) if turn is None else np.asarray(turn, dtype=float)
+        estimated = np.einsum("qp,pr,qr->q", slope, fit.scattered, slope)
+        least = np.array([np.min(fit.effective[row != 0.0], initial=np.inf) for row in slope])
+        coverage = _coverage(least * (variance / np.maximum(estimated, 1e-300)) ** 2)
     return tuple(
-        Quantity(key, float(v), float(s), unit, meaning)
-        for (key, unit, meaning), v, s in zip(keys, values, u, strict=True)
+        Quantity(key, float(v), float(np.sqrt(s)), unit, meaning, float(k))
+        for (key, unit, meaning), v, s, k in zip(keys, values, variance, coverage, strict=True)
     )
+
+
+def _coverage(degrees: np.ndarray) -> np.ndarray:
+    """Factor of Student's interval that holds as much as two sigma of a normal one; 2 for infinite degrees."""
+    from scipy.special import ndtr, stdtrit
+
+    most = np.minimum(degrees, 1e9)
+    return np.where(degrees < 1e9, stdtrit(most, ndtr(2.0)), 2.0)
 
 
 def scatter_notes(fit: Fit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
@@ -65,7 +90,7 @@ def scatter_notes(fit: Fit, unit: str, scale: float, sought: int | None = None) 
         factor = float(stdtrit(least, 0.975))
         told.append(
             f"the estimated scatter has {least:.3g} effective degrees of freedom: for it alone the coverage factor of "
-            f"95 % is {factor:.2f}, where the intervals here use 2"
+            f"95 % is {factor:.2f}; the intervals count it"
         )
     if fit.suspects.any():
         told.append(

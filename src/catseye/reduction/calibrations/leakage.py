@@ -11,13 +11,14 @@ import numpy as np
 
 from catseye.records.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.record import Within
-from catseye.reduction.calibration import Calibration
+from catseye.reduction.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
 from catseye.reduction.calibrations.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 
 KIND = "leakage"
 BUFFER, SESSION = "scatter of one buffer", "scatter between sessions"
+FEWEST_SESSIONS = 5  # with fewer a scatter between sessions that comes out as zero means little
 Volts = Annotated[float, Within(0, 1, above=True)]
 
 
@@ -77,10 +78,25 @@ def _scatter(readings: Readings, names: tuple[str, ...], sessions: int) -> Scatt
     return Scatter(claimed, unknown)
 
 
+def _sessions_decision(sheet: LeakageSheet, sessions: int) -> Decision:
+    """Whether the sessions tell how the leakage differs from one to the next."""
+    name = "sessions"
+    if sheet.u_session_volt is not None:
+        return Decision(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
+    enough = sessions >= FEWEST_SESSIONS
+    text = "they tell how the leakage differs from one to the next"
+    if not enough:
+        text = (
+            "too few to tell how the leakage differs from one to the next: u_leakage_volt may be far too small; "
+            "measure more, or state u_session_volt"
+        )
+    return Decision(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
+
+
 def _told(readings: Readings, fit: Fit, z: np.ndarray, names: tuple[str, ...], sessions: int) -> Calibration:
     sheet, m = readings.sheet, len(z)
     leakage = complex(*fit.x)
-    found, polar = polar_quantities(leakage, fit.covariance)
+    found, polar = polar_quantities(leakage, fit.covariance, fit)
     between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
     u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
     to_come = float(np.hypot(u_mean, between))
@@ -129,7 +145,7 @@ def _told(readings: Readings, fit: Fit, z: np.ndarray, names: tuple[str, ...], s
             "state",
         ),
         rows=rows,
-        decisions=fit.decisions(),
+        decisions=(_sessions_decision(sheet, sessions), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*told, *scatter_notes(fit, "mV", MILLIVOLT)),

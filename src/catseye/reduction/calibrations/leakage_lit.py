@@ -136,7 +136,7 @@ def _told(readings: Readings, fit: Fit, z: np.ndarray, statistic: np.ndarray, *,
     sheet, m = readings.sheet, len(z)
     leakage = complex(fit.x[0], fit.x[1])
     centre = fit.covariance[:2, :2]
-    found, polar = polar_quantities(leakage, centre)
+    found, polar = polar_quantities(leakage, centre, fit)
     u_centre = float(np.sqrt(0.5 * np.trace(centre)))
     to_come = float(np.hypot(u_centre, sheet.u_session_volt))
     states = fit.state(readings.left_out * (2 if known else 1))

@@ -191,7 +191,7 @@ def _told(
     sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
     keys, turn = _quantities(rail, fit, orders, sheet.start_m is not None)
     covariance = turn @ fit.covariance @ turn.T
-    found = quantities(keys, turn @ fit.x, covariance)
+    found = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
     count = len(orders)
     record = {}
     if count:

@@ -9,6 +9,7 @@ from catseye.records.readings import Readings
 from catseye.records.record import Within
 from catseye.records.refusal import refusal
 from catseye.reduction.calibration import Quantity
+from catseye.reduction.calibrations.fit import Fit
 from catseye.reduction.calibrations.kind import quantities
 from catseye.signal.cycles import fraction
 from catseye.signal.leakage import polar_covariance
@@ -39,7 +40,7 @@ def phasors(readings: Readings) -> np.ndarray:
     return first + 1j * second if pairs[0] == CARTESIAN else first * np.exp(1j * second)
 
 
-def polar_quantities(phasor: complex, covariance: np.ndarray) -> tuple[tuple[Quantity, ...], np.ndarray]:
+def polar_quantities(phasor: complex, covariance: np.ndarray, fit: Fit) -> tuple[tuple[Quantity, ...], np.ndarray]:
     """A leakage as amplitude and phase with their covariance, from its real and imaginary part."""
     polar = polar_covariance(phasor, covariance)
     keys = [
@@ -47,7 +48,10 @@ def polar_quantities(phasor: complex, covariance: np.ndarray) -> tuple[tuple[Qua
         ("leakage_phase_rad", "rad", "of it, in the phase frame of the converter"),
     ]
     values = np.array([abs(phasor), float(fraction(np.angle(phasor), 0.0))])
-    return quantities(keys, values, polar), polar
+    turn = np.zeros((2, len(fit.x)))
+    along = phasor / abs(phasor)
+    turn[:, :2] = [[along.real, along.imag], [-along.imag / abs(phasor), along.real / abs(phasor)]]
+    return quantities(keys, values, polar, fit=fit, turn=turn), polar
 
 
 def leakage_record(found: tuple[Quantity, ...], u_volt: float) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def _told(readings: Readings, fit: Fit, *, observed: np.ndarray, cycles: np.ndar
         ("scale_ppm", "ppm", "by which ranges are too long"),
     ][: len(fit.x)]
     covariance = fit.covariance * np.outer(scale, scale)
-    found = quantities(keys, fit.x * scale, covariance)
+    found = quantities(keys, fit.x * scale, covariance, fit=fit, turn=np.diag(scale))
     micrometre = 1e-3 * MILLIMETRE
     rows = tuple(
         (

@@ -38,11 +38,17 @@ def measure_repeatability(readings: Readings, reject: bool = False) -> Calibrati
 
     Source: [ISO19] section 7.4; u of a standard deviation s of v degrees of freedom is s/sqrt(2 v).
     """
+    from scipy.special import stdtrit
+
     on = np.flatnonzero(readings.active)
     value = readings.get("range_m") / MICROMETRE
     sets = readings.words["set"]
+    for row, name in enumerate(sets):
+        if not name:
+            raise readings.refuse(row, "set is empty (expected a word for it)")
     found = analysed(value[on], [sets[k] for k in on], level=readings.sheet.test_level)
-    means = {name: float(np.mean([value[k] for k in on if sets[k] == name])) for name in dict.fromkeys(sets)}
+    means = dict.fromkeys(sets, float("nan"))  # of a set that is left out as a whole nothing is known
+    means |= {name: float(np.mean([value[k] for k in on if sets[k] == name])) for name in {sets[k] for k in on}}
     rows = tuple(
         (sets[k], float(value[k] * MICROMETRE), float(value[k] - means[sets[k]]), float(means[sets[k]] - found.mean),
          f"left out: {readings.left_out[k]}" if readings.left_out[k] else "used")
@@ -74,8 +80,8 @@ def measure_repeatability(readings: Readings, reject: bool = False) -> Calibrati
         ),
         degrees_of_freedom=found.degrees_within,
         notes=(
-            f"mean {found.mean * MICROMETRE:.6f} m, u {found.u_mean:.2g} µm by the scatter alone; "
-            f"{found.degrees_between + 1} sets",
+            f"mean {found.mean * MICROMETRE:.6f} m, u {found.u_mean:.2g} µm by the scatter alone, of "
+            f"{found.degrees_between} degrees of freedom: {stdtrit(found.degrees_between, 0.975):.2f} u for 95 %",
         ),
         curve={
             "readings": (number[on], value[on] - found.mean),
@@ -94,15 +100,17 @@ def _deviations(found: Repeatability) -> tuple[np.ndarray, np.ndarray]:
     The mean squares are independent, each of variance 2 s^4 / v; between^2 is their difference over the size of a set.
     """
     within, between = found.within**2, found.between**2
-    size = (found.f - 1.0) * within / between if between > 0.0 else 1.0  # readings a set that count
+    size = found.usual  # readings a set that count
     squares = np.array([within, found.f * within])
     variance = np.diag(2.0 * squares**2 / [found.degrees_within, found.degrees_between])
     by_square = np.array([[1.0, 0.0], [-1.0 / size, 1.0 / size], [1.0 - 1.0 / size, 1.0 / size]])
-    if between == 0.0:
-        by_square[1:] = [[0.0, 0.0], [1.0, 0.0]]
     values = np.array([found.within, found.between, found.intermediate])
-    slope = by_square / (2.0 * np.where(values > 0.0, values, 1.0))[:, None]
-    return values, slope @ variance @ slope.T
+    covariance = by_square @ variance @ by_square.T
+    size_of = values.copy()
+    if between == 0.0:  # its square is uncertain all the same, its root as the root of that
+        size_of[1] = 0.5 * covariance[1, 1] ** 0.25
+    slope = 0.5 / size_of
+    return values, covariance * np.outer(slope, slope)
 
 
 RECIPE = Kind("scatter of ranges within and between sets", LAYOUT, measure_repeatability)

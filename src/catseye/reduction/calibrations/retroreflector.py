@@ -152,7 +152,7 @@ def _told(readings: Readings, fit: Fit, unknown: list[str]) -> Calibration:
         ("pc_mm" if count == 1 else f"pc_{name}_mm", "mm", f"range constant of {name}, added to the measured length")
         for name in unknown
     ]
-    found = quantities(keys, values, covariance)
+    found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
     hours, range_, on = readings.hours(), readings.get("range_m"), fit.active
     names = readings.words["retroreflector"]
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
