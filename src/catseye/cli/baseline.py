@@ -18,11 +18,12 @@ if TYPE_CHECKING:
     from catseye.reduction.baseline_lengths import BaselineSettings
 
 UNKNOWN = "unknown in the record where not given"
+LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
 
 
 def _above_zero(value: float | None) -> float | None:
-    if value is not None and not (0.0 < value < math.inf):
-        raise typer.BadParameter(f"{value} is not above zero.")
+    if value is not None and not (0.0 < value <= LARGEST):
+        raise typer.BadParameter(f"{value} is not above zero and at most {LARGEST:g}.")
     return value
 
 
@@ -48,7 +49,13 @@ def _day(value: str | None) -> str | None:
 
 
 def _u(name: str, what: str):
-    return typer.Option(name, callback=_uncertainty, help=what)
+    return typer.Option(name, callback=_modest, help=what)
+
+
+def _modest(value: float) -> float:
+    if _uncertainty(value) > LARGEST:
+        raise typer.BadParameter(f"{value} is no uncertainty of a distance meter (expected at most {LARGEST:g}).")
+    return value
 
 
 @app.command(

@@ -315,7 +315,7 @@ class _Job:
         The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.
         """
         index = self.lengths.index
-        column = -self.lengths.distance * (index - index[keep].mean())
+        column = -(self.lengths.stretch**2) * self.lengths.distance * (index - index[keep].mean())
         terms = self.cyclic_terms(cyclic)
         names = (*(terms.names if terms is not None else ()), "weather")
         columns = column[:, None] if terms is None else np.concatenate([terms.columns, column[:, None]], axis=1)

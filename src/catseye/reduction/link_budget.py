@@ -10,7 +10,7 @@ from catseye.optics.gaussian_beam import radius, returned_share, share_within
 from catseye.optics.prism import clear_share
 from catseye.optics.receiver import noise_density, signal_current, u_phase
 from catseye.reduction.link import Link, Reflector
-from catseye.signal.leakage import quadrature_range_error
+from catseye.signal.leakage import worst_range_error
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class LinkBudget:
     u_volt           V, standard uncertainty of each quadrature of the phasor
     u_phase          rad, from noise alone
     u_range          m, from noise alone
-    crosstalk_range  m, the largest error of the crosstalk that is left: a bias, not noise
+    crosstalk_range  m, the largest error of the crosstalk that is left: a bias, not noise; a quarter of half a
+                     wavelength where it is as large as the return
     noise_shares     name: share of the noise's density
     clipped          the amplitude exceeds the converter's range
     """
@@ -99,7 +100,7 @@ def link_budget(
         u_volt=u * amplitude,
         u_phase=u,
         u_range=u * half / TWO_PI,
-        crosstalk_range=float(quadrature_range_error(link.crosstalk / amplitude, 2.0 * half)),
+        crosstalk_range=float(worst_range_error(min(link.crosstalk / amplitude, 1.0), 2.0 * half)),
         noise_shares={name: part / density for name, part in parts.items()},
         clipped=amplitude > link.full_scale_volt,
     )
