@@ -23,10 +23,10 @@ check: setup  ## style, types, layers
 	$(BIN)/lint-imports
 
 test: check  ## check, then the tests
-	$(BIN)/python -m pytest
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
 
 test-all: check  ## the same with the long scatter and fault runs
-	$(BIN)/python -m pytest -m 'slow or not slow' --hypothesis-profile=explore
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m 'slow or not slow' --hypothesis-profile=explore
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01

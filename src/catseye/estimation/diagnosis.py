@@ -173,6 +173,13 @@ def _misfit(x: np.ndarray, given: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
 
+def _one_explains(solution: NetworkSolution) -> bool:
+    """Whether all but a hundredth of [pvv] is due to a single observation: without it [pvv] would fall by its w^2."""
+    largest = max(float(np.max(np.where(f.active, f.standardised**2, 0.0), initial=0.0)) for f in solution.fits)
+    squares = solution.variance_factor * solution.degrees_of_freedom
+    return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares
+
+
 def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
     """A guess, in words, at the cause: two points exchanged, or where most of the contradiction is."""
     network, names = solution.network, solution.network.points.names
@@ -182,7 +189,7 @@ def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution
             used = (end >= 0) & fit.active
             total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, len(names))
             number += np.bincount(end[used], minlength=len(names))
-    if solution.variance_factor > EXCHANGE_FROM:
+    if solution.variance_factor > EXCHANGE_FROM and not _one_explains(solution):
         few = len(names) <= EXCHANGE_ALL
         likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
         if not few:  # only the worst fitting of them, for the trials take long
