@@ -278,6 +278,11 @@ def test_priors_of_the_heads_show_in_the_covariance_and_grow_with_it(night_01, r
     ratio = [np.trace(c.block([p])) / np.trace(base.block([p])) for p in names]
     assert min(ratio) > 1.001  # more unknowns can only know less
     assert max(ratio) > 1.1
+    assert len(c.heads) == 12 * 4 + 18 + 18 * 4
+    value, u = c.heads["cyclic ZY116 sine 2"]
+    assert abs(value) < 5 * u
+    assert 0.0 < u < 0.02e-3 * (1 + 1e-9)  # never more than its prior
+    assert base.heads == {}
 
 
 @pytest.mark.parametrize("name", ["ZY104", "ZY116"])

@@ -104,6 +104,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
         "pose": surface.pose() if surface is not None else None,
         "surface": surface_object(reduction),
         "ranger_zeros": {name: {"zero": zero, "u_zero": u} for name, (zero, u) in coordinates.zeros.items()},
+        "head_effects": {name: {"value": value, "u": u} for name, (value, u) in coordinates.heads.items()},
         "air": estimated_air(reduction),
     }
 

@@ -10,7 +10,7 @@ FrameName = Literal["ground", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
 GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink
-PositionUncertainty = Annotated[float, Within(0, 2000, above=True)]  # mm, each coordinate; farther off is lost
+PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate; farther off is lost
 
 
 class Target(Record):

@@ -13,6 +13,7 @@ from catseye.estimation.robust import CHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
 from catseye.reduction.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.dish import dish_advice
+from catseye.reduction.head import head_unknowns
 from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, HEADS, THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
@@ -88,6 +89,7 @@ class Coordinates:
     shots        used shots at each point, fired there or from there
     ranges       every shot with a phase
     zeros        ranger: correction to its range, m, and standard uncertainty
+    heads        how far each effect of a head is off its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
     leakage      ranger: what is left of its leakage, V (real, imaginary)
     air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
     refractivity_ppm   mean group refractivity over the used paths
@@ -105,6 +107,7 @@ class Coordinates:
     shots: np.ndarray
     ranges: RangeShots
     zeros: dict[str, tuple[float, float]]
+    heads: dict[str, tuple[float, float]]
     leakage: dict[str, tuple[float, float]]
     air: dict[str, tuple[float, float]]
     refractivity_ppm: float
@@ -226,6 +229,12 @@ def _coordinates(
         start=np.array(layout.start)[columns].reshape(-1, 3),
         shots=np.array([count[n] for n in names]),
         ranges=ranges,
+        heads={
+            layout.names[column]: estimate(column)
+            for n in network.rangers
+            for unknown in head_unknowns(campaign, n)
+            for column in layout.columns(unknown.name, len(unknown.parts))
+        },
         zeros={n: estimate(layout.at[f"zero {n}"]) for n in network.rangers},
         leakage={n: (float(solution.x[c[0]]), float(solution.x[c[1]])) for n, c in leakage_at.items()},
         air=air,
