@@ -9,6 +9,7 @@ from catseye.signal.cycles import (
     CycleStatus,
     decision,
     fraction,
+    glass_phase,
     memo_whole_cycles,
     slip_probability,
     unwrapped_length,
@@ -159,3 +160,15 @@ def test_the_memos_rule_refuses_what_it_does_not_hold_for():
         with pytest.raises(ValidityError):
             memo_whole_cycles(coarse, phase, half)
     assert memo_whole_cycles([np.nan, 10.02], 0.0, 0.1).tolist() == [0, 100]  # equal phases: 3.13a, none added
+
+
+def test_the_notes_glass_offset_and_the_range_constant_are_one_correction():
+    half, length, constant = 0.099906, 57.123, -0.0334937
+    phase = fraction(-2 * np.pi * (length - constant) / half, 0.0)  # glass makes the way longer
+    n, _ = whole_cycles(length - constant, phase, half)
+    by_length = unwrapped_length(n, phase, half) + constant
+    by_phase = (n - phase / (2 * np.pi) - glass_phase(constant, half) / (2 * np.pi)) * half  # eq. 5.19
+    assert by_phase == pytest.approx(by_length, abs=1e-12)
+    assert by_length == pytest.approx(length, abs=1e-12)
+    with pytest.raises(ValidityError, match="half wavelength"):
+        glass_phase(constant, 0.0)

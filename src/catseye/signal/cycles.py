@@ -81,6 +81,26 @@ def unwrapped_length(
     return cycles * np.asarray(half_wavelength, dtype=float)
 
 
+def glass_phase(range_constant: ArrayLike, half_wavelength: ArrayLike) -> NDArray[np.float64]:
+    """The notes' glass calibration offset phi_ic, rad, of a target with a range constant Pc; any number of turns.
+
+    range_constant     m, negative or 0: added to the measured length
+    half_wavelength    m, above 0: half the modulation's group wavelength in air
+
+    5.19 takes phi_ic/2 pi from N - phi/2 pi, so that Pc = -phi_ic/2 pi half: light that is longer under way in glass
+    has a lower phase, and phi_ic is what it lacks. As a length Pc stays what it is when the air changes; phi_ic is not.
+
+    Source: [PARKER04] eq. 5.19. Exact.
+
+    >>> round(float(glass_phase(-0.0334937, 0.099906)), 6)
+    2.106451
+    """
+    half = np.asarray(half_wavelength, dtype=float)
+    if np.any(half <= 0.0):
+        raise ValidityError(f"half wavelength {float(half.min())} m is not above 0")
+    return -TWO_PI * np.asarray(range_constant, dtype=float) / half
+
+
 class CycleStatus(IntEnum):
     """What the whole cycles of one shot are worth: SURE, THIN (another number is conceivable) or UNKNOWN (no input)."""
 
