@@ -176,7 +176,7 @@ def phasors(
         from catseye.signal import phase_kernel
 
         cosine, sine = np.ascontiguousarray(wave.real), np.ascontiguousarray(wave.imag)
-    step = max(1, (16 if fast else 1) * BLOCK_SAMPLES // (m * n))
+    step = max(1, (128 if fast else 1) * BLOCK_SAMPLES // (m * n))
     for start in range(0, len(buffers), step):
         block, rows = buffers[start : start + step], slice(start, start + step)
         if fast:

@@ -11,7 +11,6 @@ from numba import njit
 from catseye.signal.cycle_scatter import BATCHES, COLLAPSE, FEWEST_FOR_BATCHES, FEWEST_FOR_DROPOUT
 from catseye.signal.folding import LANES, SAFE_ROWS
 
-FAR = 16  # fours of rows in a block, from which on its quarters are read side by side
 _AGAIN = {"reassoc", "contract"}  # sums may be reordered: samples are integers, nothing here is infinite
 _compiled = njit(cache=True, error_model="numpy", fastmath=_AGAIN, nogil=True)
 _inlined = njit(error_model="numpy", fastmath=_AGAIN)  # kept with their caller
@@ -27,19 +26,11 @@ def _fold(samples, n, lanes, acc, total):
     while row < rows:
         stop = min(rows, row + SAFE_ROWS)
         acc[:] = 0
-        # Four rows share one visit to acc. In a long block they lie a quarter of it apart: four streams keep the memory
-        # busier than one. In a short one they are neighbours.
-        fours = (stop - row) // 4
-        apart, step = (fours, 1) if fours >= FAR else (1, 4)
-        for k in range(fours):
-            r = row + k * step
-            one = samples[r * lanes : (r + 1) * lanes]
-            two = samples[(r + apart) * lanes : (r + apart + 1) * lanes]
-            three = samples[(r + 2 * apart) * lanes : (r + 2 * apart + 1) * lanes]
-            four = samples[(r + 3 * apart) * lanes : (r + 3 * apart + 1) * lanes]
+        while row + 4 <= stop:  # four rows share one visit to acc
+            four = samples[row * lanes : (row + 4) * lanes]
             for i in range(lanes):
-                acc[i] += (one[i] + two[i]) + (three[i] + four[i])
-        row += 4 * fours
+                acc[i] += (four[i] + four[lanes + i]) + (four[2 * lanes + i] + four[3 * lanes + i])
+            row += 4
         while row < stop:
             one = samples[row * lanes : (row + 1) * lanes]
             for i in range(lanes):
