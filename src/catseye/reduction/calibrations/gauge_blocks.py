@@ -16,7 +16,7 @@ from catseye.records.readings import TEXT, Layout, Readings, Sheet, Words
 from catseye.records.record import Record, Uncertainty, Within, broken_rule
 from catseye.reduction.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
 
 BLOCKS, SPACERS = "gauge-blocks", "spacers"
 LENGTH, TEMPERATURE = Within(0.1, 10_000), Within(-40, 60)
@@ -118,6 +118,7 @@ def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibr
         reject=reject,
         level=sheet.level,
     )
+    on, line = fit.active, np.argsort(length)
     keys = [
         ("zero_mm", "mm", "what it reads on a length of zero"),
         ("scale_ppm", "ppm", "by which it reads too long"),
@@ -127,7 +128,11 @@ def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibr
         title=f"{sheet.instrument} against gauge blocks",
         quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
         covariance=fit.covariance,
-        curve=_curve(length, fit, fit.predicted),
+        curve={
+            "readings": (length[on], 1e3 * (fit.predicted + fit.residual)[on]),
+            "left out": (length[~on], 1e3 * (fit.predicted + fit.residual)[~on]),
+            "fit": (length[line], 1e3 * fit.predicted[line]),
+        },
         axes=("length of the stack (mm)", "reads minus length (µm)"),
         method="What the instrument reads on stacks of gauge blocks, less the stacks' lengths at their temperature, is "
         "a zero and a scale. Each block's certificate is one parameter with a prior, whatever stacks it stands in; "
@@ -172,7 +177,7 @@ def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
         title=f"Spacers {', '.join(names)}" if len(names) < 5 else f"{len(names)} spacers",
         quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
         covariance=fit.covariance,
-        curve=_curve(np.arange(1.0, m + 1.0), fit, np.zeros(m)),  # lengths differ: residuals alone share an axis
+        curve=residuals_by_number(fit, 1e-3),  # lengths differ: residuals alone share an axis
         axes=("reading", "residual (µm)"),
         method="Readings corrected for the instrument's zero and scale are taken to 20 °C and averaged for each. "
         "Zero, scale, thermometer and expansion are parameters with priors that all spacers share.",
@@ -211,16 +216,6 @@ def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> 
         Effect("offset of the thermometer, °C", length * sheet.expansion_ppm_per_c * PPM, sheet.u_temperature_c),
         Effect("expansion, ppm/°C", length * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
     ]
-
-
-def _curve(x: np.ndarray, fit: Fit, predicted: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    on, line = fit.active, np.argsort(x)
-    total = predicted + fit.residual
-    return {
-        "readings": (x[on], 1e3 * total[on]),
-        "left out": (x[~on], 1e3 * total[~on]),
-        "fit": (x[line], 1e3 * predicted[line]),
-    }
 
 
 def _common(readings: Readings, fit: Fit, length: np.ndarray) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from catseye.records.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.record import Uncertainty, Within
 from catseye.reduction.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
 
 PRISM, BALL = "prism-constant", "ball-constant"
 PARTS = ("r1", "r2")
@@ -157,7 +157,6 @@ def _told(
          float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
         for k, state in enumerate(fit.state(readings.left_out))
     )  # fmt: skip
-    count, on = np.arange(1, len(readings) + 1), fit.active
     return Calibration(
         kind=kind,
         title=f"{what} constants of {sheet.instrument}",
@@ -174,11 +173,7 @@ def _told(
             f"{1e3 * sheet.u_index_ratio * abs(by_index[-1]):.2g} µm to the range constant",
             *scatter_notes(fit, "µm", 1e-3),
         ),
-        curve={
-            "readings": (count[on], 1e3 * fit.residual[on]),
-            "left out": (count[~on], 1e3 * fit.residual[~on]),
-            "fit": (count, np.zeros(len(count))),
-        },
+        curve=residuals_by_number(fit, 1e-3),
         axes=("reading", "residual (µm)"),
         method="Readings of the glass are taken to 20 °C and averaged with the offsets of gauge and thermometer and "
         "the expansion as parameters with priors. The constants follow from the dimensions and the ratio of the group "

@@ -15,7 +15,7 @@ from catseye.records.readings import Layout, Readings, Sheet
 from catseye.records.record import Uncertainty, Within
 from catseye.reduction.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
 
 KIND = "invar-wire"
 TENSION, TEMPERATURE, HEIGHT, SCALE = Within(5, 2000), Within(-40, 60), Within(-20_000, 20_000), Within(-1000, 1000)
@@ -191,8 +191,6 @@ def _told(readings: Readings, fit: Fit, seen: np.ndarray) -> Calibration:
         )
         for k, state in enumerate(fit.state(readings.left_out))
     )
-    count, on = np.arange(1, len(readings) + 1), fit.active
-    shares = sorted(fit.effects, key=lambda name: -fit.effects[name][1])
     return Calibration(
         kind=KIND,
         title=f"{'Distance by' if known is None else 'Length of'} Invar wire {sheet.instrument}",
@@ -206,14 +204,10 @@ def _told(readings: Readings, fit: Fit, seen: np.ndarray) -> Calibration:
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
             f"the scatter of the readings alone gives {1e3 * np.sqrt(fit.scattered[0, 0]):.2g} µm; systematic effects "
-            f"counted: {', '.join(shares) if shares else 'none'}",
+            f"counted: {', '.join(fit.effects) or 'none'}",
             *scatter_notes(fit, "µm", 1e-3),
         ),
-        curve={
-            "readings": (count[on], 1e3 * fit.residual[on]),
-            "left out": (count[~on], 1e3 * fit.residual[~on]),
-            "fit": (count, np.zeros(len(count))),
-        },
+        curve=residuals_by_number(fit, 1e-3),
         axes=("reading", "residual (µm)"),
         method="The wire hangs as an elastic catenary between the marks; its length is the certificate's at 20 °C and "
         "certified tension, taken to the temperature and the tension of each reading, and the end scales are added. "

@@ -75,6 +75,17 @@ def _coverage(degrees: np.ndarray) -> np.ndarray:
     return np.where(degrees < 1e9, stdtrit(most, ndtr(2.0)), 2.0)
 
 
+def residuals_by_number(fit: Fit, scale: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Curves of the residuals in order of the readings, in units of `scale`: for readings that share no other axis."""
+    count, on = np.arange(1, len(fit.residual) + 1), fit.active
+    residual = fit.residual / scale
+    return {
+        "readings": (count[on], residual[on]),
+        "left out": (count[~on], residual[~on]),
+        "fit": (count, np.zeros(len(count))),
+    }
+
+
 def scatter_notes(fit: Fit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
     """How the readings scatter and from how many degrees of freedom, in a unit of `scale` SI units.
 
