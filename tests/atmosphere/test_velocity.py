@@ -35,7 +35,10 @@ def ray(chord, k):
     def shot(rise):
         """From the middle, `rise` above the chord's middle, to where x is at the end."""
         n = N0 + slope * (top + rise - EARTH_RADIUS)
-        end = lambda s, state: state[0] - 0.5 * chord  # noqa: E731
+
+        def end(s, state):
+            return state[0] - 0.5 * chord
+
         end.terminal = True
         found = solve_ivp(rates, (0, chord), [0, top + rise, n, 0, 0], events=end, rtol=1e-13, atol=1e-10)
         return found.t[-1], found.y[1, -1] - top, found.y[4, -1]

@@ -7,9 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
-
 DATA = Path(__file__).parents[2] / "examples" / "baselines" / "busselton"
 TS30, TS16 = DATA / "ts30-baseline-observations.csv", DATA / "ts16-calibration-observations.csv"
 HEIGHTS = DATA / "pillar-heights.csv"
@@ -17,19 +14,9 @@ KEYS = {"zero", "u_zero", "scale_ppm", "u_scale_ppm", "cyclic", "s", "degrees_of
 
 
 @pytest.fixture
-def catseye(capsys):
-    """The command in this process: exit status, what it said, what it complained of."""
-    import typer
-
-    import catseye.cli.baseline  # noqa: F401
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main(["baseline", *map(str, arguments)], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
+def catseye(catseye):
+    """The command `baseline`."""
+    return lambda *arguments: catseye("baseline", *arguments)
 
 
 def test_the_pillars_then_an_instrument_against_them(catseye, tmp_path):

@@ -7,9 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
-
 EXAMPLES = Path(__file__).parents[2] / "examples" / "calibrations"
 # The truth of each example stands in the comment of its sheet.
 TRUTH = {
@@ -39,22 +36,6 @@ WRONG = {
     "amplitude-to-phase": 9, "oscillator": None, "repeatability": None, "prism-constant": 3,
     "ball-constant": None, "gauge-blocks": 12, "spacers": None, "invar-wire": 6,
 }  # fmt: skip
-
-
-@pytest.fixture
-def catseye(capsys):
-    """The command in this process: exit status, what it said, what it complained of."""
-    import typer
-
-    import catseye.cli.calibrate  # noqa: F401
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
 
 
 @pytest.mark.parametrize("kind", TRUTH)

@@ -5,27 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
 from catseye.gateways.explain_page import MARK
 
 NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
-
-
-@pytest.fixture
-def catseye(capsys):
-    """The command in this process: exit status, what it said, what it complained of."""
-    import typer
-
-    import catseye.cli.explain  # noqa: F401
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
 
 
 def test_a_shot_is_one_json_object_and_nothing_on_stderr(catseye):

@@ -3,24 +3,6 @@
 import json
 
 import pytest
-import typer
-
-import catseye.cli.link
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
-
-
-@pytest.fixture
-def catseye(capsys):
-    """The command in this process: exit status, what it said, what it complained of."""
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
 
 
 def test_a_measured_return_sets_the_gain_and_an_oblique_one_is_weaker(catseye):

@@ -6,29 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
-
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples" / "networks"
 VECTORS = ROOT / "tests" / "vectors" / "networks"
 KEYS = {"points", "variance_factor", "degrees_of_freedom", "observations", "suspects", "status"}
-
-
-@pytest.fixture
-def catseye(capsys, monkeypatch):
-    """The command in this process: exit status, what it said, what it complained of."""
-    import typer
-
-    import catseye.cli.networks  # noqa: F401
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
 
 
 @pytest.fixture

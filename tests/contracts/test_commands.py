@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from catseye import __version__
 from catseye.atmosphere.air import MODELS
-from catseye.cli import commands
+from catseye.cli import baseline, calibrate, commands, explain, link, networks  # noqa: F401  all join the app
 from catseye.cli.commands import app
 
 ROOT = Path(__file__).parents[2]
@@ -201,7 +201,7 @@ def test_help_names_every_air_model():
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_help_has_an_example_that_parses(command, tmp_path, monkeypatch):
     text = CliRunner().invoke(app, [command, "--help"]).stdout
-    example = shlex.split(re.search(r"Example: catseye (.+)", text)[1])
+    example = shlex.split(re.search(r"Examples?: catseye (.+)", text)[1])
     assert example[0] == command
     parser = typer.main.get_command(app).commands[command]
     with parser.make_context(command, example[1:]) as context:

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from catseye.errors import EstimationError, ValidityError
+from catseye.signal.columns import fit_columns
 from catseye.signal.cycles import fraction, unwrapped_length
 from catseye.signal.cyclic import (
     cyclic_design,
     cyclic_orders,
     cyclic_range,
     cyclic_slope,
-    fit_columns,
     fit_cyclic,
     imbalance_range,
     leakage_range,

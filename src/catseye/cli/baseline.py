@@ -59,8 +59,9 @@ def _modest(value: float) -> float:
 
 
 @app.command(
-    epilog="\b\nExample: catseye baseline observations.csv --heights heights.csv --write BASELINE.toml\n"
-    "         catseye baseline instrument.csv --heights heights.csv --against BASELINE.toml --out report"
+    epilog="\b\nExample: catseye baseline ts30-baseline-observations.csv --heights pillar-heights.csv --write B.toml\n"
+    "         catseye baseline ts16-calibration-observations.csv --heights pillar-heights.csv --against B.toml\n"
+    "These files: examples/baselines/busselton"
 )
 def baseline(
     observations: Annotated[

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
-from catseye.signal.cyclic import Columns, fit_columns
+from catseye.signal.columns import Columns, fit_columns
 
 Array = NDArray[np.float64]
 

@@ -183,3 +183,15 @@ def test_few_sessions_are_said_to_tell_little(table):
         z = TRUE + 3e-4 * noise(rng, 4 * count)
         decision = leakage.calibrate_leakage(blocked(table, z, np.arange(4 * count) // 4)).decisions[0]
         assert (decision.name, decision.passed) == ("sessions", passed)
+
+
+def test_a_scatter_between_sessions_that_comes_out_as_zero_is_not_taken_for_known(table):
+    """Buffers alone would have 2 (24 - 1) degrees of freedom; six sessions that might differ have fewer."""
+    rng = np.random.default_rng(11)
+    while True:
+        z = TRUE + 3e-4 * noise(rng, 24)
+        found = leakage.calibrate_leakage(blocked(table, z, np.arange(24) // 4))
+        if any("between sessions: 0 mV" in note for note in found.notes):
+            break
+    known = leakage.calibrate_leakage(blocked(table, z, np.arange(24) // 4, u_session_volt=1e-12))
+    assert found.quantities[0].coverage > 1.05 * known.quantities[0].coverage
