@@ -1,5 +1,6 @@
 """What single retroreflectors and feed-arm rangers are: targets.toml, feedarm.toml, benchmarks.csv."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -10,6 +11,7 @@ FrameName = Literal["ground", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
 GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink
+SQUARE = 2e-3  # cosine: directions are written with three digits or more
 PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate; farther off is lost
 
 
@@ -59,12 +61,29 @@ class FeedArmRanger(Record):
     """A ranger on the feed arm: its scan point is known nominally, in the reflector frame.
 
     u_position_mm   of each coordinate of the scan point; without it the reduction's setting, 10 mm, counts
+    mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
     """
 
     name: Name
     zp: Name
     nominal_scan_point_mm: Position
     u_position_mm: PositionUncertainty | None = None
+    mount_z: UnitVector | None = None
+    mount_y: UnitVector | None = None
+
+    @model_validator(mode="after")
+    def _knows_two_axes_across_each_other(self) -> "FeedArmRanger":
+        for key, other in (("mount_z", "mount_y"), ("mount_y", "mount_z")):
+            if getattr(self, key) is None and getattr(self, other) is not None:
+                raise broken_rule(f"{other} = {list(getattr(self, other))} has no {key} (expected both or none)")
+        if self.mount_z is not None and self.mount_y is not None:
+            along = sum(z * y for z, y in zip(self.mount_z, self.mount_y, strict=True))
+            if abs(along) > SQUARE:
+                raise broken_rule(
+                    f"mount_y = {list(self.mount_y)} is {math.degrees(math.acos(max(-1.0, min(1.0, along)))):.2f} deg "
+                    f"from mount_z = {list(self.mount_z)} (expected 90, within {math.degrees(SQUARE):.1f})"
+                )
+        return self
 
 
 class AimPoint(Record):
