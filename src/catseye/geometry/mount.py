@@ -57,3 +57,20 @@ def scan_point(fixed_point: ArrayLike, gamma_matrix: ArrayLike, mirror_offset: A
     """
     offset = np.asarray(mirror_offset, dtype=float)
     return np.asarray(fixed_point, dtype=float) + np.einsum("...ji,...j->...i", np.asarray(gamma_matrix), offset)
+
+
+def mount_angles(gamma_matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """alpha1 (...), alpha2 (...) in [-pi/2, pi/2] and alpha3 (...), rad, of a mount however it is turned.
+
+    gamma_matrix    (..., 3, 3), ground to mount axes, orthonormal
+
+    Source: [PARKER04] eq. 2.5 solved; the factors are taken off one by one, so that `gamma` of the answer is the matrix
+    to 1e-15 also where alpha2 is a quarter turn and the other two angles turn about one axis.
+
+    >>> [round(float(a), 9) for a in mount_angles(gamma(1.008848, -0.000024, 0.000145))]
+    [1.008848, -2.4e-05, 0.000145]
+    """
+    g = np.asarray(gamma_matrix, dtype=float)
+    alpha1 = np.arctan2(g[..., 0, 1], g[..., 0, 0])
+    tipped = g @ np.swapaxes(ry(alpha1) @ P, -1, -2)  # Rx(alpha3) Rz(alpha2)
+    return alpha1, np.arctan2(tipped[..., 0, 1], tipped[..., 0, 0]), np.arctan2(tipped[..., 1, 2], tipped[..., 2, 2])

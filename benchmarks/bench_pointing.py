@@ -1,0 +1,105 @@
+"""Encoder counts of 18 rangers for 10^5 points each, beside what a user would write instead.
+
+Medians of interleaved rounds; ours takes a thread a processor, the others one.
+python benchmarks/bench_pointing.py
+"""
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+from threadpoolctl import threadpool_limits
+
+from catseye.geometry.pointing import Station, aim, counts
+
+ROUNDS = 9
+RANGERS, POINTS = 18, 100_000
+
+
+def scene() -> tuple[Station, np.ndarray]:
+    """Twelve rangers on a ring of 120 m and six in the air, points all over the telescope."""
+    rng = np.random.default_rng(5)
+    turn = np.arange(RANGERS) * 2.0 * np.pi / 12
+    ground = np.stack([120 * np.cos(turn), 120 * np.sin(turn), np.where(np.arange(RANGERS) < 12, 0.0, 70.0)], axis=1)
+    alpha = np.stack([np.pi / 2 + turn, *rng.normal(0.0, 1e-3, (2, RANGERS))], axis=1)
+    offset = np.array([0.0, 0.247, 0.0]) + rng.normal(0.0, 1e-3, (RANGERS, 3))
+    station = Station(ground, alpha, offset, rng.normal(0, 5e-4, (RANGERS, 2)), rng.integers(-5000, 5000, (RANGERS, 2)))
+    points = np.stack([*rng.uniform(-60, 60, (2, POINTS)), rng.uniform(5, 110, POINTS)], axis=1)
+    return station, points
+
+
+def whole_arrays(station: Station, points: np.ndarray) -> np.ndarray:
+    """The transformation as a numpy user writes it: one array expression a step."""
+    mirror = (points - station.scan_point[:, None]) @ np.swapaxes(station.mirror_from_ground, -1, -2)
+    x, y, z = mirror[..., 0], mirror[..., 1], mirror[..., 2]
+    theta = np.arctan2(y, x)
+    theta = np.where(theta < -np.pi / 2, theta + 2 * np.pi, theta)
+    phi = np.arccos(z / np.sqrt(x**2 + y**2 + z**2))
+    na = 1e5 * theta / (2 * np.pi) + station.zeros[:, :1]
+    return np.stack([na, 1e5 * phi / (4 * np.pi) + station.zeros[:, 1:]], axis=-1)
+
+
+def scipy_rotations(station: Station, points: np.ndarray) -> np.ndarray:
+    """The same through scipy's rotations, one ranger at a time."""
+    from scipy.spatial.transform import Rotation
+
+    answer = np.empty((RANGERS, len(points), 2))
+    for i in range(RANGERS):
+        mirror = Rotation.from_matrix(station.mirror_from_ground[i]).apply(points - station.scan_point[i])
+        theta = np.arctan2(mirror[:, 1], mirror[:, 0])
+        answer[i, :, 0] = 1e5 * np.where(theta < -np.pi / 2, theta + 2 * np.pi, theta) / (2 * np.pi)
+        answer[i, :, 1] = 1e5 * np.arctan2(np.hypot(mirror[:, 0], mirror[:, 1]), mirror[:, 2]) / (4 * np.pi)
+    return answer + station.zeros[:, None]
+
+
+@njit(cache=True, error_model="numpy")
+def _write_only(matrix, points, out):
+    """The machine's limit for this size: the points read and the answers written, nothing computed."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j, 0] = points[j, 0] + matrix[i, 0, 0]
+            out[i, j, 1] = points[j, 1] + points[j, 2]
+
+
+def stream(station: Station, points: np.ndarray) -> np.ndarray:
+    out = np.empty((RANGERS, len(points), 2))
+    _write_only(station.mirror_from_ground, points, out)
+    return out
+
+
+def plain(station: Station, points: np.ndarray) -> np.ndarray:
+    found = aim(station[:, None], points)
+    return np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+
+
+def main() -> None:
+    station, points = scene()
+    contenders: dict[str, Callable[[], np.ndarray]] = {
+        "catseye": lambda: counts(station[:, None], points),
+        "limit: read the points, write as much": lambda: stream(station, points),
+        "catseye's plain form (numpy, with range)": lambda: plain(station, points),
+        "numpy, whole arrays": lambda: whole_arrays(station, points),
+        "scipy rotations, a ranger at a time": lambda: scipy_rotations(station, points),
+    }
+    with threadpool_limits(1):
+        answers = {name: job() for name, job in contenders.items()}
+        spent: dict[str, list[float]] = {name: [] for name in contenders}
+        for _ in range(ROUNDS):
+            for name, job in contenders.items():
+                start = time.perf_counter()
+                job()
+                spent[name].append(time.perf_counter() - start)
+    ours = statistics.median(spent["catseye"])
+    sys.stdout.write(f"{RANGERS} rangers x {POINTS:.0e} points to counts\n")
+    for name, times in spent.items():
+        took = statistics.median(times)
+        apart = np.abs(answers[name] - answers["catseye"]).max()
+        same = "" if name.startswith("limit") else f"   counts apart {apart:.1e}"
+        sys.stdout.write(f"  {name:<42}{answers[name].size / 2e6 / took:8.1f} M/s   {took / ours:7.2f} x ours{same}\n")
+
+
+if __name__ == "__main__":
+    main()

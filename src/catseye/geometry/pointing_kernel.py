@@ -1,0 +1,122 @@
+"""The compiled form of `pointing.counts`: every station to every point, blocks of points that stay in the first cache.
+
+Arctangents are a polynomial without branches, so that a whole vector register of points goes through at once; the plain
+form in `pointing` is its test. Import it only when a problem is large.
+
+atan(t) = t Q(t^2) for |t| <= tan(pi/8), where the larger part of (x, y) divides; beyond, atan(a/b) = pi/4 +
+atan((a - b)/(a + b)). Q interpolates atan(sqrt(s))/sqrt(s) at the Chebyshev points of [0, tan^2(pi/8)] (mpmath's
+chebyfit, 50 digits); it is good to 3.5e-17.
+"""
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numba import njit
+
+LANES = 128  # points a block
+MOST_THREADS = 4
+EIGHTH = math.tan(math.pi / 8.0)
+QUARTER, HALF, WHOLE = math.pi / 4.0, math.pi / 2.0, math.pi
+AZIMUTH, ELEVATION = 1e5 / (2.0 * math.pi), 1e5 / (4.0 * math.pi)  # counts a radian of Theta and of Phi
+NOT_A_NUMBER = math.nan
+Q = (
+    1.0,
+    -0.3333333333332844,
+    0.1999999999885511,
+    -0.14285714180976467,
+    0.11111106180455946,
+    -0.09090773074808414,
+    0.07689953496306857,
+    -0.06640233930429408,
+    0.056883492268090106,
+    -0.04348052215716462,
+    0.021135373157693246,
+)
+Q0, Q1, Q2, Q3, Q4, Q5, Q6, Q7, Q8, Q9, Q10 = Q
+
+_compiled = njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
+_inlined = njit(error_model="numpy", fastmath={"contract"})
+
+
+@_inlined
+def _first_quadrant(a, b):
+    """atan(a / b), rad, in [0, pi/2] for a, b of 0 or more; 0 for both zero."""
+    low, high = min(a, b), max(a, b)
+    beyond = low > EIGHTH * high
+    top = low - high if beyond else low
+    base = low + high if beyond else high
+    t = top / (base if base > 0.0 else 1.0)
+    s = t * t
+    q = Q10
+    q = q * s + Q9
+    q = q * s + Q8
+    q = q * s + Q7
+    q = q * s + Q6
+    q = q * s + Q5
+    q = q * s + Q4
+    q = q * s + Q3
+    q = q * s + Q2
+    q = q * s + Q1
+    q = q * s + Q0
+    angle = t * q + (QUARTER if beyond else 0.0)
+    return HALF - angle if a > b else angle
+
+
+@_compiled
+def _fill(matrix, origin, zeros, points, counts):
+    x, y, z = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    azimuth, elevation = np.empty(LANES), np.empty(LANES)
+    for first in range(0, points.shape[0], LANES):
+        lanes = min(LANES, points.shape[0] - first)
+        for j in range(LANES):
+            row = first + min(j, lanes - 1)
+            x[j], y[j], z[j] = points[row, 0], points[row, 1], points[row, 2]
+        for i in range(matrix.shape[0]):
+            m00, m01, m02 = matrix[i, 0, 0], matrix[i, 0, 1], matrix[i, 0, 2]
+            m10, m11, m12 = matrix[i, 1, 0], matrix[i, 1, 1], matrix[i, 1, 2]
+            m20, m21, m22 = matrix[i, 2, 0], matrix[i, 2, 1], matrix[i, 2, 2]
+            o0, o1, o2 = origin[i, 0], origin[i, 1], origin[i, 2]
+            na0, ne0 = zeros[i, 0], zeros[i, 1]
+            for j in range(LANES):
+                dx, dy, dz = x[j] - o0, y[j] - o1, z[j] - o2
+                u = m00 * dx + m01 * dy + m02 * dz
+                v = m10 * dx + m11 * dy + m12 * dz
+                w = m20 * dx + m21 * dy + m22 * dz
+                theta = _first_quadrant(abs(v), abs(u))
+                theta = WHOLE - theta if u < 0.0 else theta
+                theta = -theta if v < 0.0 else theta
+                theta = theta + 2.0 * WHOLE if theta < -HALF else theta
+                across = math.sqrt(u * u + v * v)
+                phi = _first_quadrant(across, abs(w))
+                phi = WHOLE - phi if w < 0.0 else phi
+                nowhere = 0.0 if across + abs(w) > 0.0 else NOT_A_NUMBER  # in the scan point itself
+                azimuth[j] = theta * AZIMUTH + na0 + nowhere
+                elevation[j] = phi * ELEVATION + ne0 + nowhere
+            for j in range(lanes):
+                counts[i, first + j, 0] = azimuth[j]
+                counts[i, first + j, 1] = elevation[j]
+
+
+def stations_by_points(matrix: np.ndarray, origin: np.ndarray, zeros: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Counts (s, n, 2), azimuth and elevation, of n points (n, 3), m, ground, for s stations.
+
+    matrix    (s, 3, 3), ground to mirror axes
+    origin    (s, 3), m, the scan points
+    zeros     (s, 2), counts: na0, ne0
+
+    Source: [PARKER04] eq. 2.12 to 2.22. Equal to `pointing.aim` within 1e-9 counts, but for points within a milliradian
+    of the azimuth axis, where Theta amplifies the rounding of both. At most four threads, one a processor.
+    """
+    counts = np.empty((len(matrix), len(points), 2))
+    parts = np.array_split(np.arange(len(points)), min(os.cpu_count() or 1, MOST_THREADS))
+    with ThreadPoolExecutor(len(parts)) as pool:  # the kernel holds no lock; writing new memory costs as much as it
+        jobs = [
+            pool.submit(_fill, matrix, origin, zeros, points[part[0] : part[-1] + 1], counts[:, part[0] : part[-1] + 1])
+            for part in parts
+            if len(part)
+        ]
+        for job in jobs:
+            job.result()
+    return counts
