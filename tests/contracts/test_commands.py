@@ -14,7 +14,16 @@ from typer.testing import CliRunner
 
 from catseye import __version__
 from catseye.atmosphere.air import MODELS
-from catseye.cli import baseline, calibrate, commands, explain, link, networks  # noqa: F401  all join the app
+from catseye.cli import (  # noqa: F401  all join the app
+    baseline,
+    calibrate,
+    certificate,
+    commands,
+    explain,
+    link,
+    networks,
+    point,
+)
 from catseye.cli.commands import app
 
 ROOT = Path(__file__).parents[2]

@@ -1,12 +1,26 @@
-"""From records to stations: which mirror stands how, how well that is known, and where it may turn."""
+"""From records to stations, and to the counts of one mirror for given points: CAL.EQ."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
+from catseye.geometry.encoder import (
+    COUNTS_PER_TURN,
+    autocollimation_counts,
+    back_retro_counts,
+    prime_counts,
+    within,
+)
 from catseye.geometry.frame import Transform
-from catseye.geometry.imperfect import Imperfections
-from catseye.geometry.pointing import Station
+from catseye.geometry.imperfect import (
+    Imperfections,
+    imperfect_back_counts,
+    imperfect_counts,
+    imperfect_face_counts,
+)
+from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
 from catseye.records.mirror import MirrorGeometry
 from catseye.records.monument import MonumentGeometry
 from catseye.records.target import FeedArmRanger
@@ -92,3 +106,75 @@ def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tu
     beta = [u(mirror, "u_beta_rad")] * 2
     zeros = [u(mirror, "u_zero_counts")] * 2
     return np.diag(np.square([*place, *turn, *offset, *beta, *zeros])), tuple(lacking)
+
+
+@dataclass(frozen=True, eq=False)
+class Pointings:
+    """Where one mirror looks for n points, everything (n,) unless said otherwise; CAL.EQ's answer and more.
+
+    to                   (n, 3), m, ground
+    aim                  range, Theta, Phi and counts of the six transformations
+    counts               (n, 2) of the direct pointing, offsets, tilts and encoder errors of the record included
+    prime                (n, 2) of the prime pointing: half a turn up or down, whichever is allowed, up where neither is
+    autocollimation, back_retro   elevation counts at which the face, or the retroreflector behind it, looks there
+    allowed, prime_allowed        azimuth within the limits
+    u                    (n, 2), counts, of the direct pointing by the records; NaN where they do not say it all
+    lacking              keys of uncertainties that the records lack
+    """
+
+    to: np.ndarray
+    aim: Aim
+    counts: np.ndarray
+    prime: np.ndarray
+    autocollimation: np.ndarray
+    back_retro: np.ndarray
+    allowed: np.ndarray
+    prime_allowed: np.ndarray
+    u: np.ndarray
+    lacking: tuple[str, ...]
+
+
+def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
+    """Encoder counts of one mirror for points (n, 3), m, ground.
+
+    Raises InputError for a point that has no direction, or that the beam of this mirror does not meet.
+
+    Source: [PARKER04] Figure 2.5 (CAL.EQ), eq. 2.12 to 2.26.
+    """
+    station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
+    found = aim(station, to)
+    low, high = mirror.az_low_limit, mirror.az_high_limit
+    direct = np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+    if imperfections is None:
+        prime = np.stack(prime_counts(direct[:, 0], direct[:, 1], station.zeros[1]), axis=-1)
+        face = autocollimation_counts(found.phi, station.zeros[1])
+        back = back_retro_counts(found.phi, station.zeros[1])
+    else:
+        prime = imperfect_counts(station, imperfections, to, prime=True)
+        direct = imperfect_counts(station, imperfections, to)
+        both = imperfect_face_counts(station, imperfections, to)
+        face, back = both[:, 1], imperfect_back_counts(station, imperfections, both)
+    for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
+        raise InputError(
+            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {found.range[k]:.4g} m from the scan point of "
+            f"{mirror.zp} on {monument.monument}, {np.degrees(found.phi[k]):.4g} deg from its azimuth axis: no setting "
+            "of the mirror looks there"
+        )
+    lower = prime[:, 0] - COUNTS_PER_TURN
+    down = ~within(prime[:, 0], low, high) & within(lower, low, high)
+    prime = np.column_stack([np.where(down, lower, prime[:, 0]), prime[:, 1]])
+    covariance, lacking = station_covariance(monument, mirror)
+    spread = counts_covariance(station, to, of_station=covariance)
+    u = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
+    return Pointings(
+        to=to,
+        aim=found,
+        counts=direct,
+        prime=prime,
+        autocollimation=face,
+        back_retro=back,
+        allowed=within(direct[:, 0], low, high),
+        prime_allowed=within(prime[:, 0], low, high),
+        u=np.full_like(u, np.nan) if lacking else u,
+        lacking=lacking,
+    )

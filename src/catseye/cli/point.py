@@ -1,0 +1,137 @@
+"""The command of pointing."""
+
+import math
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catseye.cli.commands import Json, app
+from catseye.cli.terminal import say
+
+EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
+DAY = 86_400.0
+
+
+def _time(text: str | None) -> str | None:
+    """As given, if it can be read: an MJD, or UTC as 2003-09-07T15:12:09Z."""
+    if text is not None:
+        _mjd(text)
+    return text
+
+
+def _mjd(text: str) -> float:
+    if re.fullmatch(r"[0-9]+(\.[0-9]*)?", text):
+        return float(text)
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError as problem:
+        raise typer.BadParameter(f"{text!r} is neither an MJD nor a time such as 2003-09-07T15:12:09Z.") from problem
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=UTC)
+    return (moment - EPOCH).total_seconds() / DAY
+
+
+def _points(texts: list[str] | None) -> list[str] | None:
+    for text in texts or []:
+        _triple(text)
+    return texts
+
+
+def _triple(text: str) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(math.isfinite(v) for v in numbers):
+        raise typer.BadParameter(f"{text!r} is not x,y,z in metres.")
+    return numbers
+
+
+def _cone(value: float | None) -> float | None:
+    if value is not None and not 0.5 <= value <= 60.0:
+        raise typer.BadParameter(f"{value} is not 0.5 to 60 degrees.")
+    return value
+
+
+@app.command(
+    epilog="\b\nExample: catseye point --monument examples/night-01/monuments/ZY103.toml "
+    "--mirror examples/night-01/mirrors/ZP103.toml --to=0,0,50\n"
+    "With the Sun: add --at 2003-09-10T14:00:00Z --longitude-deg=-79.84"
+)
+def point(
+    monument: Annotated[Path, typer.Option("--monument", metavar="M.toml", help="Record of the monument.")],
+    mirror: Annotated[Path, typer.Option("--mirror", metavar="Z.toml", help="Record of the mirror on it.")],
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--to", metavar="X,Y,Z", callback=lambda v: _points(v or []), help="Point, ground, m; may repeat."
+        ),
+    ] = None,
+    file: Annotated[
+        Path | None, typer.Option("--file", metavar="coord.dat", help="Points, a line each: x y z in mm, # comments.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="output.dat", help="Table to write, as CAL.EQ did.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", metavar="TIME", callback=_time, help="UTC or MJD: is the Sun in the way?"),
+    ] = None,
+    latitude_deg: Annotated[
+        float | None, typer.Option("--latitude-deg", help="Of the site; the monument's record if not given.")
+    ] = None,
+    longitude_deg: Annotated[
+        float | None, typer.Option("--longitude-deg", help="East positive; the monument's record if not given.")
+    ] = None,
+    sun_cone_deg: Annotated[
+        float | None, typer.Option("--sun-cone-deg", callback=_cone, help="Half angle kept from the Sun.  [default: 5]")
+    ] = None,
+    keep_out: Annotated[
+        Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="Boxes that no beam may enter.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun and keep-out boxes."""
+    import numpy as np
+
+    from catseye.gateways.objects import json_line
+    from catseye.gateways.pointing_objects import MARK, output_dat, pointing_objects, pointing_remarks, pointing_table
+    from catseye.records.coordinate_list import read_coordinates
+    from catseye.records.keep_out import KeepOut
+    from catseye.records.mirror import MirrorGeometry
+    from catseye.records.monument import MonumentGeometry
+    from catseye.records.reading import read_record
+    from catseye.reduction.pointing import point as pointed
+    from catseye.reduction.pointing import station_of
+    from catseye.reduction.sighting import place_of_monument, sightings
+
+    if bool(to) == (file is not None):
+        raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
+    stands, mirrors = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
+    where = np.array([_triple(text) for text in to or []]) if file is None else read_coordinates(file)
+    zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
+    if sun_cone_deg is not None:
+        zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})
+    mjd = None if at is None else _mjd(at)
+    place = None if mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
+    found = pointed(stands, mirrors, where)
+    station = station_of(stands, mirrors)
+    seen = []
+    if mjd is not None or zones.box:
+        seen = sightings(station, found.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones)
+    if write is not None:
+        from catseye.gateways.output import whole_file
+
+        with whole_file(write, "--write", MARK) as page:
+            page.append(output_dat(found, f"{mirrors.zp} on {stands.monument}"))
+    if json:
+        say(json_line(pointing_objects(found, seen)))
+        return
+    say(pointing_table(found))
+    if stands.zp is not None and stands.zp != mirrors.zp:
+        say(f"{mirrors.zp} is not the mirror that the record of {stands.monument} names, {stands.zp}")
+    for remark in pointing_remarks(found, seen):
+        say(remark)

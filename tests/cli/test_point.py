@@ -1,0 +1,204 @@
+"""`catseye point`: counts for people and programs, files of CAL.EQ, stops, Sun and boxes, refusals."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ZY3, ZP3 = ROOT / "examples/monuments/ZY3.toml", ROOT / "examples/mirrors/ZP3.toml"
+NOTES = ["--monument", ZY3, "--mirror", ZP3]
+NIGHT = [
+    "--monument",
+    ROOT / "examples/night-01/monuments/ZY103.toml",
+    "--mirror",
+    ROOT / "examples/night-01/mirrors/ZP103.toml",
+]
+KEYS = {
+    "to",
+    "range",
+    "theta",
+    "phi",
+    "azimuth_counts",
+    "elevation_counts",
+    "autocollimation_counts",
+    "back_retro_counts",
+    "prime",
+    "allowed",
+}
+SUNNY = ["--at", "2003-09-10T14:00:00Z", "--longitude-deg=-79.84"]
+
+
+def answer(catseye, *arguments):
+    status, said, complaint = catseye("point", *arguments, "--json")
+    assert (status, complaint) == (0, "")
+    return json.loads(said, parse_constant=pytest.fail)
+
+
+def test_the_answer_is_a_list_with_the_agreed_keys(catseye):
+    found = answer(catseye, *NOTES, "--to=0,100,20", "--to=-30,5,60")
+    assert [item["to"] for item in found] == [[0.0, 100.0, 20.0], [-30.0, 5.0, 60.0]]
+    for item in found:
+        assert set(item) >= KEYS
+        assert set(item["prime"]) == {"azimuth_counts", "elevation_counts", "allowed"}
+    first = found[0]  # by the program of the notes' figure 2.5, run by hand
+    assert first["range"] == pytest.approx(81.76955970426295, abs=1e-9)
+    assert first["azimuth_counts"] == pytest.approx(576.8106307472071, abs=1e-6)
+    assert first["elevation_counts"] == pytest.approx(12423.739743706377, abs=1e-6)
+    assert first["autocollimation_counts"] == pytest.approx(29782.479487412755, abs=1e-6)
+    assert first["back_retro_counts"] == pytest.approx(79782.479487412755, abs=1e-6)
+    assert first["prime"]["elevation_counts"] == pytest.approx(2 * -4935 - 12423.739743706377, abs=1e-6)
+
+
+def test_prime_goes_half_a_turn_up_or_down_whichever_is_allowed(catseye):
+    for item in answer(catseye, *NIGHT, "--to=0,0,50", "--to=-20,30,40", "--to=90,90,1", "--to=-90,90,80"):
+        up = item["azimuth_counts"] + 50_000
+        allowed = [v for v in (up, up - 100_000) if -21_309 <= v <= 75_691]
+        assert item["prime"]["allowed"] == bool(allowed)
+        assert item["prime"]["azimuth_counts"] == pytest.approx(allowed[0] if allowed else up, abs=1e-6)
+        assert item["allowed"] == (-21_309 <= item["azimuth_counts"] <= 75_691)
+
+
+def test_a_coord_dat_gives_what_the_same_points_give(catseye, tmp_path):
+    (tmp_path / "coord.dat").write_text("# test range\n0 100000 20000  # first\n\n-30000.0 5e3 60000\n")
+    from_file = answer(catseye, *NOTES, "--file", tmp_path / "coord.dat", "--write", tmp_path / "output.dat")
+    assert from_file == answer(catseye, *NOTES, "--to=0,100,20", "--to=-30,5,60")
+    rows = [line.split() for line in (tmp_path / "output.dat").read_text().splitlines() if not line.startswith("#")]
+    assert rows[0] == ["0.0", "100000.0", "20000.0", "576.8", "12423.7", "29782.5"]
+    assert len(rows) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("1 2\n", "coord.dat: line 1, '1 2' has 2 numbers (expected x y z in mm)"),
+        ("# a\n1 2 three\n", "coord.dat: line 2, '1 2 three': 'three' is not a number (expected x y z in mm)"),
+        ("1 2 nan\n", "'nan' is not a number"),
+        ("1 2 3e9\n", "3e9 mm (expected -1e7 to 1e7)"),
+        ("# only\n", "coord.dat: holds no point"),
+        ("", "coord.dat: holds 0 bytes and no text: empty"),
+    ],
+)
+def test_a_bad_coord_dat_is_refused_with_line_and_value(catseye, tmp_path, text, complaint):
+    (tmp_path / "coord.dat").write_text(text)
+    status, said, problem = catseye("point", *NOTES, "--file", tmp_path / "coord.dat", "--write", tmp_path / "o.dat")
+    assert (status, said) == (1, "")
+    assert complaint in problem
+    assert len(problem.strip().splitlines()) == 1
+    assert not (tmp_path / "o.dat").exists()
+
+
+def test_the_sun_answers_under_its_own_key(catseye):
+    sun = answer(catseye, *NIGHT, "--to=0,0,50", *SUNNY)[0]["sun"]
+    assert sun["allowed"]
+    # 2003-09-10 14:00 UT at 79.84 W: nearly two and a half hours before noon
+    assert math.degrees(sun["altitude"]) == pytest.approx(34.4, abs=0.3)
+    assert math.degrees(sun["azimuth"]) == pytest.approx(114.2, abs=0.3)
+    assert sun["earth_rotation"] == "measured"
+    assert sun["free_at_mjd"] is None
+
+
+def test_a_beam_into_the_sun_is_refused_with_the_time_when_it_is_free(catseye):
+    sun = answer(catseye, *NIGHT, "--to=0,0,50", *SUNNY)[0]["sun"]
+    e, a = sun["altitude"], sun["azimuth"]
+    scan_point = (-119.0, -15.0, 0.3)  # of ZY103, near enough for a target a kilometre away
+    towards = (math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e))
+    to = ",".join(f"{s + 1e4 * d:.3f}" for s, d in zip(scan_point, towards, strict=True))
+    refused = answer(catseye, *NIGHT, f"--to={to}", *SUNNY)[0]["sun"]
+    assert not refused["allowed"]
+    assert math.degrees(refused["separation"]) < 2.0
+    assert refused["free_at_mjd"] > sun["mjd"]
+    assert (refused["free_at_mjd"] - sun["mjd"]) * 1440 == pytest.approx(20, abs=12)  # 5 deg at 15 deg an hour
+    assert "from the Sun" in refused["reason"]
+    status, said, _ = catseye("point", *NIGHT, f"--to={to}", *SUNNY)
+    assert status == 0
+    assert "free at 2003-09-10T14:" in said
+
+
+def test_a_box_in_the_way_is_named(catseye, tmp_path):
+    (tmp_path / "boxes.toml").write_text(
+        'format = 1\n[[box]]\nname = "tower"\nwhy = "people"\ncentre_mm = [0.0, 0.0, 25000.0]\n'
+        "size_mm = [4000.0, 4000.0, 50000.0]\n"
+    )
+    found = answer(catseye, *NIGHT, "--to=0,0,30", "--to=60,-60,2", "--keep-out", tmp_path / "boxes.toml")
+    assert [item["keep_out"]["allowed"] for item in found] == [False, True]
+    assert "tower" in found[0]["keep_out"]["reason"]
+
+
+def test_without_uncertainties_u_is_unknown_and_with_them_it_is_given(catseye, tmp_path):
+    found = answer(catseye, *NOTES, "--to=0,100,20")[0]
+    assert found["u_azimuth_counts"] is None
+    assert "u_beta_rad" in found["uncertainties_lacking"]
+    monument, mirror = tmp_path / "m.toml", tmp_path / "z.toml"
+    monument.write_text(
+        ZY3.read_text()
+        + "\nu_x_mm = 1.0\nu_y_mm = 1.0\nu_z_mm = 1.0\nu_alpha1_rad = 2e-5\nu_alpha2_rad = 1e-5\nu_alpha3_rad = 1e-5\n"
+    )
+    mirror.write_text(ZP3.read_text() + "\nu_offset_mm = 0.01\nu_beta_rad = 1e-5\nu_zero_counts = 0.5\n")
+    known = answer(catseye, "--monument", monument, "--mirror", mirror, "--to=0,100,20")[0]
+    assert known["uncertainties_lacking"] == []
+    assert known["u_azimuth_counts"] == pytest.approx(0.6, abs=0.15)  # 0.5 of the zero, 0.3 of 2e-5 rad
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "complaint"),
+    [
+        (["--to=1,2"], 2, "'1,2' is not x,y,z in metres"),
+        (["--to=1,2,inf"], 2, "is not x,y,z in metres"),
+        ([], 2, "give points by --to or by --file"),
+        (["--to=1,2,3", "--file", "x.dat"], 2, "give points by --to or by --file"),
+        (["--file", "nowhere.dat"], 1, "nowhere.dat: missing"),
+        (["--to=1,2,3", "--at", "yesterday"], 2, "is neither an MJD nor a time"),
+        (["--to=1,2,3", "--sun-cone-deg", "0"], 2, "is not 0.5 to 60 degrees"),
+        (["--to=1,2,3", "--at", "52892.5"], 1, "needs latitude_deg, which the record of ZY3 does not have"),
+        (["--to=1,2,3", "--keep-out", "none.toml"], 1, "none.toml: missing"),
+    ],
+)
+def test_what_cannot_be_done_says_so_in_one_line(catseye, change, status, complaint):
+    done, said, problem = catseye("point", *NOTES, *change)
+    assert (done, said) == (status, "")
+    assert complaint in " ".join(problem.split())
+
+
+def test_a_point_in_the_mirror_itself_has_no_counts(catseye, tmp_path):
+    (tmp_path / "m.toml").write_text(
+        'monument = "ZY1"\nx_mm = 5000.0\ny_mm = 0.0\nz_mm = 0.0\n'
+        "alpha1_rad = 0.0\nalpha2_rad = 0.0\nalpha3_rad = 0.0\n"
+    )
+    (tmp_path / "z.toml").write_text(
+        'zp = "ZP1"\ndx_mm = 0.0\ndy_mm = 250.0\ndz_mm = 0.0\nbeta1_rad = 0.0\nbeta2_rad = 0.0\nna0 = 0\nne0 = 0\n'
+        "az_low_limit = -20000\naz_high_limit = 70000\n"
+    )
+    at = ["--monument", tmp_path / "m.toml", "--mirror", tmp_path / "z.toml", "--to=5,0,0.25"]
+    status, _, problem = catseye("point", *at)
+    assert status == 1
+    assert "no setting of the mirror looks there" in problem
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "complaint"),
+    [
+        ("ZY3", "alpha1_rad = 57.8", "alpha1_rad = 57.8 looks like degrees (expected"),
+        ("ZY3", "alpha3_rad = 1.2", "alpha3_rad = 1.2 looks like degrees (expected -0.1 to 0.1)"),
+        ("ZY3", "x_mm = 5.5862\ny_mm = 20.85", "x_mm, y_mm = 5.5862, 20.85 looks like metres (expected"),
+        ("ZP3", "dy_mm = 0.247459", "dy_mm = 0.247459 looks like metres (expected 50 to 1000)"),
+        ("ZP3", "beta1_rad = -2.5", "beta1_rad = -2.5 looks like degrees (expected -0.1 to 0.1)"),
+        ("ZP3", "az_low_limit = 70000\naz_high_limit = -20000", "az_low_limit = 70000 is not below az_high_limit"),
+        ("ZP3", "beam_tilt_x_rad = 0.001", "beam_tilt_x_rad = 0.001 has no u_tilt_rad"),
+        ("ZP3", "fkp_0 = 40000", "fkp_0 = 40000 (expected 0 to 32767)"),
+        ("ZP3", "abv_1 = 10\naba_1 = 20", "abv_1 = 10 is below aba_1 = 20 (expected no less"),
+    ],
+)
+def test_bad_records_are_refused_with_file_key_value_and_range(catseye, tmp_path, file, line, complaint):
+    keys = [part.split(" = ")[0] for part in line.splitlines()]
+    records = {"ZY3": ZY3, "ZP3": ZP3}
+    kept = [row for row in records[file].read_text().splitlines() if row.split(" = ")[0].strip() not in keys]
+    path = tmp_path / f"{file}.toml"
+    path.write_text("\n".join([line, *kept]))
+    records[file] = path
+    at = ["--monument", records["ZY3"], "--mirror", records["ZP3"], "--to=0,100,20"]
+    status, said, problem = catseye("point", *at)
+    assert (status, said) == (1, "")
+    assert problem.startswith(f"catseye: {file}.toml: ")
+    assert complaint in problem
