@@ -16,8 +16,9 @@ from catseye.estimation.adjustment import adjust
 from catseye.records.campaign import read_campaign
 from catseye.reduction.coordinates import adjust_coordinates
 from catseye.reduction.epoch import reduce_epoch
-from catseye.reduction.head import head_unknowns
+from catseye.reduction.head import _axes, head_unknowns
 from catseye.reduction.network import build_network
+from catseye.reduction.pointing import station_in
 from catseye.reduction.ranges import follow_electronics
 from catseye.reduction.settings import Settings
 from catseye.reduction.shots import shot_group
@@ -368,6 +369,29 @@ def test_axes_on_the_feed_arm_are_refused_since_nothing_says_how_the_mirror_is_t
         build_network(changed(night_01, "ZY115", **said), r.phases, r.electronics, r.settings)
     assert str(caught.value).startswith(f"mirrors/ZP115.toml: {shown} cannot be applied: ZY115 is on the feed arm and")
     assert "\n" not in str(caught.value)
+
+
+def test_axes_on_the_feed_arm_are_applied_where_the_record_says_how_the_mount_is_turned(night_01, reduced_night_01):
+    """The mount's z^ along the reflector's -z, y^ along its y: x^ is then -x, and at az 145.3, el 30 all is turned."""
+    r = reduced_night_01
+    turned = [
+        ranger.model_copy(update={"mount_z": (0.0, 0.0, -1.0), "mount_y": (0.0, 1.0, 0.0)})
+        for ranger in night_01.feedarm.ranger
+    ]
+    arm = night_01.feedarm.model_copy(update={"ranger": tuple(turned)})
+    campaign = changed(dataclasses.replace(night_01, feedarm=arm), "ZY115", mirror_offset_mm=0.2, u_axis_mm=0.01)
+    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    mirror = campaign.mirror_of("ZY115")
+    assert "axes ZY115" in {unknown.name for unknown in head_unknowns(campaign, "ZY115")}
+    station = station_in(campaign, "ZY115")
+    a, e = np.radians([145.3, 30.0])
+    down = -np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])  # against the antenna's axis
+    np.testing.assert_allclose(station.gamma[2], down, atol=1e-12)
+    np.testing.assert_allclose(station.scan_point, network.places["ZY115"].start, atol=1e-9)
+    correction, _ = _axes(campaign, "ZY115", np.array([80.0 * down + [0.0, 0.0, 1.0]]))
+    # the face stands 0.2 mm forward: 2 s cos(Phi/2) shorter, seen nearly straight on, and the cube's own is put back
+    cube = 2 * 0.2e-3 * np.cos(2 * np.pi * (mirror.elv_zrg - mirror.ne0) / 1e5)
+    assert correction[0] == pytest.approx(0.4e-3 - cube, abs=1e-6)
 
 
 def test_a_cube_behind_the_mirror_has_no_axis_correction_and_says_so(night_01, reduced_night_01):

@@ -18,18 +18,16 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
+from catseye.geometry.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
 from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
-from catseye.geometry.mount import gamma, lambda_
+from catseye.geometry.pointing import Station
 from catseye.records.campaign import Campaign
 from catseye.records.mirror import Mirror
-from catseye.records.monument import Monument
 from catseye.records.refusal import refusal
+from catseye.reduction.pointing import AXES, station_in
 from catseye.signal.amplitude import amplitude_by_coefficient, amplitude_phase
 from catseye.signal.cyclic import cyclic_design, cyclic_range
 
-COUNTS = 100_000.0  # of an encoder, a turn
-HALF_TURN = 50_000.0
-AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")  # in the order of `path_change`
 UNSAID_ORDERS = 2  # of a cyclic deviation of which the sheet says the uncertainty alone
 
 
@@ -70,18 +68,13 @@ class HeadCorrections:
 def head_unknowns(campaign: Campaign, name: str) -> list[Unknown]:
     """The parameters of a ranger's head; none for a sheet that knows nothing of these effects.
 
-    Raises InputError for a feed-arm ranger whose sheet speaks of its axes: no record says how its mirror is turned.
+    Raises InputError for a feed-arm ranger whose sheet speaks of its axes while feedarm.toml does not say how its mount
+    is turned.
     """
     mirror = campaign.mirror_of(name)
     unknowns = []
     if mirror.u_axis_mm is not None:
-        if name not in campaign.monuments:
-            said = next((key for key in AXES if getattr(mirror, key)), "u_axis_mm")
-            raise refusal(
-                f"mirrors/{mirror.zp}.toml",
-                f"{said} = {getattr(mirror, said)} cannot be applied: {name} is on the feed arm and no record says how "
-                "its mirror is turned (expected no axis_offset_mm, mirror_offset_mm, beam_x_mm, beam_y_mm, u_axis_mm)",
-            )
+        mounted(campaign, name)
         parts = tuple(key.removesuffix("_mm").replace("_", " ") for key in AXES)
         unknowns.append(Unknown(f"axes {name}", parts, mirror.u_axis_mm * MILLIMETRE, "u_axis_mm"))
     if mirror.u_amplitude_to_phase_rad is not None:
@@ -125,7 +118,7 @@ def head_corrections(
     for unknown in head_unknowns(campaign, name):
         kind = unknown.name.partition(" ")[0]
         if kind == "axes":
-            change, by = _axes(campaign.monuments[name], mirror, sight)
+            change, by = _axes(campaign, name, sight)
         elif kind == "amplitude":
             # A phase read too high is a range read too short.
             per_radian = 0.5 * SPEED_OF_LIGHT / (campaign.site.ranging.modulation_hz * TWO_PI * index)
@@ -145,26 +138,23 @@ def _orders(mirror: Mirror) -> int:
     return len(mirror.cyclic_cosine_mm) or UNSAID_ORDERS
 
 
-def _axes(monument: Monument, mirror: Mirror, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _axes(campaign: Campaign, name: str, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Correction (m,) and its derivatives (m, 4) by the four offsets: less the target's change, plus the cube's.
 
     Source: [PARKER04] eq. 2.8 and 2.12 for the mirror's axes, 2.21 and 2.22 for the cube's angles.
     """
+    station, mirror = mounted(campaign, name), campaign.mirror_of(name)
     offsets = np.array([getattr(mirror, key) for key in AXES]) * MILLIMETRE
-    mirror_from_ground = lambda_(mirror.beta1_rad, mirror.beta2_rad) @ gamma(
-        monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad
-    )
-    target = sight @ mirror_from_ground.T
+    target = sight @ station.mirror_from_ground.T
     prime = only_prime(mirror, direction_angles(target)[0])
     theta, phi = beam_angles(target, offsets, prime=prime)
     if np.isnan(phi).any():
         raise ValidityError(
-            f"{monument.monument}: a target lies straight behind its mirror, where no beam reaches it: check the typed "
-            "position and alpha1_rad"
+            f"{name}: a target lies straight behind its mirror, where no beam reaches it: check the typed position and "
+            "how its mount is turned"
         )
     change, slopes = path_change(theta, phi, np.linalg.norm(target, axis=-1), offsets, prime=prime)
-    theta_0 = TWO_PI * (mirror.azm_zrg - mirror.na0) / COUNTS
-    phi_0 = 2.0 * TWO_PI * (mirror.elv_zrg - mirror.ne0) / COUNTS
+    theta_0, phi_0 = azimuth_angle(mirror.azm_zrg, mirror.na0), elevation_angle(mirror.elv_zrg, mirror.ne0)
     if abs(phi_0) > np.pi:
         raise refusal(
             f"mirrors/{mirror.zp}.toml",
@@ -175,11 +165,22 @@ def _axes(monument: Monument, mirror: Mirror, sight: np.ndarray) -> tuple[np.nda
     return change_0 - change, slopes_0 - slopes
 
 
+def mounted(campaign: Campaign, name: str) -> Station:
+    """The ranger's mirror as it stands; InputError on the feed arm where feedarm.toml does not say how it is turned."""
+    station, mirror = station_in(campaign, name), campaign.mirror_of(name)
+    if station is not None:
+        return station
+    said = next((key for key in AXES if getattr(mirror, key)), "u_axis_mm")
+    raise refusal(
+        f"mirrors/{mirror.zp}.toml",
+        f"{said} = {getattr(mirror, said)} cannot be applied: {name} is on the feed arm and no record says how its "
+        "mirror is turned (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, mirror_offset_mm, beam_x_mm, "
+        "beam_y_mm, u_axis_mm)",
+    )
+
+
 def only_prime(mirror: Mirror, theta: np.ndarray) -> np.ndarray:
     """Where the azimuth limits forbid the direct pointing and allow the prime one."""
 
-    def allowed(count: np.ndarray) -> np.ndarray:
-        return (mirror.az_low_limit <= count) & (count <= mirror.az_high_limit)
-
-    direct = COUNTS * theta / TWO_PI + mirror.na0
-    return ~allowed(direct) & (allowed(direct + HALF_TURN) | allowed(direct - HALF_TURN))
+    low, high, direct = mirror.az_low_limit, mirror.az_high_limit, azimuth_counts(theta, mirror.na0)
+    return ~within(direct, low, high) & (within(direct + HALF_TURN, low, high) | within(direct - HALF_TURN, low, high))

@@ -21,9 +21,11 @@ from catseye.geometry.imperfect import (
     imperfect_face_counts,
 )
 from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
+from catseye.records.campaign import Campaign
 from catseye.records.mirror import MirrorGeometry
 from catseye.records.monument import MonumentGeometry
 from catseye.records.target import FeedArmRanger
+from catseye.reduction.places import nominal_frame
 
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
@@ -68,6 +70,15 @@ def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_
         beta=np.array([mirror.beta1_rad, mirror.beta2_rad]),
         zeros=np.array([mirror.na0, mirror.ne0]),
     )
+
+
+def station_in(campaign: Campaign, name: str) -> Station | None:
+    """A campaign's ranger, the telescope in its nominal posture; None where no record says how its mount is turned."""
+    mirror = campaign.mirror_of(name)
+    if name in campaign.monuments:
+        return station_of(campaign.monuments[name], mirror)
+    ranger = next(r for r in campaign.feedarm.ranger if r.name == name)
+    return None if ranger.mount_z is None else feed_arm_station(ranger, mirror, nominal_frame(campaign))
 
 
 def offset_of(mirror: MirrorGeometry) -> np.ndarray:

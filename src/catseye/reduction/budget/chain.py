@@ -10,12 +10,13 @@ from catseye.atmosphere.air import air, group_refractivity
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.propagation import Draw, Model, draw_inputs
+from catseye.geometry.encoder import azimuth_angle, elevation_angle
 from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
-from catseye.geometry.mount import gamma, lambda_
 from catseye.optics.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
 from catseye.reduction.budget.scene import Scene, walk_of
-from catseye.reduction.head import AXES, COUNTS, only_prime
+from catseye.reduction.head import mounted, only_prime
+from catseye.reduction.pointing import AXES
 
 NODES = 3  # of the quadrature along the path: exact to degree 5 in height
 
@@ -158,17 +159,16 @@ def _axes(scene: Scene, v: Columns) -> np.ndarray:
     """Correction (n,), m, for axes and beam that do not meet: less the target's change, plus the cube's."""
     if "axes axis offset" not in v.at:
         return np.zeros(len(v.x))
-    monument, mirror = scene.campaign.monuments[scene.ranger], scene.mirror
-    mount = gamma(monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad)
-    sight = lambda_(mirror.beta1_rad, mirror.beta2_rad) @ mount @ (scene.b - scene.a)
+    mirror = scene.mirror
+    sight = mounted(scene.campaign, scene.ranger).mirror_from_ground @ (scene.b - scene.a)
     keys = [f"axes {key.removesuffix('_mm').replace('_', ' ')}" for key in AXES]
     offsets = np.stack([v(key) for key in keys], axis=1) * MILLIMETRE
     prime = only_prime(mirror, direction_angles(sight)[0])
     theta, phi = beam_angles(sight, offsets, prime=prime)
     target, _ = path_change(theta, phi, np.linalg.norm(sight), offsets, prime=prime)
     cube, _ = path_change(
-        TWO_PI * (mirror.azm_zrg - mirror.na0) / COUNTS,
-        2.0 * TWO_PI * (mirror.elv_zrg - mirror.ne0) / COUNTS,
+        azimuth_angle(mirror.azm_zrg, mirror.na0),
+        elevation_angle(mirror.elv_zrg, mirror.ne0),
         mirror.d0_mm * MILLIMETRE,
         offsets,
     )
