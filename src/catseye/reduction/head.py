@@ -174,8 +174,8 @@ def mounted(campaign: Campaign, name: str) -> Station:
     raise refusal(
         f"mirrors/{mirror.zp}.toml",
         f"{said} = {getattr(mirror, said)} cannot be applied: {name} is on the feed arm and no record says how its "
-        "mirror is turned (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, mirror_offset_mm, beam_x_mm, "
-        "beam_y_mm, u_axis_mm)",
+        "mirror is turned (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, mirror_offset_mm, "
+        "beam_x_mm, beam_y_mm, u_axis_mm)",
     )
 
 
