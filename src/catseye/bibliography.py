@@ -372,4 +372,25 @@ SOURCES: dict[str, Source] = {
         locator="Optical Engineering 40, 2001",
         used="the problem of one length from phases at several wavelengths",
     ),
+    "TEXAS13": Source(
+        title="Texas Instruments, LM628/LM629 Precision motion controller, data sheet SNVS781C, revised March 2013",
+        locator="SNVS781C, first issued by National Semiconductor",
+        used="pages 9 to 24: trajectory parameters and their worked example, PID filter, commands, tables 1, 5 and 7",
+        errata=("page 11 takes 341 us for the sample time of 341.33 us: 446 956 for 600 rpm runs at 599.4 rpm",),
+    ),
+    "CREAGER02": Source(
+        title="R. E. Creager, ZY manual (laser ranger control program), National Radio Astronomy Observatory, 2002",
+        locator="NRAO Green Bank, 11 March 2002",
+        used="pages of the commands ABA, ABP, ABV, ACP, CWT, ERL, FHM, FIL, FKD, FLT",
+    ),
+    "KARNOPP85": Source(
+        title="D. Karnopp, Computer simulation of stick-slip friction in mechanical dynamic systems, 1985",
+        locator="doi:10.1115/1.3140698",
+        used="friction that holds an axis at rest until the drive exceeds it",
+    ),
+    "FRANKLIN98": Source(
+        title="G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems, third edition, 1998",
+        locator="ISBN 0-201-82054-4",
+        used="zero-order hold equivalents, discrete PID, margins of sampled loops (recalled, not at hand)",
+    ),
 }

@@ -1,0 +1,95 @@
+"""Figures of a servo axis as SVG text: a move with its following error, and step responses beside linear theory."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.simulator.servo import Trace
+from catseye.simulator.tuning import Plant
+
+WIDTH = 9.4  # inches, as all figures
+
+
+def move_figure(trace: Trace, *, target: float, plant: Plant | None = None) -> str:
+    """Position, velocity, following error and drive of one move, as SVG text.
+
+    trace    of the move, from its start
+    target   counts
+    plant    of the axis, to draw the drive that the profile asks for; None without
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(WIDTH, 8.6), layout="constrained")
+        position, velocity, error, drive = figure.subplots(4, 1, sharex=True)
+        t = trace.time - trace.time[0]
+        position.plot(t, trace.desired, color=SERIES[0], label="desired")
+        position.plot(t, trace.actual, "--", color=SERIES[1], label="actual")
+        position.axhline(target, color=FAINT, lw=0.8, ls=":")
+        position.set_title("Position, counts")
+        position.legend(loc="lower right")
+        velocity.plot(t, trace.velocity, color=SERIES[0], label="desired", zorder=3)
+        middle, speed = _speed(trace)
+        velocity.plot(middle - trace.time[0], speed, color=SERIES[1], label="actual, mean of 10 ms")
+        velocity.set_title("Velocity, counts/s")
+        velocity.legend(loc="upper right")
+        error.plot(t, trace.error, color=SERIES[2], lw=0.8)
+        error.set_title(f"Following error, counts: at most {np.max(np.abs(trace.error)):.1f}")
+        drive.plot(t, trace.output, color=SERIES[3], lw=0.5, label="filter's output")
+        if plant is not None:
+            drive.plot(t, _asked(trace, plant), color=INK, lw=1.1, label="what the profile asks for", zorder=3)
+            drive.legend(loc="upper right")
+        drive.set_title("Drive, converter steps")
+        drive.set_xlabel("time since the start, s")
+        return svg(figure)
+
+
+def step_figure(
+    responses: Mapping[str, Trace], *, target: float, linear: Mapping[str, NDArray[np.float64]] | None = None
+) -> str:
+    """Step responses beside one another, as SVG text: the first moments, and what is left at the end.
+
+    responses   traces by name, each from its step at zero
+    target      of the step, counts
+    linear      what linear theory says, counts sample by sample, by the same names; None without
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
+        first, last = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+        for colour, (name, trace) in zip(SERIES, responses.items(), strict=False):
+            t = 1e3 * (trace.time - trace.time[0])
+            first.plot(t, trace.actual, color=colour, lw=1.1, label=name)
+            last.plot(t / 1e3, trace.actual - target, color=colour, lw=0.9)
+            theory = (linear or {}).get(name)
+            if theory is not None:
+                first.plot(t[: len(theory)], theory[: len(t)], ":", color=colour, lw=1.3)
+        first.axhline(target, color=FAINT, lw=0.8)
+        first.set_xlim(0.0, 200.0)
+        first.set_title(f"Step of {target:g} counts; dotted: linear theory, no friction")
+        first.set_xlabel("time since the step, ms")
+        first.set_ylabel("position, counts")
+        last.axhspan(-1.0, 1.0, color=BAD, alpha=0.12, lw=0)
+        last.set_ylim(-8.0, 8.0)
+        last.set_title("What is left; within a count: shaded")
+        last.set_xlabel("time since the step, s")
+        last.set_ylabel("actual less target, counts")
+        figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        return svg(figure)
+
+
+def _speed(trace: Trace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and mean speeds, counts/s, over about 10 ms of encoder readings."""
+    sample = float(trace.time[1] - trace.time[0])
+    n = max(1, min(round(0.01 / sample), len(trace.time) - 1))
+    speed = (trace.actual[n:] - trace.actual[:-n]) / (n * sample)
+    return 0.5 * (trace.time[n:] + trace.time[:-n]), speed
+
+
+def _asked(trace: Trace, plant: Plant) -> NDArray[np.float64]:
+    """Converter steps that an axis needs to do as its profile says."""
+    acceleration = np.gradient(trace.velocity, trace.time[1] - trace.time[0])
+    return (acceleration + plant.decay * trace.velocity) / plant.gain + plant.friction * np.sign(trace.velocity)

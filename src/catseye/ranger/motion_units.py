@@ -1,0 +1,213 @@
+"""People's units and the integers of the LM628 motion chip, there and back, and what each ZY command accepts.
+
+Velocities and accelerations are counts a sample, and a sample squared, times 65 536; a sample lasts 2048 periods of the
+clock: 341.33 us at the ranger's 6 MHz. The data sheet's worked example rounds it to 341 us: it loads 446 956 for 600
+rpm at 2000 counts a turn, which runs at 599.4 rpm. With the exact sample time, the default here, 447 392 is right.
+"""
+
+import operator
+from dataclasses import dataclass
+
+from catseye.constants import TWO_PI
+from catseye.errors import ValidityError
+from catseye.geometry.encoder import COUNTS_PER_TURN
+
+CLOCK_HZ = 6e6
+CLOCKS_PER_SAMPLE = 2048
+SAMPLE_TIME = CLOCKS_PER_SAMPLE / CLOCK_HZ
+FRACTION = 65_536  # of a count: the unit of velocity and acceleration
+POSITION_LOW, POSITION_HIGH = -(2**30), 2**30 - 1
+LARGEST_RATE = 2**30 - 1
+LARGEST_GAIN = 32_767
+LONGEST_INTERVAL = 255
+LARGEST_ERROR_LIMIT = 25_000  # of the ZY; the chip's own is 32 767
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one command accepts: the name of its value, lowest, highest, unit."""
+
+    name: str
+    low: int
+    high: int
+    unit: str
+
+
+LIMITS = {
+    "ABA": Limits("acceleration", 0, LARGEST_RATE, "1/65536 count per sample squared"),
+    "ABV": Limits("velocity", 0, LARGEST_RATE, "1/65536 count per sample"),
+    "ABP": Limits("target position", POSITION_LOW, POSITION_HIGH, "counts"),
+    "FKP": Limits("proportional gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FKI": Limits("integral gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FKD": Limits("derivative gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FIL": Limits("integration limit", 0, LARGEST_GAIN, "1/256 of a step of the 8-bit converter"),
+    "FSI": Limits("derivative interval", 0, LONGEST_INTERVAL, "samples less one"),
+    "ERL": Limits("position error limit", 0, LARGEST_ERROR_LIMIT, "counts"),
+}
+
+
+def checked(command: str, value: int) -> int:
+    """The value of a command as a plain integer, when the command accepts it.
+
+    command   ABA, ABV, ABP, FKP, FKI, FKD, FIL, FSI or ERL
+    value     as the command takes it
+
+    Raises ValidityError: no integer, or outside the command's limits. Source: [CREAGER02], the pages of the commands.
+
+    >>> checked("ERL", 25_001)
+    Traceback (most recent call last):
+        ...
+    catseye.errors.ValidityError: ERL: position error limit 25001 is outside 0 to 25000 (counts)
+    """
+    limits = LIMITS[command]
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or isinstance(value, bool):
+        raise ValidityError(
+            f"{command}: {limits.name} {value!r} is no integer (expected {limits.low} to {limits.high})"
+        )
+    if not limits.low <= number <= limits.high:
+        raise ValidityError(
+            f"{command}: {limits.name} {number} is outside {limits.low} to {limits.high} ({limits.unit})"
+        )
+    return number
+
+
+def checked_rates(command: str, velocity: int, acceleration: int) -> None:
+    """Refuse a velocity below the acceleration, as the ZY does.
+
+    command        ABA or ABV, whichever is asked
+    velocity       1/65536 count a sample
+    acceleration   1/65536 count a sample squared
+
+    Raises ValidityError: the velocity is below the acceleration. Source: [CREAGER02], pages ABA and ABV.
+
+    >>> checked_rates("ABA", 20_000, 20_000)
+    """
+    if velocity < acceleration:
+        first = "the velocity (ABV)" if command == "ABA" else "the acceleration (ABA)"
+        raise ValidityError(
+            f"{command}: velocity {velocity} is below acceleration {acceleration} (expected at least as much): "
+            f"set {first} first"
+        )
+
+
+def sample_time(clock_hz: float = CLOCK_HZ) -> float:
+    """Time between two samples of the chip, s.
+
+    clock_hz   clock, above 0 to 8 MHz
+
+    Raises ValidityError: the chip has no such clock. Source: [TEXAS13], table 1.
+
+    >>> f"{sample_time() * 1e6:.2f} us"
+    '341.33 us'
+    """
+    if not 0.0 < clock_hz <= 8e6:
+        raise ValidityError(f"clock {clock_hz:g} Hz is outside 0 to 8e6 Hz, where [TEXAS13] holds")
+    return CLOCKS_PER_SAMPLE / clock_hz
+
+
+def counts_from_turns(turns: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
+    """Counts (or counts/s, counts/s^2) of turns (or turns/s, turns/s^2).
+
+    turns             of the encoder's axis
+    counts_per_turn   four times the encoder's lines
+
+    >>> counts_from_turns(600 / 60, 2000)
+    20000.0
+    """
+    return float(turns) * counts_per_turn
+
+
+def counts_from_radians(angle: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
+    """Counts (or counts/s, counts/s^2) of an angle of the encoder's axis (or its rates).
+
+    angle             rad (or rad/s, rad/s^2)
+    counts_per_turn   four times the encoder's lines
+    """
+    return float(angle) / TWO_PI * counts_per_turn
+
+
+def turns_from_counts(counts: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
+    """Turns (or turns/s, turns/s^2) of counts: the inverse of `counts_from_turns`."""
+    return float(counts) / counts_per_turn
+
+
+def radians_from_counts(counts: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
+    """Angle of the encoder's axis, rad, of counts (or their rates): the inverse of `counts_from_radians`."""
+    return float(counts) / counts_per_turn * TWO_PI
+
+
+def velocity_integer(counts_per_second: float, sample: float = SAMPLE_TIME) -> int:
+    """The integer that ABV takes for a speed.
+
+    counts_per_second   speed, counts/s, 0 or above
+    sample              time between samples, s
+
+    Raises ValidityError: below zero, too small to move, too large. Source: [TEXAS13], page 11, whose example this is.
+
+    >>> velocity_integer(counts_from_turns(600 / 60, 2000), 341e-6), velocity_integer(counts_from_turns(10, 2000))
+    (446956, 447392)
+    """
+    return _integer("ABV", counts_per_second * sample * FRACTION, f"{counts_per_second:g} counts/s")
+
+
+def acceleration_integer(counts_per_second2: float, sample: float = SAMPLE_TIME) -> int:
+    """The integer that ABA takes for an acceleration.
+
+    counts_per_second2   acceleration, counts/s^2, 0 or above
+    sample               time between samples, s
+
+    Raises ValidityError: below zero, too small to move, too large. Source: [TEXAS13], page 11, whose example this is.
+
+    >>> acceleration_integer(counts_from_turns(1, 2000), 341e-6)
+    15
+    """
+    return _integer("ABA", counts_per_second2 * sample**2 * FRACTION, f"{counts_per_second2:g} counts/s^2")
+
+
+def velocity_counts(integer: int, sample: float = SAMPLE_TIME) -> float:
+    """Speed, counts/s, of an integer of ABV.
+
+    integer   1/65536 count a sample
+    sample    time between samples, s
+
+    >>> f"{velocity_counts(446956) / 2000 * 60:.2f} rpm"
+    '599.41 rpm'
+    """
+    return integer / FRACTION / sample
+
+
+def acceleration_counts(integer: int, sample: float = SAMPLE_TIME) -> float:
+    """Acceleration, counts/s^2, of an integer of ABA.
+
+    integer   1/65536 count a sample squared
+    sample    time between samples, s
+    """
+    return integer / FRACTION / sample**2
+
+
+def derivative_interval(setting: int, sample: float = SAMPLE_TIME) -> float:
+    """Time between two differences of the derivative term, s, for a setting of FSI.
+
+    setting   0 to 255: an interval of setting + 1 samples
+    sample    time between samples, s
+
+    Raises ValidityError: no such setting. Source: [TEXAS13], table 5.
+
+    >>> f"{derivative_interval(3, sample_time(8e6)) * 1e6:.0f} us"
+    '1024 us'
+    """
+    return (checked("FSI", setting) + 1) * sample
+
+
+def _integer(command: str, exact: float, asked: str) -> int:
+    limits = LIMITS[command]
+    if not 0.0 <= exact < limits.high + 0.5:
+        raise ValidityError(f"{command}: {limits.name} {asked} is outside 0 to {limits.high} ({limits.unit})")
+    rounded = round(exact)
+    if rounded == 0 and exact > 0.0:
+        raise ValidityError(f"{command}: {limits.name} {asked} is below half of {limits.unit}: nothing would move")
+    return rounded

@@ -1,0 +1,97 @@
+"""People's units and the motion chip's integers."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from catseye.errors import ValidityError
+from catseye.ranger import motion_units as units
+
+
+def test_the_data_sheet_s_worked_example():
+    """[TEXAS13] page 11: 500 lines, 600 rpm, 1 turn/s^2, 100 turns; it takes 341 us for the sample time."""
+    sample = 341e-6
+    assert units.velocity_integer(units.counts_from_turns(10, 2000), sample) == 446_956 == 0x0006D1EC
+    assert units.acceleration_integer(units.counts_from_turns(1, 2000), sample) == 15
+    assert units.counts_from_turns(100, 2000) == 200_000 == 0x00030D40
+
+
+def test_with_the_exact_sample_time_600_rpm_is_another_integer():
+    assert units.velocity_integer(units.counts_from_turns(10, 2000)) == 447_392  # 2e4 * 2048/6e6 * 65536 = 447 392.4
+    assert units.acceleration_integer(units.counts_from_turns(1, 2000)) == 15  # 15.27
+    assert pytest.approx(341.3333e-6, abs=1e-10) == units.SAMPLE_TIME
+
+
+def test_sample_times_and_intervals_of_the_data_sheet():
+    """[TEXAS13] tables 1 and 5: at 8 MHz a sample is 256 us, the longest derivative interval 65 536 us."""
+    sample = units.sample_time(8e6)
+    assert sample == pytest.approx(256e-6)
+    assert units.derivative_interval(0, sample) == pytest.approx(256e-6)
+    assert units.derivative_interval(255, sample) == pytest.approx(65_536e-6)
+
+
+@given(st.floats(1.0, 4e7), st.floats(256e-6, 1e-3))
+def test_any_speed_comes_back_within_half_a_unit(speed, sample):
+    if speed * sample * units.FRACTION > units.LARGEST_RATE:
+        with pytest.raises(ValidityError, match="ABV: velocity"):
+            units.velocity_integer(speed, sample)
+        return
+    back = units.velocity_counts(units.velocity_integer(speed, sample), sample)
+    assert abs(back - speed) <= 0.5 / units.FRACTION / sample * (1 + 1e-9)
+
+
+@given(st.floats(200.0, 1e9), st.floats(256e-6, 1e-3))
+def test_any_acceleration_comes_back_within_half_a_unit(rate, sample):
+    back = units.acceleration_counts(units.acceleration_integer(rate, sample), sample)
+    assert abs(back - rate) <= 0.5 / units.FRACTION / sample**2 * (1 + 1e-9)
+
+
+@given(st.floats(-1e6, 1e6))
+def test_turns_and_radians_there_and_back(value):
+    assert units.turns_from_counts(units.counts_from_turns(value)) == pytest.approx(value, rel=1e-12)
+    assert units.radians_from_counts(units.counts_from_radians(value)) == pytest.approx(value, rel=1e-12)
+    assert units.counts_from_radians(6.283185307179586) == pytest.approx(100_000)
+
+
+@pytest.mark.parametrize("command", units.LIMITS)
+def test_every_command_takes_its_limits_and_refuses_the_next(command):
+    limits = units.LIMITS[command]
+    assert units.checked(command, limits.low) == limits.low
+    assert units.checked(command, limits.high) == limits.high
+    for beyond in (limits.low - 1, limits.high + 1):
+        with pytest.raises(ValidityError) as refused:
+            units.checked(command, beyond)
+        text = str(refused.value)
+        assert text.startswith(f"{command}: {limits.name} {beyond} is outside {limits.low} to {limits.high}")
+        assert "\n" not in text
+
+
+@pytest.mark.parametrize("value", [1.5, "7", None, True])
+def test_what_is_no_integer_is_refused(value):
+    with pytest.raises(ValidityError, match="is no integer"):
+        units.checked("FKP", value)
+
+
+def test_a_velocity_below_the_acceleration_is_refused_and_says_what_to_set_first():
+    with pytest.raises(ValidityError, match=r"ABA: velocity 9 is below acceleration 10 .*ABV"):
+        units.checked_rates("ABA", 9, 10)
+    with pytest.raises(ValidityError, match=r"ABV: velocity 9 is below acceleration 10 .*ABA"):
+        units.checked_rates("ABV", 9, 10)
+
+
+@pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf"), 1e12])
+def test_speeds_that_no_register_holds_are_refused(bad):
+    with pytest.raises(ValidityError, match="ABV: velocity"):
+        units.velocity_integer(bad)
+
+
+def test_a_speed_too_small_to_move_is_refused_and_zero_is_not():
+    with pytest.raises(ValidityError, match="nothing would move"):
+        units.velocity_integer(0.01)
+    assert units.velocity_integer(0.0) == 0
+
+
+@pytest.mark.parametrize("clock", [0.0, -6e6, 9e6, float("nan")])
+def test_a_clock_the_chip_has_not_is_refused(clock):
+    with pytest.raises(ValidityError, match="clock"):
+        units.sample_time(clock)
