@@ -393,4 +393,44 @@ SOURCES: dict[str, Source] = {
         locator="ISBN 0-201-82054-4",
         used="zero-order hold equivalents, discrete PID, margins of sampled loops (recalled, not at hand)",
     ),
+    "SNYDER87": Source(
+        title="J. P. Snyder, Map projections: a working manual, U.S. Geological Survey Professional Paper 1395, 1987",
+        locator="doi:10.3133/pp1395",
+        used="eqs. 4-18, 4-20 (radii of curvature), 14-4, 14-15, 15-1 to 15-9 (Lambert conformal conic on the ellipsoid)",
+    ),
+    "STEM89": Source(
+        title="J. E. Stem, State Plane Coordinate System of 1983, NOAA Manual NOS NGS 5, 1989",
+        locator="NOAA Manual NOS NGS 5, Rockville",
+        used="zone 4702 West Virginia South, sign of the convergence, elevation and combined factors, Euler's radius",
+    ),
+    "TORGE12": Source(
+        title="W. Torge and J. Müller, Geodesy, fourth edition, de Gruyter, 2012",
+        locator="doi:10.1515/9783110250008",
+        used="deflection of the vertical, Laplace's equation",
+    ),
+    "SOFA23": Source(
+        title="IAU SOFA Board, IAU SOFA software collection, issue 2023-10-11",
+        locator="https://www.iausofa.org",
+        used="Atco13, by way of pyerfa: catalogue to observed place; pnm06a, gst06a, epv00, ab for the Sun",
+    ),
+    "LEEUWEN07": Source(
+        title="F. van Leeuwen, Validation of the new Hipparcos reduction, Astronomy and Astrophysics 474, 2007",
+        locator="doi:10.1051/0004-6361:20078357",
+        used="proper motion and parallax of Polaris, HIP 11767",
+    ),
+    "TANAKA01": Source(
+        title="M. Tanaka, G. Girard, R. Davis, A. Peuto, N. Bignell, Recommended table for the density of water, 2001",
+        locator="doi:10.1088/0026-1394/38/4/3",
+        used="eq. 1: density of water, 0 to 40 °C",
+    ),
+    "JAZWINSKI70": Source(
+        title="A. H. Jazwinski, Stochastic Processes and Filtering Theory, Academic Press, 1970",
+        locator="Mathematics in Science and Engineering, volume 64, Academic Press, New York",
+        used="the extended Kalman filter, for the vibration of the structure",
+    ),
+    "SCHWEPPE65": Source(
+        title="F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, 1965",
+        locator="doi:10.1109/TIT.1965.1053737",
+        used="the likelihood of a Kalman filter's innovations, for the modes of a vibration",
+    ),
 }

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from catseye.records.calibration import CalibrationRecord
+from catseye.records.reading import read_record
+
 EXAMPLES = Path(__file__).parents[2] / "examples" / "calibrations"
 # The truth of each example stands in the comment of its sheet.
+ARCSECOND = np.pi / 648_000
 TRUTH = {
     "reference-distance": {"d0_mm": 180.685},
     "leakage": {"leakage_amplitude_volt": 0.03104, "leakage_phase_rad": 4.3574},
@@ -30,18 +34,68 @@ TRUTH = {
     "gauge-blocks": {"zero_mm": 0.0042, "scale_ppm": 18.0},
     "spacers": {"A_mm": 88.9003, "B_mm": 30.0121, "C_mm": 10.0008},
     "invar-wire": {"distance_mm": 24_003.1},
+    "autocollimation": {
+        "beta1_rad": -150 * ARCSECOND,
+        "beta2_rad": 25 * ARCSECOND,
+        "ne0": -4935.4,
+        "na0": -4195.3,
+        "face_tilt_rad": 20 * ARCSECOND,
+    },
+    "height-gauge": {"dx_mm": -0.075, "dy_mm": 247.459, "dz_mm": -0.762},
+    "both-faces": {"axis_offset_mm": 0.4, "mirror_offset_mm": -0.3},
+    "both-faces-pointing": {
+        "face_tilt_rad": 2e-4,
+        "beam_tilt_x_rad": 1e-4,
+        "beam_tilt_y_rad": -3e-4,
+        "na0": 2691.4,
+        "ne0": 1434.7,
+    },
+    "encoder": {"azimuth_encoder_cosine_1_counts": 3.0, "azimuth_encoder_sine_2_counts": 0.5},
+    "limits": {"az_low_stop_counts": -21_810.0, "az_high_stop_counts": 76_191.0},
+    "alignment": {"beam_x_mm": 0.21, "beam_y_mm": -0.33, "beam_tilt_x_rad": 3e-4, "beam_tilt_y_rad": 1e-4},
+    "detector-focus": {"best_focus_mm": 0.31, "depth_mm": 1.4},
+    "search-results": {"na0": 2692.8, "ne0": 1432.9, "alpha1_rad": -1.1972616},
+    "monument-azimuth": {"azimuth_deg": 45.4087, "alpha1_rad": np.pi - np.radians(45.4087)},
+    "plate-levels": {"alpha2_rad": -14.0 * ARCSECOND, "alpha3_rad": 22.0 * ARCSECOND, "level_zero_arcsec": 4.0},
+    "monument-place": {"x_mm": -85_312.0, "y_mm": -84_107.0, "z_mm": 2431.0},
+    "inclinometer": {
+        "zero_x_volt": 0.013,
+        "zero_y_volt": -0.027,
+        "scale_x_volt_per_rad": 412.0,
+        "scale_y_volt_per_rad": 405.0,
+        "misalignment_x_arcsec": 1400.0,
+        "misalignment_y_arcsec": -2300.0,
+        "cubic_x_per_rad2": 300.0,
+        "cubic_y_per_rad2": 300.0,
+        "warmth_x_volt_per_c": 2e-4,
+        "warmth_y_volt_per_c": -1e-4,
+        "table_tilt_x_arcsec": 35.0,
+        "table_tilt_y_arcsec": -20.0,
+    },
+    "hydrostatic-level": {
+        "height_ZY103_mm": 8.412,
+        "height_ZY104_mm": -3.307,
+        "height_ZY105_mm": 1.951,
+        "constant_mm": 2.2,
+    },
 }
 WRONG = {
     "reference-distance": 13, "leakage": 29, "leakage-lit": None, "linearity": 77, "retroreflector": 41,
     "amplitude-to-phase": 9, "oscillator": None, "repeatability": None, "prism-constant": 3,
     "ball-constant": None, "gauge-blocks": 12, "spacers": None, "invar-wire": 6,
+    "autocollimation": 11, "height-gauge": 19, "both-faces": 8, "both-faces-pointing": 4, "encoder": 17,
+    "limits": 8, "alignment": 10, "detector-focus": 19, "search-results": 6, "monument-azimuth": None,
+    "plate-levels": None, "monument-place": None, "inclinometer": None, "hydrostatic-level": None,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", TRUTH)
-def test_an_example_finds_its_truth_and_its_one_wrong_reading(catseye, kind):
-    status, out, err = catseye("calibrate", kind, EXAMPLES / f"{kind}.csv", "--reject", "--json")
+def test_an_example_finds_its_truth_and_its_one_wrong_reading_and_its_record_reads_back(catseye, kind, tmp_path):
+    written = tmp_path / "record.toml"
+    status, out, err = catseye("calibrate", kind, EXAMPLES / f"{kind}.csv", "--reject", "--write", written, "--json")
     assert (status, err) == (0, "")
+    record = read_record(written, CalibrationRecord)
+    assert {q.key for q in record.quantity} >= set(TRUTH[kind])
     found = json.loads(out, parse_constant=pytest.fail)
     assert found["not_used"] == ([] if WRONG[kind] is None else [WRONG[kind]])
     for key, value in TRUTH[kind].items():

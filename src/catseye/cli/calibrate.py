@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spares itself
     "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
-    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire"
+    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
+    "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
+    "monument-place|inclinometer|hydrostatic-level"
 )
 
 

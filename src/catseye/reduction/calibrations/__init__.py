@@ -6,17 +6,31 @@ from catseye.errors import InputError
 from catseye.records.readings import read_readings
 from catseye.reduction.calibration import Calibration
 from catseye.reduction.calibrations import (
+    alignment,
     amplitude,
+    autocollimation,
+    both_faces,
+    both_faces_pointing,
+    detector_focus,
+    encoder,
     gauge_blocks,
     glass_constants,
+    height_gauge,
+    hydrostatic_level,
+    inclinometer,
     invar_wire,
     leakage,
     leakage_lit,
+    limits,
     linearity,
+    monument_azimuth,
+    monument_place,
     oscillator,
+    plate_levels,
     reference_distance,
     repeatability,
     retroreflector,
+    search_results,
 )
 from catseye.reduction.calibrations.kind import Kind
 
@@ -34,6 +48,20 @@ KINDS: dict[str, Kind] = {
     "gauge-blocks": gauge_blocks.BLOCKS_RECIPE,
     "spacers": gauge_blocks.SPACERS_RECIPE,
     "invar-wire": invar_wire.RECIPE,
+    "autocollimation": autocollimation.RECIPE,
+    "height-gauge": height_gauge.RECIPE,
+    "both-faces": both_faces.RECIPE,
+    "both-faces-pointing": both_faces_pointing.RECIPE,
+    "encoder": encoder.RECIPE,
+    "limits": limits.RECIPE,
+    "alignment": alignment.RECIPE,
+    "detector-focus": detector_focus.RECIPE,
+    "search-results": search_results.RECIPE,
+    "monument-azimuth": monument_azimuth.RECIPE,
+    "plate-levels": plate_levels.RECIPE,
+    "monument-place": monument_place.RECIPE,
+    "inclinometer": inclinometer.RECIPE,
+    "hydrostatic-level": hydrostatic_level.RECIPE,
 }
 
 

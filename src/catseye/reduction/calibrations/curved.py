@@ -1,0 +1,178 @@
+"""Readings that depend on what is sought by a curve: `fit_readings` about the latest values until they stay.
+
+A parameter is sought freely, or has a value and a standard uncertainty beforehand (a systematic effect, a value from
+another calibration); all come out with one covariance.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.reduction.calibration import Quantity
+from catseye.reduction.calibrations.fit import REJECTED, SUSPECT, USED, Effect, Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.kind import quantities
+
+ROUNDS = 40
+SETTLED = 1e-4  # of a standard uncertainty: what a further round would move
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a model.
+
+    name     what it is, for messages
+    start    where the search begins; the value known beforehand where there is one
+    step     of the differences that stand for derivatives, in its unit
+    u        standard uncertainty of that value; infinite where it is sought, zero holds it
+    """
+
+    name: str
+    start: float
+    step: float
+    u: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedFit:
+    """The outcome.
+
+    parameters    as they were given
+    values        (p,) of all of them
+    covariance    (p, p); rows and columns of held ones are zero
+    fit           the last linear one: residuals, tests; `predicted` is what the values predict
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+    fit: Fit
+
+    def index(self, name: str) -> int:
+        """Where a parameter stands; ValueError for another name."""
+        return [p.name for p in self.parameters].index(name)
+
+    def value(self, name: str) -> float:
+        """Of a parameter."""
+        return float(self.values[self.index(name)])
+
+    def u(self, name: str) -> float:
+        """Its standard uncertainty."""
+        k = self.index(name)
+        return float(np.sqrt(self.covariance[k, k]))
+
+    def quantities(self, wanted: Sequence[tuple[str, str, str, str, float]]) -> tuple[tuple[Quantity, ...], np.ndarray]:
+        """Quantities and their covariance, each wanted as (parameter, key, unit, meaning, size of the unit)."""
+        at = [self.index(name) for name, *_ in wanted]
+        scale = np.array([1.0 / size for *_, size in wanted])
+        covariance = self.covariance[np.ix_(at, at)] * np.outer(scale, scale)
+        sought = [k for k, p in enumerate(self.parameters) if np.isinf(p.u)]
+        turn = np.array([[s * (k == j) for j in sought] for k, s in zip(at, scale, strict=True)])
+        keys = [(key, unit, meaning) for _, key, unit, meaning, _ in wanted]
+        fit = self.fit if sought else None
+        return quantities(keys, self.values[at] * scale, covariance, fit=fit, turn=turn), covariance
+
+
+def fit_curved(
+    observed: np.ndarray,
+    predict: Callable[[np.ndarray], np.ndarray],
+    parameters: Sequence[Parameter],
+    scatter: Scatter,
+    *,
+    active: np.ndarray | None = None,
+    together: np.ndarray | None = None,
+    reject: bool = False,
+    level: float = 0.05,
+) -> CurvedFit:
+    """The parameters that fit readings best, where these depend on them by a curve.
+
+    observed     (m,)
+    predict      function of the values (p,) of the parameters -> (m,)
+    parameters   p, each sought or with a standard uncertainty beforehand
+    scatter, active, together, reject, level   as for `fit_readings`
+
+    Raises EstimationError where the readings do not hold every sought parameter (it names them), where too many would
+    be rejected, or where the search does not end.
+
+    Source: [FOERSTNER16] chapter 4 (Gauss-Newton with priors); derivatives by central differences.
+    """
+    values = np.array([p.start for p in parameters], dtype=float)
+    sought = np.array([np.isinf(p.u) for p in parameters], dtype=bool)
+    acting = np.array([not np.isinf(p.u) and p.u > 0.0 for p in parameters], dtype=bool)
+    start, on, rejecting = values.copy(), active, False
+    for _ in range(ROUNDS):
+        slopes = _slopes(predict, values, parameters)
+        back = np.where(acting, values - start, 0.0)  # priors stay about their own values
+        fit = fit_readings(
+            observed - predict(values) + slopes @ back,
+            slopes[:, sought],
+            scatter,
+            names=[p.name for p in parameters if np.isinf(p.u)],
+            effects=[
+                Effect(p.name, slopes[:, k], p.u) for k, p in enumerate(parameters) if acting[k]
+            ],
+            active=on,
+            together=together,
+            reject=rejecting,
+            level=level,
+        )  # fmt: skip
+        found = values.copy()
+        found[sought] += fit.x
+        found[acting] = start[acting] + [fit.effects[p.name][0] for k, p in enumerate(parameters) if acting[k]]
+        covariance = _covariance(slopes, scatter, fit, parameters)
+        u = np.sqrt(np.diag(covariance))
+        moved = np.max(np.abs(found - values) / np.where(u > 0.0, u, np.inf), initial=0.0)
+        values = found
+        if not np.isfinite(values).all():
+            break
+        if moved < SETTLED:
+            if rejecting or not reject:
+                return CurvedFit(tuple(parameters), values, covariance, replace(fit, predicted=predict(values)))
+            rejecting = True  # far from the answer every reading looks wrong
+    raise EstimationError(
+        f"the values did not settle in {ROUNDS} rounds: check the sheet's nominal values, and the columns' signs"
+    )
+
+
+def _slopes(
+    predict: Callable[[np.ndarray], np.ndarray], values: np.ndarray, parameters: Sequence[Parameter]
+) -> np.ndarray:
+    """(m, p) derivatives."""
+    columns = []
+    for k, p in enumerate(parameters):
+        aside = np.zeros(len(values))
+        aside[k] = p.step
+        columns.append((predict(values + aside) - predict(values - aside)) / (2.0 * p.step))
+    return np.column_stack(columns)
+
+
+def _covariance(slopes: np.ndarray, scatter: Scatter, fit: Fit, parameters: Sequence[Parameter]) -> np.ndarray:
+    """(p, p) of all parameters together, which `fit_readings` gives for the sought ones alone."""
+    total = scatter.claimed + sum(
+        (fit.components[name] ** 2 * matrix for name, matrix in scatter.unknown.items()), np.zeros_like(scatter.claimed)
+    )
+    block = np.ix_(fit.active, fit.active)
+    free = np.array([k for k, p in enumerate(parameters) if p.u > 0.0], dtype=int)
+    wide = slopes[np.ix_(fit.active, free)]
+    prior = np.array([0.0 if np.isinf(parameters[k].u) else parameters[k].u ** -2.0 for k in free])
+    normal = wide.T @ np.linalg.solve(total[block], wide) + np.diag(prior)
+    size = 1.0 / np.sqrt(np.diag(normal))
+    answer = np.zeros((len(parameters), len(parameters)))
+    answer[np.ix_(free, free)] = np.linalg.inv(normal * np.outer(size, size)) * np.outer(size, size)
+    return answer
+
+
+def row_ends(fit: Fit, reasons: Sequence[str], each: int) -> list[tuple[float, str]]:
+    """Of each row of a table that gave `each` observed values, one after the other: statistic and state of the worst.
+
+    reasons   why a row was left out beforehand, "" where it was not
+    """
+    states = fit.state([reason for reason in reasons for _ in range(each)])
+    order = (USED, SUSPECT, REJECTED)
+    told = []
+    for k in range(0, len(states), each):
+        statistic = max(fit.statistic[k : k + each], key=abs)
+        state = max(states[k : k + each], key=lambda s: order.index(s) if s in order else len(order))
+        told.append((float(statistic), state))
+    return told

@@ -1,0 +1,17 @@
+"""The examples of the lab's kinds are as `lab_scene` writes them."""
+
+from pathlib import Path
+
+import pytest
+
+from lab_scene import EXAMPLES, write_example
+
+HERE = Path(__file__).parents[3] / "examples" / "calibrations"
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_an_example_is_what_its_maker_writes(kind, tmp_path):
+    write_example(kind, tmp_path)
+    for ending in (".csv", ".toml"):
+        made, kept = ((folder / (kind + ending)).read_text(encoding="utf-8") for folder in (tmp_path, HERE))
+        assert made == kept
