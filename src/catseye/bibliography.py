@@ -35,7 +35,7 @@ SOURCES: dict[str, Source] = {
             "2.2.2, step 4: beta1 is minus the y displacement of the autocollimator (its own example 2.36 is right)",
             "2.4, step 6 zeroes y with the autocollimator along z^: that is Theta = beta1, not 0",
             "2.4: both autocollimation distances differ by the axis offset, not by the mirror's (`mirror_path`)",
-            "2.5, step 2 surveys x^'s azimuth, a quarter turn before 2.6's; step 4 cites 2.12 for lambda, 2.11 is meant",
+            "2.5, step 2 surveys x^'s azimuth, a quarter turn before 2.6's; step 4 cites 2.12 for lambda: 2.11",
             "2.44 omits the plus signs between X_r and its offset",
             "3.1 says the coordinates are unique: three ranges give two points, mirror images in the stations' plane",
             "2.5 (example) says the y origin is the tooling ball of ZY2: z is meant",
@@ -400,7 +400,7 @@ SOURCES: dict[str, Source] = {
     "SNYDER87": Source(
         title="J. P. Snyder, Map projections: a working manual, U.S. Geological Survey Professional Paper 1395, 1987",
         locator="doi:10.3133/pp1395",
-        used="eqs. 4-18, 4-20 (radii of curvature), 14-4, 14-15, 15-1 to 15-9 (Lambert conformal conic on the ellipsoid)",
+        used="eqs. 4-18, 4-20 (radii of curvature), 14-4, 14-15, 15-1 to 15-9 (Lambert conformal conic)",
     ),
     "STEM89": Source(
         title="J. E. Stem, State Plane Coordinate System of 1983, NOAA Manual NOS NGS 5, 1989",
@@ -436,5 +436,25 @@ SOURCES: dict[str, Source] = {
         title="F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, 1965",
         locator="doi:10.1109/TIT.1965.1053737",
         used="the likelihood of a Kalman filter's innovations, for the modes of a vibration",
+    ),
+    "MEEUS98": Source(
+        title="J. Meeus, Astronomical Algorithms, second edition, Willmann-Bell, 1998",
+        locator="ISBN 0-943396-61-1",
+        used="eqs. 16.3 and 16.4 (refraction), example 25.b (apparent place of the Sun, 1992 October 13.0 TD)",
+    ),
+    "IERS10": Source(
+        title="G. Petit and B. Luzum (editors), IERS Conventions (2010), IERS Technical Note 36",
+        locator="Verlag des Bundesamts für Kartographie und Geodäsie, Frankfurt am Main, 2010",
+        used="chapter 5: UT1 and the turn of the Earth; its bulletins A and B give UT1 - UTC",
+    ),
+    "MIRTICH96": Source(
+        title="B. V. Mirtich, Impulse-based dynamic simulation of rigid body systems, thesis, 1996",
+        locator="University of California, Berkeley, 1996",
+        used="conservative advancement: time to contact bounded from below by distance over rate",
+    ),
+    "DIJKSTRA59": Source(
+        title="E. W. Dijkstra, A note on two problems in connexion with graphs, Numerische Mathematik 1, 1959",
+        locator="doi:10.1007/BF01386390",
+        used="problem 2: the shortest way",
     ),
 }

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
 from catseye.ranger import motion_units as units
+from catseye.records.mirror import MirrorGeometry
 
 
 def test_the_data_sheet_s_worked_example():
@@ -95,3 +96,14 @@ def test_a_speed_too_small_to_move_is_refused_and_zero_is_not():
 def test_a_clock_the_chip_has_not_is_refused(clock):
     with pytest.raises(ValidityError, match="clock"):
         units.sample_time(clock)
+
+
+def test_a_record_tells_how_fast_the_axes_go():
+    sheet = {"zp": "ZP1", "dx_mm": 0.0, "dy_mm": 250.0, "dz_mm": 0.0, "beta1_rad": 0.0, "beta2_rad": 0.0}
+    limits = {"na0": 0, "ne0": 0, "az_low_limit": -20_000, "az_high_limit": 70_000}
+    rates = {"abv_0": units.velocity_integer(12_000.0), "aba_0": units.acceleration_integer(40_000.0), "abv_1": 44_739}
+    pace = units.pace_of(MirrorGeometry(**sheet, **limits, **rates, aba_1=153))
+    assert pace.velocity == pytest.approx((12_000.0, 2000.0), rel=1e-3)
+    assert pace.acceleration == pytest.approx((40_000.0, 20_000.0), rel=3e-3)
+    with pytest.raises(ValidityError, match=r"ZP1: aba_1 = None \(expected above 0"):
+        units.pace_of(MirrorGeometry(**sheet, **limits, **rates))

@@ -16,7 +16,7 @@ from catseye.records.mirror import MirrorGeometry
 from catseye.records.structural_model import read_structural_model
 from catseye.records.target import FeedArmRanger
 from catseye.reduction.antenna import SubreflectorPosition, antenna_of
-from catseye.reduction.moving_ranger import Drive, Known, moving_ranger, projected, vibrating
+from catseye.reduction.moving_ranger import Driven, Known, moving_ranger, projected, vibrating
 from catseye.reduction.pointing import feed_arm_station
 from catseye.signal.vibration import Mode, start
 
@@ -30,7 +30,7 @@ RANGER = FeedArmRanger(
     mount_y=(0.0, -0.6, -0.8),
 )
 # slewing at the telescope's fastest
-DRIVE = Drive(
+DRIVE = Driven(
     time=100.0,
     azimuth=145.3 * DEGREE,
     elevation=38.0 * DEGREE,

@@ -10,9 +10,11 @@ import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
+from catseye.constants import DEGREE
 
 EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
 DAY = 86_400.0
+REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.visibility, whose import --help spares itself
 
 
 def _time(text: str | None) -> str | None:
@@ -48,6 +50,35 @@ def _triple(text: str) -> list[float]:
     if len(numbers) != 3 or not all(math.isfinite(v) for v in numbers):
         raise typer.BadParameter(f"{text!r} is not x,y,z in metres.")
     return numbers
+
+
+def _kind(name: str | None) -> str | None:
+    if name is not None and name not in REFLECTORS.split("|"):
+        raise typer.BadParameter(f"{name!r} is not one of {', '.join(REFLECTORS.split('|'))}.")
+    return name
+
+
+def _vector(text: str | None) -> str | None:
+    if text is not None and not any(_triple(text)):
+        raise typer.BadParameter(f"{text!r} points nowhere.")
+    return text
+
+
+def _posture(text: str | None) -> str | None:
+    if text is not None:
+        _angles(text)
+    return text
+
+
+def _angles(text: str) -> tuple[float, float]:
+    """Azimuth and elevation, rad, of "AZ,EL" in degrees."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 2 or not (abs(numbers[0]) <= 540.0 and -5.0 <= numbers[1] <= 95.0):
+        raise typer.BadParameter(f"{text!r} is not AZ,EL in degrees, elevation -5 to 95.")
+    return numbers[0] * DEGREE, numbers[1] * DEGREE
 
 
 def _cone(value: float | None) -> float | None:
@@ -92,9 +123,24 @@ def point(
     keep_out: Annotated[
         Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="Boxes that no beam may enter.")
     ] = None,
+    reflector: Annotated[
+        str | None,
+        typer.Option("--reflector", metavar=REFLECTORS, callback=_kind, help="What stands there: is it visible?"),
+    ] = None,
+    facing: Annotated[
+        str | None,
+        typer.Option("--facing", metavar="X,Y,Z", callback=_vector, help="Outward axis of the reflectors, ground."),
+    ] = None,
+    solids: Annotated[
+        Path | None, typer.Option("--solids", metavar="SOLIDS.toml", help="What may stand in the way.")
+    ] = None,
+    posture: Annotated[
+        str | None,
+        typer.Option("--posture", metavar="AZ,EL", callback=_posture, help="Of the telescope, deg, for its solids."),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun and keep-out boxes."""
+    """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun, keep-out boxes, visibility."""
     import numpy as np
 
     from catseye.gateways.objects import json_line
@@ -104,9 +150,10 @@ def point(
     from catseye.records.mirror import MirrorGeometry
     from catseye.records.monument import MonumentGeometry
     from catseye.records.reading import read_record
+    from catseye.records.solids import Solids
     from catseye.reduction.pointing import point as pointed
     from catseye.reduction.pointing import station_of
-    from catseye.reduction.sighting import place_of_monument, sightings
+    from catseye.reduction.sighting import place_of_monument, seen_from, sightings
 
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
@@ -121,17 +168,28 @@ def point(
     station = station_of(stands, mirrors)
     seen = []
     if mjd is not None or zones.box:
-        seen = sightings(station, found.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones)
+        seen = sightings(station, mirrors, found.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones)
+    visible = None
+    if reflector or facing or solids:
+        visible = seen_from(
+            station,
+            stands.monument,
+            where,
+            kind=reflector or "prism",
+            facing=None if facing is None else np.array(_triple(facing)),
+            solids=Solids() if solids is None else read_record(solids, Solids),
+            posture=None if posture is None else _angles(posture),
+        )
     if write is not None:
         from catseye.gateways.output import whole_file
 
         with whole_file(write, "--write", MARK) as page:
             page.append(output_dat(found, f"{mirrors.zp} on {stands.monument}"))
     if json:
-        say(json_line(pointing_objects(found, seen)))
+        say(json_line(pointing_objects(found, seen, visible)))
         return
     say(pointing_table(found))
     if stands.zp is not None and stands.zp != mirrors.zp:
         say(f"{mirrors.zp} is not the mirror that the record of {stands.monument} names, {stands.zp}")
-    for remark in pointing_remarks(found, seen):
+    for remark in pointing_remarks(found, seen, visible):
         say(remark)

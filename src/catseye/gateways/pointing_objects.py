@@ -8,14 +8,17 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.reduction.guard import Verdict, utc_text
 from catseye.reduction.pointing import Pointings
 from catseye.reduction.sighting import Sighting
+from catseye.reduction.visibility import Visibility
 
 MARK = "# catseye point"
 HEADINGS = ("x", "y", "z", "range", "N_a", "N_e", "autocoll.", "back retro", "N_a'", "N_e'", "allowed")
 UNITS = ("m", "m", "m", "m", "counts", "counts", "counts", "counts", "counts", "counts", "")
 
 
-def pointing_objects(found: Pointings, sightings: list[Sighting]) -> list[dict[str, Any]]:
-    """One object a point, SI keys; `sun` and `keep_out` where they were asked for."""
+def pointing_objects(
+    found: Pointings, sightings: list[Sighting], seen: Visibility | None = None
+) -> list[dict[str, Any]]:
+    """One object a point, SI keys; `sun`, `keep_out` and `visibility` where they were asked for."""
     answer = []
     for k, to in enumerate(found.to):
         item: dict[str, Any] = {
@@ -39,6 +42,9 @@ def pointing_objects(found: Pointings, sightings: list[Sighting]) -> list[dict[s
         }
         if sightings:
             item |= _sighting_object(sightings[k])
+        if seen is not None:
+            angle = float(seen.incidence[0, k])
+            item["visibility"] = {"visible": bool(seen.seen[0, k]), "reason": seen.reason(0, k), "incidence": angle}
         answer.append(item)
     return answer
 
@@ -56,8 +62,6 @@ def _sighting_object(seen: Sighting) -> dict[str, Any]:
         }
     if seen.keep_out is not None:
         item["keep_out"] = _verdict_object(seen.keep_out)
-    if seen.visible is not None:
-        item["visibility"] = {"visible": seen.visible, "reason": seen.hidden_by, "incidence": seen.incidence}
     return item
 
 
@@ -90,7 +94,7 @@ def _allowed(direct: bool, prime: bool) -> str:
     return {(True, True): "both", (True, False): "direct", (False, True): "prime"}.get((direct, prime), "neither")
 
 
-def pointing_remarks(found: Pointings, sightings: list[Sighting]) -> list[str]:
+def pointing_remarks(found: Pointings, sightings: list[Sighting], visible: Visibility | None = None) -> list[str]:
     """What the table does not show, one line each."""
     remarks = []
     if found.lacking:
@@ -100,8 +104,9 @@ def pointing_remarks(found: Pointings, sightings: list[Sighting]) -> list[str]:
         remarks.append(f"u of the counts at most {u[0]:.2f} in azimuth, {u[1]:.2f} in elevation")
     for seen in sightings:
         remarks += [v.reason for v in (seen.sun, seen.keep_out) if v is not None and not v.allowed]
-        if seen.visible is False:
-            remarks.append(f"not visible: {seen.hidden_by}")
+    if visible is not None:
+        for k, to in enumerate(found.to):
+            remarks.append(f"{', '.join(f'{v:g}' for v in to)}: {visible.reason(0, k)}")
     suns = [seen for seen in sightings if seen.separation is not None]
     if suns:
         first, near = suns[0], min(float(seen.separation or 0.0) for seen in suns) / DEGREE

@@ -16,6 +16,8 @@ from catseye.errors import ValidityError
 COUNTS_PER_TURN = 100_000.0
 HALF_TURN = 0.5 * COUNTS_PER_TURN
 COUNTS_PER_RADIAN = COUNTS_PER_TURN / TWO_PI  # of an axis; the beam's Phi counts half as much
+BEAM_PER_COUNT = np.array([1.0, 2.0]) / COUNTS_PER_RADIAN  # rad of Theta and of Phi
+BEAM_PER_COUNT.flags.writeable = False
 
 
 class Choice(NamedTuple):

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.geometry.encoder import COUNTS_PER_TURN
+from catseye.geometry.slew import Pace
+from catseye.records.mirror import MirrorGeometry
 
 CLOCK_HZ = 6e6
 CLOCKS_PER_SAMPLE = 2048
@@ -187,6 +189,23 @@ def acceleration_counts(integer: int, sample: float = SAMPLE_TIME) -> float:
     sample    time between samples, s
     """
     return integer / FRACTION / sample**2
+
+
+def pace_of(mirror: MirrorGeometry, sample: float = SAMPLE_TIME) -> Pace:
+    """How fast a mirror's axes go and accelerate by its record.
+
+    mirror    with abv_0, aba_0, abv_1, aba_1
+    sample    time between samples, s
+
+    Raises ValidityError where the record does not say it, or says zero.
+    """
+    for key in ("abv_0", "aba_0", "abv_1", "aba_1"):
+        if not getattr(mirror, key):
+            raise ValidityError(f"{mirror.zp}: {key} = {getattr(mirror, key)} (expected above 0: how fast its axes go)")
+    return Pace(
+        (velocity_counts(mirror.abv_0 or 0, sample), velocity_counts(mirror.abv_1 or 0, sample)),
+        (acceleration_counts(mirror.aba_0 or 0, sample), acceleration_counts(mirror.aba_1 or 0, sample)),
+    )
 
 
 def derivative_interval(setting: int, sample: float = SAMPLE_TIME) -> float:

@@ -28,7 +28,7 @@ FEED_ARM = "feed_arm"
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class Driven:
     """The telescope's motion about a time, as its control system gives it.
 
     time                             s, to which azimuth and elevation belong
@@ -144,7 +144,7 @@ def moving_ranger(
     ranger: FeedArmRanger,
     mirror: MirrorGeometry,
     antenna: Antenna,
-    drive: Drive,
+    drive: Driven,
     times: ArrayLike,
     *,
     u_mount: float,
@@ -194,7 +194,7 @@ def moving_ranger(
 def projected(
     antenna: Antenna,
     group: str,
-    drive: Drive,
+    drive: Driven,
     times: ArrayLike,
     *,
     known: tuple[Known, ...] = (),
@@ -268,7 +268,7 @@ def _propagated(
     return total
 
 
-def _of_axes(slopes: np.ndarray, drive: Drive) -> np.ndarray:
+def _of_axes(slopes: np.ndarray, drive: Driven) -> np.ndarray:
     """Covariance from the encoders of azimuth and elevation."""
     u = np.array([drive.u_azimuth, drive.u_elevation])[: slopes.shape[-1]]
     return (slopes * u**2) @ np.swapaxes(slopes, -1, -2)

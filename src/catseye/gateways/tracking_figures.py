@@ -1,0 +1,120 @@
+"""Figures of following, finding and seeing: misses over time, a search and its spot, who sees what."""
+
+import numpy as np
+
+from catseye.gateways.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
+from catseye.geometry.search_pattern import count_size
+from catseye.reduction.spot_fit import Spot
+from catseye.reduction.tracking import Following, Track
+from catseye.reduction.visibility import Sight, Visibility
+
+SIGHTS = {
+    Sight.SEEN: (SERIES[2], "seen"),
+    Sight.INCIDENCE: (SERIES[4], "incidence"),
+    Sight.OBSTRUCTED: (SERIES[1], "obstructed"),
+    Sight.TOO_FAR: (SERIES[3], "too far"),
+    Sight.TOO_NEAR: (SERIES[5], "too near"),
+    Sight.BEYOND_STOPS: (BAD, "beyond the stops"),
+}
+MOST_LABELS = 60  # on an axis
+ELLIPSE = 3.0  # standard deviations drawn
+
+
+def miss_figure(track: Track, misses: np.ndarray, shares: np.ndarray, limit: float = 1e-3) -> str:
+    """SVG: how far the beams pass their targets, over the track; the worst pair, the median, and the limit.
+
+    track     that was followed
+    misses    (s, k, r, p) m, of `reduction.tracking.misses`
+    shares    (k,) of each interval
+    limit     m, drawn as a line
+    """
+    good = track.status == Following.FOLLOWED
+    when = (track.since[:-1, None] + np.asarray(shares) * np.diff(track.since)[:, None]).ravel()
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(8.6, 3.2), layout="constrained")
+        ax = figure.subplots()
+        if good.any():
+            shown = 1e3 * misses[:, :, good].reshape(len(when), -1)
+            ax.plot(when, shown.max(axis=1), color=SERIES[1], lw=1.1, label=f"worst of {int(good.sum())} pairs")
+            ax.plot(when, np.median(shown, axis=1), color=SERIES[0], lw=1.1, label="median")
+        ax.axhline(1e3 * limit, color=BAD, lw=0.9, ls="--", label=f"{1e3 * limit:g} mm")
+        ax.set_yscale("log")
+        ax.set_xlabel("time (s)")
+        ax.set_ylabel("beam past the target (mm)")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return svg(figure)
+
+
+def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> str:
+    """SVG: the places that a search looked at, in order, coloured by what came back, and the spot's centre if found.
+
+    spot     of `reduction.finding.find`
+    zeros    (na0, ne0) counts, for the size of counts on the sky: the picture is as the sky is
+    title    instead of the status
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(7.4, 5.2), layout="constrained")
+        ax = figure.subplots()
+        na, ne = spot.looked_at.T if len(spot.looked_at) else (np.zeros(0), np.zeros(0))
+        ax.plot(na, ne, color=GRID, lw=0.7, zorder=1)
+        known = np.isfinite(spot.seen)
+        drawn = ax.scatter(na[known], ne[known], c=spot.seen[known], s=16, cmap="viridis", linewidths=0, zorder=2)
+        ax.plot(na[~known], ne[~known], "x", ms=4, color=FAINT, zorder=2)
+        figure.colorbar(drawn, ax=ax, label="return (V)", shrink=0.85)
+        if spot.found:
+            _mark(ax, spot)
+        if len(spot.looked_at):
+            across, up = count_size(np.median(spot.looked_at, axis=0), zeros)
+            ax.set_aspect(up / max(across, 0.02 * up))  # near the azimuth axis a count is nothing
+        ax.set_xlabel("azimuth counts")
+        ax.set_ylabel("elevation counts")
+        ax.ticklabel_format(useOffset=False)
+        shown = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
+        ax.set_title(f"{shown}: {_said(spot)}" if spot.found else shown, fontsize=8.5)
+        return svg(figure)
+
+
+def _mark(ax, spot: Spot) -> None:
+    """Centre and ellipse of three standard deviations."""
+    values, vectors = np.linalg.eigh(spot.covariance)
+    turn = np.linspace(0.0, 2.0 * np.pi, 120)
+    ring = vectors @ (np.sqrt(values)[:, None] * ELLIPSE * np.stack([np.cos(turn), np.sin(turn)]))
+    ax.plot(*spot.counts, "+", ms=10, color=BAD, mew=1.4, zorder=4)
+    ax.plot(*(spot.counts[:, None] + ring), color=BAD, lw=1.0, zorder=4, label=f"centre, {ELLIPSE:g} u")
+
+
+def _said(spot: Spot) -> str:
+    (na, ne), (u_na, u_ne) = spot.counts, spot.u_counts
+    return f"{na:.2f} ± {u_na:.2f}, {ne:.2f} ± {u_ne:.2f} counts; {spot.amplitude:.2f} V, flatness {spot.flatness:.1f}"
+
+
+def visibility_figure(found: Visibility) -> str:
+    """SVG: rangers by retroreflectors, each cell coloured by whether it is seen, or why not."""
+    rangers, targets = found.code.shape
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(min(12.0, 3.2 + 0.16 * targets), 1.6 + 0.22 * rangers), layout="constrained")
+        ax = figure.subplots()
+        colours = mpl.colors.ListedColormap([SIGHTS[Sight(k)][0] for k in range(len(Sight))])
+        ax.imshow(found.code, cmap=colours, vmin=-0.5, vmax=len(Sight) - 0.5, aspect="auto", interpolation="none")
+        ax.set_yticks(range(rangers), found.rangers, fontsize=7.5)
+        if targets <= MOST_LABELS:
+            ax.set_xticks(range(targets), found.targets, rotation=90, fontsize=6.5)
+        else:
+            ax.set_xlabel(f"{targets} retroreflectors")
+        ax.set_xticks(np.arange(0.5, targets), minor=True)
+        ax.set_yticks(np.arange(0.5, rangers), minor=True)
+        ax.grid(False)
+        if targets <= MOST_LABELS:
+            ax.grid(which="minor", color="white", lw=0.8)
+        ax.tick_params(which="both", length=0)
+        there = [sight for sight in SIGHTS if np.any(found.code == sight)]
+        counts = {sight: int(np.sum(found.code == sight)) for sight in there}
+        handles = [mpl.patches.Patch(color=SIGHTS[s][0], label=f"{SIGHTS[s][1]}: {counts[s]}") for s in there]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        return svg(figure)

@@ -1,0 +1,206 @@
+"""Finding a target by its return: search until there is light, scan around it, fit the spot, say where it is.
+
+    find               the whole of it, from a predicted pointing and something that measures; the spot by `spot_fit`
+    found_point        the target's place, from the counts found and a known range
+    search_results     a table of what was found; adjustment_readings the one by which zeros and angles are adjusted
+
+A target that is not found is a status with what was searched, never an exception.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.pointing import Station, ray, ray_jacobian
+from catseye.geometry.search_pattern import (
+    LEAST_REACH,
+    Pattern,
+    count_size,
+    offsets_of_counts,
+    raster,
+    spiral,
+)
+from catseye.geometry.time_tag import TimeTag
+from catseye.optics.spot import reach
+from catseye.reduction.spot_fit import Head, Spot, fit_spot
+
+Array = NDArray[np.float64]
+Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN where there is no reading
+Allowed = Callable[[Array], NDArray[np.bool_]]  # of (n, 2) counts
+
+WIDER = 1.6  # half a scan's width over the spot's radius
+RECENTRED = 3  # scans at most
+COLUMNS = (
+    "target",
+    "azimuth_counts",
+    "elevation_counts",
+    "u_azimuth_counts",
+    "u_elevation_counts",
+    "amplitude_volt",
+    "mjd",
+)
+
+
+def find(
+    predicted: ArrayLike, head: Head, measure: Measure, *, search_radius: float, allowed: Allowed | None = None
+) -> Spot:
+    """The pointing at which a target returns most, searched for about a predicted one.
+
+    predicted       (2,) counts (Na, Ne), real, direct or prime
+    head            the ranger
+    measure         amplitude at (2,) whole counts
+    search_radius   rad on the sky, 0 or more
+    allowed         which of (n, 2) counts may be looked at (Sun, structure); all if None
+
+    A spiral of looks, without gaps for a spot that falls to the threshold no sooner than to half its peak (a status
+    says so where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
+    until the spot's centre is well inside; then `fit_spot`.
+
+    Source: the notes' practice of searching at predicted counts; patterns in `geometry.search_pattern`.
+    """
+    looked: list[Array] = []
+    seen: list[float] = []
+
+    def look(at: Array) -> float:
+        value = float(measure(at))
+        looked.append(at)
+        seen.append(value)
+        return value
+
+    within = max(float(reach(head.radius, 0.5)), LEAST_REACH)
+    pattern = spiral(predicted, head.zeros, search_radius, within, head.azimuth_limits)
+    kept, forbidden = _permitted(pattern, allowed)
+    hit = next((at for at in kept if look(at) > head.threshold_volt), None)
+    if hit is None:
+        status = _nothing(pattern, forbidden, seen, predicted, head, search_radius)
+        return Spot(status, looked_at=np.array(looked).reshape(-1, 2), seen=np.array(seen))
+    fine = float(max(0.5 * np.hypot(*count_size(hit, head.zeros)) * 1.001, 0.25 * head.radius))
+    centre, half = hit, WIDER * head.radius
+    spot = Spot("")
+    for _ in range(RECENTRED):
+        try:
+            scan = raster(centre, head.zeros, (half, half), fine, head.azimuth_limits)
+        except ValidityError:  # the azimuth axis lies within the scan: a raster has no rows there
+            scan = spiral(centre, head.zeros, half, max(fine, LEAST_REACH), head.azimuth_limits)
+        inner, forbidden = _permitted(scan, allowed)
+        known = {tuple(at) for at in looked}
+        for at in inner:
+            if tuple(at) not in known:
+                look(at)
+        near = offsets_of_counts(centre, head.zeros, np.array(looked))
+        use = np.hypot(near[:, 0], near[:, 1]) <= 2.0 * half
+        spot = fit_spot(np.array(looked)[use], np.array(seen)[use], head)
+        off = offsets_of_counts(centre, head.zeros, spot.counts[None])[0] if spot.found else np.zeros(2)
+        if not spot.found or np.hypot(*off) <= 0.5 * half:
+            break
+        centre = np.rint(spot.counts)
+    status = spot.status
+    if not spot.found:
+        status = f"{status} (light of {np.nanmax(seen):.2f} V near {hit[0]:.0f}, {hit[1]:.0f})"
+    return replace(spot, status=status, looked_at=np.array(looked), seen=np.array(seen))
+
+
+def found_point(
+    station: Station, spot: Spot, distance: float, u_distance: float, *, of_station: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
+
+    station       the ranger
+    spot          found
+    distance      m from the scan point, above 0; u_distance m
+    of_station    (13, 13) covariance of the station's parameters; none if None
+
+    Raises ValidityError for a spot that was not found.
+
+    Source: [PARKER04] eqs. 2.12-2.22 turned round; [JCGM102] first order.
+    """
+    if not spot.found:
+        raise ValidityError(f"no point for a target that was {spot.status}")
+    if not (distance > 0.0 and u_distance >= 0.0):
+        raise ValidityError(f"distance {distance} m, u {u_distance} m: expected above 0, and 0 or more")
+    origin, direction = ray(station, spot.counts)
+    by_counts, turned, moved = ray_jacobian(station, spot.counts)
+    slope = distance * by_counts
+    covariance = slope @ spot.covariance @ slope.T + u_distance**2 * np.outer(direction, direction)
+    if of_station is not None:
+        whole = moved + distance * turned
+        covariance = covariance + whole @ np.asarray(of_station, dtype=float) @ whole.T
+    return origin + distance * direction, covariance
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """A target that was found: its name, the spot, and when."""
+
+    target: str
+    spot: Spot
+    when: TimeTag
+
+
+def search_results(results: Sequence[SearchResult]) -> str:
+    """CSV text of targets found: real counts with their standard uncertainties, V, and an MJD to the microsecond.
+
+    Those that were not found have no row: what has no counts adjusts nothing. Raises ValidityError where none was.
+    """
+    found = [result for result in results if result.spot.found]
+    if not found:
+        raise ValidityError(f"none of {len(results)} targets was found: there is no table of search results to write")
+    lines = [",".join(COLUMNS)]
+    for result in found:
+        spot, u = result.spot, result.spot.u_counts
+        numbers = [*(f"{n:.3f}" for n in spot.counts), *(f"{v:.4f}" for v in u), f"{spot.amplitude:.4f}"]
+        lines.append(",".join([result.target, *numbers, result.when.text()]))
+    return "\n".join(lines) + "\n"
+
+
+def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, ArrayLike], ne0: float) -> str:
+    """CSV text of targets found, with where they are, as the calibration kind `search-results` reads it.
+
+    results    of one ranger; those not found have no row
+    places     target: (3,) m, ground
+    ne0        counts, elevation at Phi = 0: below it is the prime pointing
+
+    Raises ValidityError where none was found, or where a target that was has no place.
+    """
+    found = [result for result in results if result.spot.found]
+    missing = [result.target for result in found if result.target not in places]
+    if missing or not found:
+        what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
+        raise ValidityError(f"{what}: there is nothing to adjust by")
+    lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,pointing,mjd_utc"]
+    for result in found:
+        na, ne = result.spot.counts
+        where = [f"{x:.5f}" for x in np.asarray(places[result.target], dtype=float)]
+        pointing = "prime" if ne < ne0 else "direct"
+        lines.append(",".join([result.target, *where, f"{na:.3f}", f"{ne:.3f}", pointing, result.when.text()]))
+    return "\n".join(lines) + "\n"
+
+
+def _permitted(pattern: Pattern, allowed: Allowed | None) -> tuple[Array, int]:
+    if allowed is None or not len(pattern):
+        return pattern.counts, 0
+    good = np.asarray(allowed(pattern.counts), dtype=bool)
+    return pattern.counts[good], int(np.sum(~good))
+
+
+def _nothing(
+    pattern: Pattern, forbidden: int, seen: list[float], predicted: ArrayLike, head: Head, radius: float
+) -> str:
+    """The status of a search that saw no light."""
+    na, ne = np.asarray(predicted, dtype=float)
+    readings = [value for value in seen if np.isfinite(value)]
+    gaps = {
+        "beyond the stops": pattern.left_out,
+        "forbidden": forbidden,
+        "without a reading": len(seen) - len(readings),
+    }
+    left = ", ".join(f"{number} {what}" for what, number in gaps.items() if number)
+    narrow = "; the spot is narrower than whole counts surely meet" if reach(head.radius, 0.5) < LEAST_REACH else ""
+    most = f"; the largest was {max(readings):.3f} V" if readings else ""
+    return (
+        f"not found: nothing above {head.threshold_volt:g} V at {len(readings)} places within {1e3 * radius:.3g} mrad "
+        f"of {na:.1f}, {ne:.1f}{f' ({left})' if left else ''}{most}{narrow}"
+    )

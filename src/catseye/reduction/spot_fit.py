@@ -1,0 +1,281 @@
+"""The spot that a scan over a retroreflector shows: where its centre is, in counts, and how well that is known."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.search_pattern import count_size, counts_of_offsets, offsets_of_counts
+from catseye.optics.spot import gaussian_spot
+
+Array = NDArray[np.float64]
+
+FOUND = "found"
+UNIFORM = 1.0 / np.sqrt(12.0)  # standard uncertainty of what is known to a whole count
+FEWEST = 8  # readings for six parameters, with some to test them
+FLAT_PRIOR = 1.5  # of the root of flatness - 1: real spots have 0 to 2
+SINGULAR = 1e-10  # least eigenvalue of the parameters' correlations
+FEWEST_LIT = 3  # readings of a spot
+TIMES_NOISE = 5.0  # above the background: such a reading is lit
+BOUNDS = np.array([20.0, 20.0, 3.0, np.inf, np.inf, 3.0])  # of x, y, ln radius, peak, background, g
+FEW_SIGMAS = 3.0  # beyond, a residual counts in proportion (Huber)
+ROUNDS = 3  # of the readings' weights
+NODES = 4  # of each axis within a count
+
+
+@dataclass(frozen=True)
+class Head:
+    """What a search must know of a ranger and its spot.
+
+    zeros             (na0, ne0) counts
+    azimuth_limits    counts, low and high
+    radius            rad: of the spot expected, where its Gaussian has fallen to 1/e^2
+    threshold_volt    V: a return above it is light from the target
+    noise_volt        V, standard uncertainty of one amplitude
+    full_scale_volt   V: an amplitude not below it is clipped
+    scintillation     standard uncertainty of an amplitude over itself, of air and laser
+    u_counts          of a shaft's place when it reads a whole count, spread evenly
+    misfit            standard deviation of a real spot's shape from the model's, over its peak
+    """
+
+    zeros: tuple[float, float]
+    azimuth_limits: tuple[float, float]
+    radius: float
+    threshold_volt: float
+    noise_volt: float
+    full_scale_volt: float = 10.0
+    scintillation: float = 0.02
+    u_counts: float = UNIFORM
+    misfit: float = 0.01
+
+    def __post_init__(self) -> None:
+        positive = {"radius": self.radius, "threshold_volt": self.threshold_volt, "noise_volt": self.noise_volt}
+        for name, value in (*positive.items(), ("full_scale_volt", self.full_scale_volt)):
+            if not 0.0 < value < np.inf:
+                raise ValidityError(f"{name} = {value} is not above 0 and finite")
+        for name in ("scintillation", "u_counts", "misfit"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValidityError(f"{name} = {getattr(self, name)} is not 0 or more and finite")
+        if self.threshold_volt >= self.full_scale_volt:
+            raise ValidityError(f"threshold {self.threshold_volt} V is not below full scale {self.full_scale_volt} V")
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A fitted spot; NaN where the status is not "found".
+
+    status            "found", or one line that says what was searched and what to do
+    counts            (2,) of its centre, real
+    covariance        (2, 2) counts^2
+    amplitude         V of the centre, above the background
+    radius            rad, at 1/e^2
+    background        V
+    flatness          1 a Gaussian, more a flat top
+    variance_factor   of the readings that hold the centre, expectation 1; where above 1 the covariance is multiplied
+    readings          that took part
+    looked_at         (n, 2) counts in order, of the whole search
+    seen              (n,) V there
+    """
+
+    status: str
+    counts: Array = field(default_factory=lambda: np.full(2, np.nan))
+    covariance: Array = field(default_factory=lambda: np.full((2, 2), np.nan))
+    amplitude: float = np.nan
+    radius: float = np.nan
+    background: float = np.nan
+    flatness: float = np.nan
+    variance_factor: float = np.nan
+    readings: int = 0
+    looked_at: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    seen: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def found(self) -> bool:
+        return self.status == FOUND
+
+    @property
+    def u_counts(self) -> Array:
+        """(2,) standard uncertainties."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: Head) -> Spot:
+    """A round spot on a background, Gaussian or flatter, fitted to amplitudes at counts by least squares.
+
+    counts       (n, 2) counts (Na, Ne), all in one pointing
+    amplitude    (n,) V; NaN is missing, not below full scale is clipped
+    head         the ranger: noise, expected radius, full scale
+
+    The prediction is the spot's mean over where the shafts may stand within a count; a reading's variance is that of
+    the noise, the scintillation, what the spot varies over these places, and the misfit of shape. A clipped reading
+    counts only while the spot is below full scale there. The start is the centroid of what stands above the lower half.
+    A retroreflector wider than the beam makes a spot with a flat top: its flatness is a parameter with a prior that
+    begins at the Gaussian. Residuals beyond three standard deviations count less, as at steep sides and where a bird
+    flies by. Misfit beyond all this is in the variance factor, by which the covariance grows.
+
+    Source: least squares with the weights of [HUBER09] on the model of `optics.spot.gaussian_spot`; covariance
+    [JCGM100] 5.2 of independent readings. Against scatter, on spots made by diffraction, the mean of e' C^-1 e is 2.3
+    where 2 is expected: u is some 7 % too small, since a spot's steep sides make errors that are not normal.
+    """
+    n, a = np.asarray(counts, dtype=float).reshape(-1, 2), np.asarray(amplitude, dtype=float)
+    if a.shape != (len(n),):
+        raise ValidityError(f"amplitude has shape {a.shape}, expected ({len(n)},), one for each pair of counts")
+    good = np.isfinite(a) & np.isfinite(n).all(axis=1)
+    n, a = n[good], a[good]
+    clipped = a >= head.full_scale_volt
+    if np.sum(~clipped) < FEWEST:
+        return Spot(f"not found: {np.sum(~clipped)} readings that are not clipped are too few (expected {FEWEST})")
+    dark = float(np.median(np.sort(a)[: max(1, len(a) // 4)]))
+    lit = int(np.sum(a > dark + TIMES_NOISE * head.noise_volt))
+    if lit < FEWEST_LIT:
+        return Spot(f"not found: no spot stands out, {lit} of {len(a)} readings are lit (expected {FEWEST_LIT})")
+    middle = n[int(np.argmax(a))]
+    xy = offsets_of_counts(middle, head.zeros, n) / head.radius
+    size = count_size(middle, head.zeros) / head.radius * head.u_counts
+    sheet = _Sheet(xy, a, clipped, head, size)
+    p, q, factor = sheet.fitted()
+    if not np.isfinite(p).all() or not np.isfinite(q).all():
+        return Spot("not found: the readings do not hold a spot's centre, radius and height (expected a wider scan)")
+    background, peak = p[4], p[3]
+    if not _surrounded(xy, p[:2]):
+        edge = counts_of_offsets(middle, head.zeros, p[None, :2] * head.radius)[0]
+        return Spot(f"not found: the spot's centre {edge[0]:.1f}, {edge[1]:.1f} lies outside the scan")
+    centre, slope = _in_counts(middle, head, p[:2])
+    return Spot(
+        FOUND,
+        centre,
+        slope @ q[:2, :2] @ slope.T,
+        float(peak),
+        float(np.exp(p[2]) * head.radius),
+        float(background),
+        float(1.0 + p[5] ** 2),
+        factor,
+        len(a),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheet:
+    """Readings in units of the expected radius, and their fit; parameters x, y, ln radius, peak, background, g;
+    flatness is 1 + g^2.
+    """
+
+    xy: Array
+    a: Array
+    clipped: NDArray[np.bool_]
+    head: Head
+    size: Array
+
+    @cached_property
+    def around(self) -> tuple[Array, Array]:
+        """Offsets (n, k, 2) of the readings with the shafts anywhere within what is known, and their weights (k)."""
+        node, weight = np.polynomial.legendre.leggauss(NODES)
+        dx, dy = np.meshgrid(node * np.sqrt(3.0) * self.size[0], node * np.sqrt(3.0) * self.size[1])
+        return self.xy[:, None] + np.stack([dx.ravel(), dy.ravel()], axis=-1), 0.25 * np.outer(weight, weight).ravel()
+
+    def shapes(self, p: Array) -> Array:
+        """(n, k) of the spot at height 1, without background."""
+        d = self.around[0] - p[:2]
+        size = {"radius": np.exp(p[2]), "flatness": 1.0 + p[5] ** 2}
+        return gaussian_spot(d[..., 0], d[..., 1], peak=1.0, background=0.0, **size)
+
+    def model(self, p: Array) -> Array:
+        """(n,) V, mean over where the shafts may stand."""
+        return np.asarray(p[4] + p[3] * (self.shapes(p) @ self.around[1]))
+
+    def jacobian(self, p: Array) -> Array:
+        """(n, 6)."""
+        places, weight = self.around
+        d, s2, f = places - p[:2], np.exp(2.0 * p[2]), 1.0 + p[5] ** 2
+        u, shape = np.sum(d**2, axis=-1) / s2, self.shapes(p)
+        log = np.log(np.where(u > 0.0, u, 1e-300))
+        power = np.exp(np.minimum(f * log, 6.0))
+        slope = p[3] * shape * 4.0 * f * power * np.exp(-log)
+        by_g = -4.0 * p[3] * p[5] * shape * power * log
+        moved = np.einsum("nk,nki,k->ni", slope, d / s2, weight)
+        ones = np.ones(len(d))
+        return np.column_stack([moved, (slope * u) @ weight, shape @ weight, ones, by_g @ weight])
+
+    def sigma(self, p: Array) -> Array:
+        """(n,) V."""
+        shape = self.shapes(p)
+        mean = shape @ self.around[1]
+        stands = np.maximum(shape**2 @ self.around[1] - mean**2, 0.0)
+        shares = stands + (self.head.scintillation * mean) ** 2 + self.head.misfit**2
+        return np.asarray(np.sqrt(self.head.noise_volt**2 + p[3] ** 2 * shares))
+
+    def residual(self, p: Array) -> Array:
+        """Observed minus predicted; of a clipped reading none where the prediction is above full scale too."""
+        v = self.a - self.model(p)
+        return np.where(self.clipped, np.maximum(self.head.full_scale_volt - self.model(p), 0.0), v)
+
+    def start(self) -> Array:
+        low, high = float(np.min(self.a)), float(np.max(self.a))
+        weight = np.maximum(self.a - 0.5 * (low + high), 0.0)
+        centre = weight @ self.xy / weight.sum() if weight.sum() > 0.0 else np.zeros(2)
+        return np.array([*centre, 0.0, max(high - low, self.head.noise_volt), low, 0.7])
+
+    def fitted(self) -> tuple[Array, Array, float]:
+        """Parameters, their covariance, and the variance factor."""
+        from scipy.optimize import least_squares
+
+        p, prior = self.start(), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / FLAT_PRIOR])
+        for _ in range(ROUNDS):
+            sigma = self.sigma(p)
+
+            def active(x: Array) -> Array:
+                return np.where(self.clipped & (self.residual(x) == 0.0), 0.0, 1.0)
+
+            answer = least_squares(
+                lambda x, s=sigma: np.append(self.residual(x) / s, x[5] / FLAT_PRIOR),
+                np.clip(p, -BOUNDS, BOUNDS),
+                bounds=(-BOUNDS, BOUNDS),
+                jac=lambda x, s=sigma: np.vstack([-self.jacobian(x) * (active(x) / s)[:, None], prior]),
+                x_scale=np.array([1.0, 1.0, 0.5, max(p[3], 1e-6), max(p[3], 1e-6), 1.0]),
+                max_nfev=60,
+                loss="huber",
+                f_scale=FEW_SIGMAS,
+            )
+            p = answer.x
+        on = active(p) > 0.0
+        sigma = self.sigma(p)[on]
+        v = self.residual(p)[on] / sigma
+        rows = self.jacobian(p)[on] / sigma[:, None]
+        weight = FEW_SIGMAS / np.maximum(np.abs(v), FEW_SIGMAS)
+        dof = int(on.sum()) - len(p) + 1  # the prior counts
+        normal = (weight * rows.T) @ rows + np.outer(prior, prior)
+        scale = np.sqrt(np.diag(normal))
+        if (
+            dof < 1
+            or abs(p[2]) > 0.99 * BOUNDS[2]
+            or not np.all(scale > 0.0)
+            or _singular(normal / np.outer(scale, scale))
+        ):
+            return np.full(6, np.nan), np.full((6, 6), np.nan), np.nan
+        q = np.asarray(np.linalg.inv(normal))
+        leverage = np.minimum(np.einsum("ni,ij,nj,n->n", rows, q, rows, weight), 0.9)
+        # of the readings that hold the centre, not of the dark ones around: each as it would be without itself
+        factor = float(np.sum(leverage * (v / (1.0 - leverage)) ** 2 * (1.0 - leverage)) / np.sum(leverage))
+        return p, q * max(factor, 1.0), factor
+
+
+def _singular(correlations: Array) -> bool:
+    """Parameters that the readings cannot tell apart."""
+    return not bool(np.linalg.eigvalsh(correlations)[0] > SINGULAR)
+
+
+def _surrounded(xy: Array, centre: Array) -> bool:
+    """Readings lie on all sides of the centre: no quarter of directions is empty."""
+    around = np.sort(np.arctan2(*(xy - centre).T[::-1]))
+    gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
+    return bool(gaps.max() < np.pi)
+
+
+def _in_counts(middle: Array, head: Head, at: Array) -> tuple[Array, Array]:
+    """The place as counts, and the derivatives (2, 2) of counts by the place in units of the radius."""
+    step = 1e-4
+    probes = at + step * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    n = counts_of_offsets(middle, head.zeros, probes * head.radius)
+    return n[0], np.column_stack([n[1] - n[2], n[3] - n[4]]) / (2.0 * step)

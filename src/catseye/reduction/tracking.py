@@ -1,0 +1,321 @@
+"""Following the moving antenna: where it will be, the counts that each ranger runs along, and how well they hold.
+
+Drive, AntennaPath      how the telescope's axes move
+mounted, carried        rangers on the ground, and rangers that ride on the reflector's frame
+follow                  counts at the ends of every interval, on one turn and in one pointing
+misses                  how far the beams really pass their targets in between
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import DEGREE, TWO_PI
+from catseye.errors import InputError, ValidityError
+from catseye.geometry.antenna import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
+from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN, within
+from catseye.geometry.pointing import Station, counts
+from catseye.geometry.rotation import rx, rz
+from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.track import CountLine, miss
+
+Array = NDArray[np.float64]
+
+AZIMUTH_SLEW = 35.2 * DEGREE / 60.0  # rad/s, the GBT's, site facts
+ELEVATION_SLEW = 17.6 * DEGREE / 60.0  # rad/s
+SLEW_ACCELERATION = 0.2 * DEGREE  # rad/s^2: ours, chosen; on the quick side of what such a telescope does
+BUFFER = 0.128  # s, [PARKER04] section 2.6.1
+SHARES = np.arange(1, 16) / 16.0  # of an interval, where beams are looked at
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One axis of the telescope: at rest, then off with a steady acceleration, a steady rate, and to rest again.
+
+    start, end      rad
+    rate            rad/s, above 0: not exceeded
+    acceleration    rad/s^2, above 0
+    begin           s
+
+    >>> round(Drive(0.0, 1.0, rate=0.1, acceleration=0.1).duration, 9)
+    11.0
+    """
+
+    start: float
+    end: float
+    rate: float
+    acceleration: float = SLEW_ACCELERATION
+    begin: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("rate", self.rate), ("acceleration", self.acceleration)):
+            if not 0.0 < value < np.inf:
+                raise ValidityError(f"{name} {value} of a drive is not above 0 and finite")
+
+    @property
+    def peak(self) -> float:
+        """rad/s that is reached: less than the rate on a short way."""
+        return min(self.rate, float(np.sqrt(abs(self.end - self.start) * self.acceleration)))
+
+    @property
+    def duration(self) -> float:
+        """s from rest to rest."""
+        way = abs(self.end - self.start)
+        return way / self.peak + self.peak / self.acceleration if way > 0.0 else 0.0
+
+    def at(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Angle (...), rad, rate and acceleration at times (...), s."""
+        since = np.clip(np.asarray(t, dtype=float) - self.begin, 0.0, self.duration)
+        ramp = self.peak / self.acceleration
+        left = self.duration - since
+        sign = float(np.sign(self.end - self.start))
+        early, late = since < ramp, left < ramp
+        way = np.where(early, 0.5 * self.acceleration * since**2, self.peak * (since - 0.5 * ramp))
+        angle = np.where(late, self.end - sign * 0.5 * self.acceleration * left**2, self.start + sign * way)
+        rate = sign * np.where(late, self.acceleration * left, np.where(early, self.acceleration * since, self.peak))
+        moving = (since > 0.0) & (left > 0.0)
+        bend = sign * self.acceleration * np.where(early, 1.0, np.where(late, -1.0, 0.0))
+        return angle, np.where(moving, rate, 0.0), np.where(moving, bend, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AntennaPath:
+    """The telescope's way: azimuth clockwise from north, elevation; a rigid telescope on a perfect track.
+
+    azimuth, elevation       drives
+    elevation_axis_height    m
+    reflector_to_elevation   (3,) m
+    """
+
+    azimuth: Drive
+    elevation: Drive
+    elevation_axis_height: float = ELEVATION_AXIS_HEIGHT
+    reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION
+
+    def motion(self, points: ArrayLike, frame: str, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Place, velocity and acceleration (t..., n, 3), m and s, ground, of points fixed in a frame.
+
+        points    (n, 3), m, in the frame
+        frame     "ground", "alidade", "elevation" or "reflector"
+        t         (t...) s
+
+        Source: [PARKER04] eqs. 2.40-2.44 differentiated: azimuth turns about -z, elevation about +x of the alidade.
+        """
+        at, still = np.asarray(points, dtype=float), np.zeros(3)
+        t = np.asarray(t, dtype=float)
+        if frame == "ground":
+            whole = np.broadcast_to(at, (*t.shape, *at.shape))
+            return whole, np.zeros(whole.shape), np.zeros(whole.shape)
+        azimuth, azimuth_rate, azimuth_bend = (x[..., None, None] for x in self.azimuth.at(t))
+        v, a = np.broadcast_to(still, at.shape), np.broadcast_to(still, at.shape)
+        if frame in ("elevation", "reflector"):
+            elevation, rate, bend = (x[..., None, None] for x in self.elevation.at(t))
+            shifted = at + (np.asarray(self.reflector_to_elevation) if frame == "reflector" else still)
+            arm = np.einsum("...ij,...j->...i", rx(0.5 * np.pi - elevation[..., 0]), shifted)
+            x_axis = np.array([1.0, 0.0, 0.0])
+            swing = np.cross(x_axis, arm)
+            v, a = rate * swing, bend * swing + rate**2 * np.cross(x_axis, swing)
+            at = arm + np.array([0.0, 0.0, self.elevation_axis_height])
+        elif frame != "alidade":
+            raise InputError(f"frame {frame!r} is not known (expected ground, alidade, elevation or reflector)")
+        turn = rz(azimuth[..., 0])
+        place, v, a = (np.einsum("...ij,...j->...i", turn, vector) for vector in (at, v, a))
+        spin = np.array([0.0, 0.0, -1.0])
+        swing = np.cross(spin, place)
+        acceleration = (
+            azimuth_bend * swing + azimuth_rate**2 * np.cross(spin, swing) + 2.0 * azimuth_rate * np.cross(spin, v) + a
+        )
+        return place, azimuth_rate * swing + v, acceleration
+
+    def rotation(self, t: ArrayLike) -> Array:
+        """Axes of the reflector in the ground frame (t..., 3, 3), one a column."""
+        return rz(self.azimuth.at(t)[0]) @ rx(0.5 * np.pi - self.elevation.at(t)[0])
+
+    def spin(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Turning of the reflector (t..., 3), rad/s, and its change, rad/s^2, ground axes."""
+        azimuth, azimuth_rate, azimuth_bend = (x[..., None] for x in self.azimuth.at(t))
+        _, rate, bend = (x[..., None] for x in self.elevation.at(t))
+        x_axis = rz(azimuth[..., 0])[..., :, 0]  # of the alidade
+        down = np.array([0.0, 0.0, -1.0])
+        change = azimuth_bend * down + bend * x_axis + azimuth_rate * rate * np.cross(down, x_axis)
+        return azimuth_rate * down + rate * x_axis, change
+
+
+Stations = Callable[[Array], Station]
+Targets = Callable[[Array], Array]
+
+
+def mounted(stations: Station) -> Stations:
+    """Rangers (r,) on the ground, the same at all times, ready for `follow`."""
+    return lambda t: stations[None, :, None]
+
+
+def carried(stations: Station, path: AntennaPath, when: float) -> Stations:
+    """Rangers (r,) that ride on the reflector's frame, given as they stand at one time, ready for `follow`.
+
+    stations    (r,), in the ground frame at `when`
+    path        of the telescope
+    when        s
+
+    Source: [PARKER04] section 2.6.1: R_i and gamma are functions of azimuth and elevation.
+    """
+    place, first = path.motion(np.zeros((1, 3)), "reflector", when)[0][0], path.rotation(when)
+    own_point = (stations.scan_point - place) @ first
+    own_gamma = stations.gamma @ first
+
+    def at(t: Array) -> Station:
+        here, _, _ = path.motion(own_point, "reflector", t)
+        gamma = own_gamma[None] @ np.swapaxes(path.rotation(t), -1, -2)[:, None]
+        moved = Station.from_matrix(here, gamma, offset=stations.offset, beta=stations.beta, zeros=stations.zeros)
+        return moved[:, :, None]
+
+    return at
+
+
+def fixed(points: ArrayLike, frame: str, path: AntennaPath) -> Targets:
+    """Targets (n, 3), m, fixed in a frame of the telescope, ready for `follow`."""
+    own = np.asarray(points, dtype=float)
+    return lambda t: path.motion(own, frame, t)[0][:, None]
+
+
+class Following(IntEnum):
+    """What becomes of a target that a ranger is to follow."""
+
+    FOLLOWED = 0
+    BEYOND_STOPS = 1
+    TOO_FAST = 2
+    NOWHERE = 3
+
+
+REASONS = {
+    Following.FOLLOWED: "followed",
+    Following.BEYOND_STOPS: "leaves the azimuth stops in either pointing (expected a shorter track, or another ranger)",
+    Following.TOO_FAST: "asks more than the axes' rate: it passes near the azimuth axis",
+    Following.NOWHERE: "has no direction: it comes to the scan point",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Counts along which rangers follow targets, interval by interval.
+
+    begin      (s,) instants t0
+    since      (s + 1,) s from the first t0: where the intervals begin and end
+    lines      (s, r, p): real counts; those of what is not followed mean nothing
+    prime      (r, p) bool: in the prime pointing, throughout
+    status     (r, p) of Following
+    """
+
+    begin: TimeTag
+    since: Array
+    lines: CountLine
+    prime: NDArray[np.bool_]
+    status: NDArray[np.int64]
+
+    def reason(self, ranger: int, target: int) -> str:
+        """One line on a pair."""
+        return REASONS[Following(int(self.status[ranger, target]))]
+
+
+def follow(
+    stations: Stations,
+    targets: Targets,
+    begin: TimeTag,
+    *,
+    intervals: int,
+    interval: float = BUFFER,
+    limits: ArrayLike = (-np.inf, np.inf),
+    most_rate: float = np.inf,
+) -> Track:
+    """Counts of every ranger for every target at the ends of each interval, and whether they can be run.
+
+    stations    times (s,) -> Station (s or 1, r, 1); times count from `begin`
+    targets     times (s,) -> points (s, 1 or r, p, 3), m, ground
+    begin       the first t0
+    intervals   how many, 1 or more
+    interval    s, a whole number of nanoseconds
+    limits      azimuth stops (2,) or (r, 2), counts
+    most_rate   counts/s, of either axis
+
+    A pair stays on one turn and in one pointing for the whole track: the direct one where the stops allow it, else the
+    prime one. Failure is a status.
+
+    Source: [PARKER04] eqs. 2.12-2.26, 2.45, 2.46.
+    """
+    if intervals < 1 or not interval > 0.0:
+        raise ValidityError(f"{intervals} intervals of {interval} s are nothing to follow (expected 1 or more above 0)")
+    steps = np.rint(interval * 1e9).astype(np.int64) * np.arange(intervals + 1)
+    since = steps / 1e9
+    station = stations(since)
+    nodes = counts(station, targets(since))
+    nodes[..., 0] = np.unwrap(nodes[..., 0], period=COUNTS_PER_TURN, axis=0)
+    low, high = (np.asarray(limits, dtype=float)[..., k] for k in (0, 1))
+    low, high = (np.broadcast_to(x, station.shape[1:2])[:, None] for x in (low, high))
+    direct, allowed = _on_one_turn(nodes, low, high)
+    zero = np.broadcast_to(station.zeros, (*station.shape, 2))
+    other = np.stack([nodes[..., 0] + HALF_TURN, 2.0 * zero[..., 1] - nodes[..., 1]], axis=-1)
+    prime, allowed_prime = _on_one_turn(other, low, high)
+    second = ~allowed & allowed_prime
+    chosen = np.where(second[None, :, :, None], prime, direct)
+    lines = CountLine(chosen[:-1], chosen[1:], np.full(chosen.shape[:-1], interval)[:-1])
+    status = np.where(allowed | allowed_prime, Following.FOLLOWED, Following.BEYOND_STOPS)
+    fast = np.abs(lines.rate).max(axis=(0, -1)) > most_rate
+    status = np.where((status == Following.FOLLOWED) & fast, Following.TOO_FAST, status)
+    status = np.where(np.isfinite(chosen).all(axis=(0, -1)), status, Following.NOWHERE)
+    return Track(begin.plus(steps[:-1]), since, lines, second, status.astype(np.int64))
+
+
+def misses(
+    track: Track, stations: Stations, targets: Targets, *, whole_counts: bool = False, shares: ArrayLike = SHARES
+) -> Array:
+    """By how much (s, k, r, p), m, the beams pass their targets at shares of each interval.
+
+    track, stations, targets   as followed
+    whole_counts               the mirrors stand on the nearest whole count
+    shares                     (k,) 0 to 1 of the interval
+
+    Source: exact rays, `track.miss`.
+    """
+    passed = []
+    for share in np.asarray(shares, dtype=float):
+        t = track.since[:-1] + share * np.diff(track.since)
+        there = track.lines.at(share * track.lines.interval)
+        passed.append(miss(stations(t), np.rint(there) if whole_counts else there, targets(t)))
+    return np.stack(passed, axis=1)
+
+
+def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER) -> tuple[Array, Array]:
+    """What a range that changes during a buffer does to it: run of the phase (...), rad, and share of the amplitude.
+
+    range_rate    (...) m/s, of the distance
+    wavelength    m, above 0: of the modulation in air
+    duration      s, above 0, of the buffer
+
+    The phase runs by -4 pi v T / wavelength; the sum over the buffer is left with sin(x)/x of it, x half that run. It
+    is nothing where the range changes by half a wavelength.
+
+    Source: [PARKER04] eqs. 5.1-5.3 and 5.9 for a phase that runs evenly. Exact.
+
+    >>> run, left = smear([0.0, 0.0999 / 0.128], wavelength=0.1998)
+    >>> (run + 0.0).round(6).tolist(), left.round(6).tolist()
+    ([0.0, -6.283185], [1.0, 0.0])
+    """
+    run = -2.0 * TWO_PI * np.asarray(range_rate, dtype=float) * duration / wavelength
+    return run, np.abs(np.sinc(0.5 * run / np.pi))
+
+
+def _on_one_turn(nodes: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Counts (s, r, p, 2) moved by whole turns so that all lie within the stops, and whether they do (r, p)."""
+    least, most = nodes[..., 0].min(axis=0), nodes[..., 0].max(axis=0)
+    with np.errstate(invalid="ignore"):
+        bounded = np.isfinite(low) & (least < low)
+        turns = np.where(bounded, np.ceil((np.where(np.isfinite(low), low, 0.0) - least) / COUNTS_PER_TURN), 0.0)
+        over = np.isfinite(high) & (most + turns * COUNTS_PER_TURN > high)
+        down = np.ceil((most + turns * COUNTS_PER_TURN - np.where(np.isfinite(high), high, 0.0)) / COUNTS_PER_TURN)
+    turns = turns - np.where(over, down, 0.0)
+    moved = nodes + (turns * COUNTS_PER_TURN)[None, :, :, None] * np.array([1.0, 0.0])
+    shift = turns * COUNTS_PER_TURN
+    return moved, within(least + shift, low, high) & within(most + shift, low, high)
