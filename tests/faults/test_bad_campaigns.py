@@ -233,7 +233,10 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "boolean for a number": (set_key(MIRROR, "d0_mm", "true"), "d0_mm = True (expected a number)"),
     "nan": (set_key(MIRROR, "d0_mm", "nan"), "d0_mm = nan (expected a finite number)"),
     "infinity": (set_key(TRIPLET, "d12_mm", "-inf"), "triplets/TR01.toml: d12_mm = -inf (expected a finite number)"),
-    "fraction for a whole number": (set_key(MIRROR, "na0", "12.5"), "na0 = 12.5 (expected a whole number)"),
+    "fraction for a whole number": (
+        set_key(MIRROR, "az_low_limit", "-21309.5"),
+        "az_low_limit = -21309.5 (expected a whole number)",
+    ),
     "huge whole number": (set_key(MIRROR, "na0", "0x" + "f" * 9000), "na0 = a number of thousands of digits (expected"),
     "huge decimal number": (set_key(MIRROR, "na0", "9" * 9000), "mirrors/ZP103.toml: cannot be read as TOML"),
     "deeply nested": (set_key(MIRROR, "na0", "[" * 9000), "mirrors/ZP103.toml: cannot be read as TOML"),

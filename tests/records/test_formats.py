@@ -6,12 +6,15 @@ from pathlib import Path
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.mirror import Mirror
-from catseye.records.monument import Monument
+from catseye.records.keep_out import KeepOut
+from catseye.records.mirror import Mirror, MirrorGeometry
+from catseye.records.monument import Monument, MonumentGeometry
 from catseye.records.reading import Folder, read_record
 from catseye.records.record import Record
 from catseye.records.shot import Shot, read_buffers
 from catseye.records.site import Site
+from catseye.records.solids import Solids
+from catseye.records.structural_model import StructuralModel
 from catseye.records.target import Benchmark, FeedArm, Targets
 from catseye.records.triplet import Triplet
 from catseye.records.weather import WeatherSample
@@ -27,6 +30,11 @@ RECORDS: dict[str, type[Record]] = {
     "triplet-1-signed.toml": Triplet,
     "targets-1.toml": Targets,
     "feedarm-1.toml": FeedArm,
+    "monument-1-pointing.toml": MonumentGeometry,
+    "mirror-1-pointing.toml": MirrorGeometry,
+    "keep-out-1.toml": KeepOut,
+    "solids-1.toml": Solids,
+    "structural-model-1.toml": StructuralModel,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (Benchmark, 6),
