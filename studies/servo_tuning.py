@@ -15,9 +15,18 @@ from catseye.errors import ValidityError
 from catseye.gateways.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 from catseye.simulator.motion_chip import MotionChip
-from catseye.simulator.motor import AxisDesign, Motor
+from catseye.simulator.motor import AxisDesign
 from catseye.simulator.servo import TRACKING_SAMPLES, ServoAxis, Settling, Trace
-from catseye.simulator.tuning import Filter, closed_loop, design_filter, identify, margins, plant_of, step_metrics
+from catseye.simulator.tuning import (
+    Filter,
+    closed_loop,
+    design_filter,
+    identify,
+    margins,
+    plant_of,
+    ready_axis,
+    step_metrics,
+)
 
 AXIS = AxisDesign()
 MOVE, STEP = 10_000, 50  # counts
@@ -30,13 +39,14 @@ SLEW = 35.0 / 60.0 / 360.0 * 100_000  # counts/s: the antenna's azimuth at 35 de
 
 def axis(filter_: Filter, *, design: AxisDesign = AXIS, bits=8, overflow="saturate", angle: float = 0.0) -> ServoAxis:
     """An axis, its amplifier on, its filter at work."""
-    made = ServoAxis(MotionChip(output_bits=bits, overflow=overflow), Motor(design, angle))
-    made.axis(True)
-    made.flt(*filter_.values)
-    made.erl(2000)
-    made.abv(velocity_integer(SPEED))
-    made.aba(acceleration_integer(ACCELERATION))
-    return made
+    return ready_axis(
+        filter_,
+        velocity=velocity_integer(SPEED),
+        acceleration=acceleration_integer(ACCELERATION),
+        design=design,
+        angle=angle,
+        chip=MotionChip(output_bits=bits, overflow=overflow),
+    )
 
 
 def move(made: ServoAxis, target: int = MOVE, samples: int = 6000) -> Trace:

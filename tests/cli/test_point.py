@@ -102,12 +102,12 @@ def test_the_sun_answers_under_its_own_key(catseye):
 def test_a_beam_into_the_sun_is_refused_with_the_time_when_it_is_free(catseye):
     sun = answer(catseye, *NIGHT, "--to=0,0,50", *SUNNY)[0]["sun"]
     e, a = sun["altitude"], sun["azimuth"]
-    scan_point = (-119.0, -15.0, 0.3)  # of ZY103, near enough for a target a kilometre away
+    scan_point = (113.0, 44.3, 0.25)  # of ZY103, to decimetres: the target is ten kilometres away
     towards = (math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e))
     to = ",".join(f"{s + 1e4 * d:.3f}" for s, d in zip(scan_point, towards, strict=True))
     refused = answer(catseye, *NIGHT, f"--to={to}", *SUNNY)[0]["sun"]
     assert not refused["allowed"]
-    assert math.degrees(refused["separation"]) < 2.0
+    assert math.degrees(refused["separation"]) < 0.1
     assert refused["free_at_mjd"] > sun["mjd"]
     assert (refused["free_at_mjd"] - sun["mjd"]) * 1440 == pytest.approx(20, abs=12)  # 5 deg at 15 deg an hour
     assert "from the Sun" in refused["reason"]
@@ -202,3 +202,25 @@ def test_bad_records_are_refused_with_file_key_value_and_range(catseye, tmp_path
     assert (status, said) == (1, "")
     assert problem.startswith(f"catseye: {file}.toml: ")
     assert complaint in problem
+
+
+def test_visibility_answers_under_its_own_key(catseye):
+    scene = ["--reflector", "prism", "--facing=1,0.5,0", "--solids", ROOT / "examples/solids.toml"]
+    found = answer(catseye, *NIGHT, "--to=60,40,20", "--to=-100,-40,20", *scene, "--posture", "145.3,30")
+    first, second = (item["visibility"] for item in found)
+    assert first == {"visible": True, "reason": "seen", "incidence": first["incidence"]}
+    assert math.degrees(first["incidence"]) < 45.0
+    assert not second["visible"]
+    assert "obstructed by" in second["reason"]
+    turned = answer(catseye, *NIGHT, "--to=60,40,20", "--reflector", "hollow", "--facing=-1,0,0")[0]["visibility"]
+    assert (turned["visible"], "above 30" in turned["reason"]) == (False, True)
+    unknown = answer(catseye, *NIGHT, "--to=60,40,20", "--reflector", "ball")[0]["visibility"]
+    assert (unknown["visible"], unknown["incidence"]) == (True, None)
+
+
+def test_a_solid_on_the_telescope_needs_a_posture(catseye):
+    status, said, problem = catseye("point", *NIGHT, "--to=0,0,50", "--solids", ROOT / "examples/solids.toml")
+    assert (status, said) == (1, "")
+    assert "'alidade tower' stands in the frame alidade" in problem
+    for option, value in (("--posture", "10"), ("--facing", "0,0,0"), ("--reflector", "mirror")):
+        assert catseye("point", *NIGHT, "--to=0,0,50", option, value)[0] == 2

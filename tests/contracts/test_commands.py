@@ -22,6 +22,7 @@ from catseye.cli import (  # noqa: F401  all join the app
     explain,
     link,
     networks,
+    plot,
     point,
 )
 from catseye.cli.commands import app

@@ -111,3 +111,14 @@ def test_random_ways_are_found_and_verified():
 def test_a_step_of_no_counts_is_refused():
     with pytest.raises(ValidityError, match="step"):
         route(guard(), MORNING, START, END, step=(0.0, 100.0))
+
+
+def test_a_short_way_round_is_taken_before_a_free_but_long_slew_to_the_other_pointing():
+    own = guard()
+    start, target = AT_SUN + [-1400.0, -900.0], AT_SUN + [1400.0, 900.0]
+    prime = np.array([target[0] + 50_000.0, 2.0 * ZEROS[1] - target[1]])
+    assert own.slew(MORNING, start, prime).allowed
+    found = route(own, MORNING, start, target, step=(300.0, 150.0))
+    assert (found.status, found.prime) == (RouteStatus.AROUND, False)
+    assert found.duration < 0.5 * float(trapezoid(start, prime, PACE).total)
+    assert own.route(MORNING, found.waypoints).allowed

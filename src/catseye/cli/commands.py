@@ -27,7 +27,7 @@ app = typer.Typer(
 
 def main() -> None:
     """The command line of this process; leaves with SystemExit."""
-    from catseye.cli import baseline, calibrate, certificate, explain, link, networks, point  # noqa: F401  their commands join the app
+    from catseye.cli import baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
 
     typer.main.get_command(app)(prog_name="catseye")
 

@@ -17,14 +17,14 @@ DAY = 86_400.0
 REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.visibility, whose import --help spares itself
 
 
-def _time(text: str | None) -> str | None:
+def time_text(text: str | None) -> str | None:
     """As given, if it can be read: an MJD, or UTC as 2003-09-07T15:12:09Z."""
     if text is not None:
-        _mjd(text)
+        as_mjd(text)
     return text
 
 
-def _mjd(text: str) -> float:
+def as_mjd(text: str) -> float:
     if re.fullmatch(r"[0-9]+(\.[0-9]*)?", text):
         return float(text)
     try:
@@ -109,7 +109,7 @@ def point(
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option("--at", metavar="TIME", callback=_time, help="UTC or MJD: is the Sun in the way?"),
+        typer.Option("--at", metavar="TIME", callback=time_text, help="UTC or MJD: is the Sun in the way?"),
     ] = None,
     latitude_deg: Annotated[
         float | None, typer.Option("--latitude-deg", help="Of the site; the monument's record if not given.")
@@ -162,7 +162,7 @@ def point(
     zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
     if sun_cone_deg is not None:
         zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})
-    mjd = None if at is None else _mjd(at)
+    mjd = None if at is None else as_mjd(at)
     place = None if mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
     found = pointed(stands, mirrors, where)
     station = station_of(stands, mirrors)

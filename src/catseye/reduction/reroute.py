@@ -100,10 +100,12 @@ def route(
     moves = trapezoid(here, goals, guard.pace)
     time = np.where(guard.entries(mjd, moves).status == 0, moves.total, np.inf)
     best = int(np.argmin(time))
-    if np.isfinite(time[best]):
-        return Route(RouteStatus.DIRECT, np.stack([here, goals[best]]), float(time[best]), bool(prime[best]))
-    ways = _Grid.between(guard, mjd, slack, step, here, goals).ways(here, goals)
     soonest: Route | None = None
+    if np.isfinite(time[best]):
+        soonest = Route(RouteStatus.DIRECT, np.stack([here, goals[best]]), float(time[best]), bool(prime[best]))
+        if time[best] <= np.min(moves.total):  # nothing could be sooner
+            return soonest
+    ways = _Grid.between(guard, mjd, slack, step, here, goals).ways(here, goals)
     for way, last in ways:
         found = _shortened(guard, mjd, way)
         if found is not None and (soonest is None or found[1] < soonest.duration):

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import EstimationError, ValidityError
 from catseye.ranger.motion_units import LARGEST_GAIN, LIMITS, SAMPLE_TIME
-from catseye.simulator.motor import AxisDesign
-from catseye.simulator.servo import Trace
+from catseye.simulator.motion_chip import MotionChip
+from catseye.simulator.motor import AxisDesign, Motor
+from catseye.simulator.servo import ServoAxis, Trace
 
 STEPS = 128.0  # of the 8-bit converter, to its end; gains are told for it, a 12-bit converter is only finer
 SCALE = 256.0  # of the filter's 16-bit sum to a step; of the sum of errors to what ki multiplies
@@ -91,6 +92,36 @@ class StepMetrics:
     rise: float
     overshoot: float
     settling: float
+
+
+def ready_axis(
+    filter_: Filter,
+    *,
+    velocity: int,
+    acceleration: int,
+    design: AxisDesign | None = None,
+    error_limit: int = 2000,
+    angle: float = 0.0,
+    chip: MotionChip | None = None,
+) -> ServoAxis:
+    """An axis ready to move: amplifier on, filter at work, profile loaded.
+
+    filter_                  its integers
+    velocity, acceleration   of its moves, as ABV and ABA take them
+    design                   of the axis; the assumed one if None
+    error_limit              counts, as ERL takes it
+    angle                    rad, where it stands
+    chip                     as it comes from its reset; one with an 8-bit converter if None
+
+    Raises ValidityError for what a command does not accept.
+    """
+    made = ServoAxis(chip or MotionChip(), Motor(design or AxisDesign(), angle))
+    made.axis(True)
+    made.flt(*filter_.values)
+    made.erl(error_limit)
+    made.abv(velocity)
+    made.aba(acceleration)
+    return made
 
 
 def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:

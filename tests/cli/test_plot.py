@@ -1,0 +1,66 @@
+"""`catseye plot`: figures whole or not at all, what they say as JSON, refusals."""
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+NIGHT = ROOT / "examples" / "night-01"
+SKY = [
+    "sky", "--monument", NIGHT / "monuments/ZY103.toml", "--mirror", NIGHT / "mirrors/ZP103.toml",
+    "--at", "2003-09-10T18:00:00Z", "--longitude-deg=-79.84", "--keep-out", ROOT / "examples/keep-out.toml",
+]  # fmt: skip
+ZP3 = ROOT / "examples/mirrors/ZP3.toml"
+SETTINGS = "fkp_0 = 356\nfki_0 = 465\nfkd_0 = 4355\nfil_0 = 4096\nfsi_0 = 3\n"
+
+
+def test_a_slew_through_the_sun_is_refused_and_led_round(catseye, tmp_path):
+    out = tmp_path / "sky.svg"
+    slew = ["--from=18500,10000", "--to=21500,12000"]  # the Sun stands at 19919, 10888
+    status, said, complaint = catseye("plot", *SKY, *slew, "--out", out, "--json")
+    assert (status, complaint) == (0, "")
+    found = json.loads(said, parse_constant=pytest.fail)
+    assert not found["slew_allowed"]
+    assert "from the Sun" in found["slew_refused"]
+    assert found["free_at_mjd"] > 52_892.75
+    assert found["route"] == "a way round the zones"
+    assert len(found["waypoints"]) >= 3
+    assert ET.fromstring(out.read_text(encoding="utf-8")).tag.endswith("svg")
+    status, said, _ = catseye("plot", *SKY, "--out", out)  # its own file may be written again
+    assert (status, "written to" in said) == (0, True)
+
+
+def test_a_servo_move_takes_a_mirrors_settings(catseye, tmp_path):
+    mirror, out = tmp_path / "z.toml", tmp_path / "servo.svg"
+    mirror.write_text(f"abv_0 = 268435\naba_0 = 305\n{SETTINGS}" + ZP3.read_text(encoding="utf-8"), encoding="utf-8")
+    ours = json.loads(catseye("plot", "servo", "--out", out, "--json")[1])
+    its = json.loads(catseye("plot", "servo", "--mirror", mirror, "--out", out, "--json")[1])
+    same = ("kp", "ki", "kd", "il", "interval", "phase_margin_deg")
+    assert [its[key] for key in same] == [ours[key] for key in same]
+    assert its["following_error_counts"] == pytest.approx(ours["following_error_counts"], abs=2.0)
+    assert its["settled_after_s"] < 1.3
+    assert not its["motor_off"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "complaint"),
+    [
+        (["clouds", "--out", "a.svg"], 2, "'clouds' is not one of sky, servo"),
+        (["servo"], 2, "Missing option '--out'"),
+        (["sky", "--out", "a.svg"], 2, "sky needs --monument, --mirror and --at"),
+        ([*SKY, "--from=1,2", "--out", "a.svg"], 2, "go together"),
+        ([*SKY, "--from=1", "--to=2,3", "--out", "a.svg"], 2, "is not AZIMUTH,ELEVATION in counts"),
+        (["servo", "--counts", "0", "--out", "a.svg"], 2, "greater than or equal to 1"),
+        (["servo", "--mirror", ZP3, "--out", "a.svg"], 1, "fkp_0 is missing"),
+        (["servo", "--out", ROOT / "README.md"], 1, "exists and is not catseye's"),
+        (["servo", "--out", ROOT], 1, "is a directory"),
+    ],
+)
+def test_what_cannot_be_drawn_says_so(catseye, tmp_path, monkeypatch, arguments, status, complaint):
+    monkeypatch.chdir(tmp_path)
+    done, said, problem = catseye("plot", *arguments)
+    assert (done, said) == (status, "")
+    assert complaint in " ".join(problem.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())
