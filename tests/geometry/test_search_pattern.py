@@ -114,3 +114,18 @@ def test_the_spirals_steps_along_its_arc_are_even():
 def test_what_cannot_be_searched_is_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
+
+
+@pytest.mark.parametrize("prime", [False, True])
+@pytest.mark.parametrize(
+    ("elevation", "half", "reach"),
+    [
+        (20_255.516, (1.436e-3, 0.797e-3), 8.61e-5),  # the centre's rounding decides whether one more row is needed
+        (3_611.476, (0.696e-3, 1.673e-3), 9.41e-5),
+        (1_500.0, (2e-2, 2e-3), 2e-4),  # rows bend towards the azimuth axis
+        (6_000.0, (5e-2, 1e-3), 2e-4),
+    ],
+)
+def test_a_raster_leaves_no_gap_at_its_edges_and_corners(elevation, half, reach, prime):
+    centre = ZEROS + np.array([500.3, -elevation if prime else elevation])
+    assert covered_to(raster(centre, ZEROS, half, reach, OPEN), half) <= reach * (1 + 1e-3)

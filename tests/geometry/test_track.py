@@ -59,6 +59,8 @@ def test_the_miss_is_the_distance_of_a_point_from_the_beam():
     np.testing.assert_allclose(aside, r * np.sin(phi) * BEAM_PER_COUNT[0], rtol=1e-6)
     prime = np.stack([n[:, 0] + 50_000, 2 * 1434 - n[:, 1]], axis=-1)
     assert np.all(miss(STATION, prime, points) < 1e-11)
+    away = 2.0 * STATION.scan_point - points  # behind the beam: on its line, not on its ray
+    np.testing.assert_allclose(miss(STATION, n, away), r, rtol=1e-12)
 
 
 def seen_counts(t, p, v, a):
@@ -159,6 +161,10 @@ def test_the_longest_interval_shrinks_towards_the_azimuth_axis_and_is_zero_on_it
         (lambda: count_motion([1.0, 2.0], [0, 0, 0], [0, 0, 0]), r"shape \(2,\)"),
         (lambda: longest_interval([1.0, 0, 0], 1.0, 1.0, limit_counts=0.0), "limit = 0.0 is not above 0"),
         (lambda: longest_interval([1.0, 0, 0], 1.0, 1.0, longest=np.inf), "longest = inf"),
+        (lambda: longest_interval([0, 120.0, 0], -1.0, 0.02), r"speed -1\.0 is not 0 or more"),
+        (lambda: longest_interval([0, 120.0, 0], 1.0, [-0.02, 0.1]), r"acceleration -0\.02 is not 0 or more"),
+        (lambda: line_bound([0, 120.0, 0], np.nan, 0.02, 0.128), "speed nan is not"),
+        (lambda: line_bound([0, 120.0, 0], 1.0, 0.02, -0.128), r"interval -0\.128"),
     ],
 )
 def test_what_cannot_be_is_refused(call, message):

@@ -33,6 +33,8 @@ REFUSALS = [
     ("u_turn_arcsec = 0.5", "", r"motion\.u_turn_arcsec is missing"),
     ('terms = ["cosE", "sinE"]', 'terms = ["cosE", "sinF"]', r"'sinF' is not known"),
     ('terms = ["cosE", "sinE"]', 'terms = ["cosE", "cosE"]', r"says one twice"),
+    ('terms = ["cosE", "sinE"]', 'terms = ["sinE*t", "t * sinE"]', r"says one twice"),
+    ("origin_mm = [0.0, 0.0, 48260.0]", "origin_mm = [0.0, 0.0, 48.26]", r"'elevation': origin_mm .* 48\.26 .*metres"),
     ("shift_y_mm = [1.5, 0.0]", "shift_y_mm = [1.5]", r"shift_y_mm has another shape .*expected 2 values"),
     ("shift_y_mm = [1.5, 0.0]", "shift_y_mm = [15000.0, 0.0]", r"shift_y_mm holds 15000 .*expected -3000 to 3000"),
     ("shift_y_mm = [1.5, 0.0]", "shift_q_mm = [1.5, 0.0]", r"shift_q_mm = .*not a known key.*perhaps shift_"),

@@ -140,5 +140,9 @@ def test_outside_its_range_and_for_strangers_it_refuses(antenna):
         antenna.ground_from("boom", POSTURE)
     with pytest.raises(InputError, match="group 'boom' is not"):
         antenna.points("boom", POSTURE)
+    with pytest.raises(InputError, match="'reflektor' cannot be shifted"):
+        antenna.ground_from("reflector", POSTURE, added={"reflektor": np.ones(6)})
+    with pytest.raises(InputError, match="'rim' cannot be shifted"):  # each of its points moves by a table of its own
+        antenna.points("rim", POSTURE, added={"rim": np.ones(6)})
     # 0 deg C is legal
     assert np.isfinite(antenna.points("rim", Posture(0.0, 0.0, 0.0))).all()

@@ -224,6 +224,8 @@ def test_a_found_target_has_coordinates_with_their_covariance():
         found_point(STATION, Spot("not found: dark"), RANGE, 1e-4)
     with pytest.raises(ValidityError, match=r"distance -1\.0 m"):
         found_point(STATION, spot, -1.0, 1e-4)
+    with pytest.raises(ValidityError, match=r"distance inf m"):
+        found_point(STATION, spot, np.inf, 1e-4)
 
 
 def test_search_results_are_a_table_that_keeps_the_microsecond():
@@ -278,3 +280,22 @@ def test_a_head_that_cannot_be_is_refused(key, value, message):
 
 def test_counts_on_the_sky_are_small_near_the_azimuth_axis():
     assert count_size([0.0, 100.0], [0.0, 0.0])[0] < count_size([0.0, 5000.0], [0.0, 0.0])[0]
+
+
+def test_a_spike_on_the_way_does_not_end_the_search():
+    """A bird at the predicted place; the target 20 counts from it."""
+    rng = np.random.default_rng(3)
+    true = np.add(TRUE, [18.0, 9.0])
+    measure, spike = ranger(rng, true), np.rint(TRUE)
+    spot = find(TRUE, HEAD, lambda at: 3.0 if np.array_equal(at, spike) else measure(at), search_radius=4e-3)
+    assert spot.status == "found"
+    assert np.all(np.abs(spot.counts - true) < 4.0 * spot.u_counts)
+    assert len(np.unique(spot.looked_at, axis=0)) == len(spot.looked_at)
+
+
+def test_a_name_that_would_break_the_table_is_refused():
+    result = SearchResult("A,B", Spot("found", np.array([1.0, 2.0]), np.eye(2)), TimeTag(1, 0))
+    with pytest.raises(ValidityError, match="'A,B' is no name for a table"):
+        search_results([result])
+    with pytest.raises(ValidityError, match="'A,B' is no name for a table"):
+        adjustment_readings([result], {"A,B": [1, 2, 3]}, 0.0)

@@ -16,9 +16,9 @@ from catseye.records.mirror import MirrorGeometry
 from catseye.records.structural_model import read_structural_model
 from catseye.records.target import FeedArmRanger
 from catseye.reduction.antenna import SubreflectorPosition, antenna_of
-from catseye.reduction.moving_ranger import Driven, Known, moving_ranger, projected, vibrating
+from catseye.reduction.moving_ranger import Driven, Known, moving_ranger, projected, tracked, vibrating
 from catseye.reduction.pointing import feed_arm_station
-from catseye.signal.vibration import Mode, start
+from catseye.signal.vibration import Mode, follow, start
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "structural-model" / "telescope.toml"
 RANGER = FeedArmRanger(
@@ -233,3 +233,62 @@ def test_strangers_are_refused(antenna, mirror):
         moving_ranger(RANGER, mirror, antenna, DRIVE, 1000.0, u_mount=1e-5)
     assert DRIVE.posture(100.0).temperature_c == 3.0
     assert isinstance(DRIVE.posture(TIMES), Posture)
+
+
+def test_what_stands_on_the_alidade_does_not_follow_the_elevation_encoder(tmp_path):
+    more = """
+[[frame]]
+name = "tower"
+parent = "alidade"
+origin_mm = [0.0, -20000.0, 1000.0]
+
+[[group]]
+name = "on_tower"
+frame = "tower"
+
+[[group.point]]
+name = "TW1"
+position_mm = [0.0, 0.0, 1000.0]
+u_position_mm = 1.0
+"""
+    path = tmp_path / "tower.toml"
+    path.write_text(EXAMPLE.read_text(encoding="utf-8") + more, encoding="utf-8")
+    model = antenna_of(read_structural_model(path))
+    still, loose = (projected(model, "on_tower", replace(DRIVE, u_elevation=u), TIMES).covariance for u in (0.0, 1e-3))
+    np.testing.assert_array_equal(loose, still)
+
+
+def test_an_arm_that_ground_rangers_track_is_foretold_as_if_a_detector_saw_it(antenna, mirror):
+    """Ground coordinates of a target at the arm's top, slewing and swinging, to where the arm's ranger will be."""
+    rng, u, rate = np.random.default_rng(5), 2e-4, 7.8
+    t = 100.0 + np.arange(400) / rate - 400 / rate
+    slow = replace(DRIVE, azimuth_rate=1e-4, elevation_rate=-5e-5)
+    ahead = t[-1] + np.array([0.1, 0.3])
+    shape = np.array([[0.0, 4.125, 0.0], [-4.125, 0.0, 0.0]]) * ARCSECOND / 1e-3  # of the file: turns by x, by y
+
+    def swing(when):
+        x, y = 3e-3 * np.cos(2 * np.pi * 0.78 * when + 0.4), 2e-3 * np.cos(2 * np.pi * 1.05 * when - 1.0)
+        return np.concatenate([np.zeros((len(when), 3)), x[:, None] * shape[0] + y[:, None] * shape[1]], axis=-1)
+
+    truth = antenna.points("arm", slow.posture(t), added={"feed_arm": swing(t)})
+    at = antenna.groups["arm"].names.index("ZEG41040L")
+    seen = truth[:, at] + u * rng.standard_normal((len(t), 3))
+    samples, noise = tracked(antenna, "ZEG41040L", seen, np.eye(3) * u**2, slow.posture(t))
+    modes = [Mode(v.frequency_hz, 0.0005, np.diag([4e-6, 4e-6, 1e-7]), 0.01) for v in antenna.record.vibration]
+    state = follow(start(t[0], modes, u_offset=1e-2), t, samples, noise=noise).state
+    known = vibrating(antenna.record, state, ahead, seen_at=(antenna, "ZEG41040L"))
+    found = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(known,))
+    told = Known({"feed_arm": swing(ahead)}, np.zeros((2, 6, 6)))
+    true = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(told,))
+    still = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7)
+    off = np.linalg.norm(found.station.scan_point - true.station.scan_point, axis=-1)
+    assert np.all(off < 3e-4)
+    assert np.linalg.norm(still.station.scan_point - true.station.scan_point, axis=-1).max() > 1.5e-3
+    error = known.six["feed_arm"] - swing(ahead)
+    u_turn = np.sqrt(np.diagonal(known.covariance, axis1=-2, axis2=-1))[:, 3:5]
+    assert np.all(np.abs(error[:, 3:5]) < 4.0 * u_turn)
+    assert np.all(u_turn < 0.2 * 4.125 * 3 * ARCSECOND)
+    with pytest.raises(InputError, match="stands on 'reflector', the vibration is of 'feed_arm'"):
+        vibrating(antenna.record, state, ahead, seen_at=(antenna, "TR01"))
+    with pytest.raises(InputError, match="on 3 axes"):
+        vibrating(antenna.record, state, ahead)

@@ -258,6 +258,15 @@ def test_targets_are_taken_from_a_coordinates_file_with_their_covariance(antenna
     np.testing.assert_array_equal(found.covariance, q[np.ix_(at, at)])
     with pytest.raises(InputError, match="'covariance' is missing"):
         measured_of({"points": points, "covariance_order": order}, antenna, POSTURE)
+    with pytest.raises(InputError, match="covariance_order has no 'TR01 x'"):
+        measured_of(document | {"covariance_order": order[:6]}, antenna, POSTURE)
+    with pytest.raises(InputError, match=r"covariance has shape \(9, 8\)"):
+        measured_of(document | {"covariance": q[:, :8].tolist()}, antenna, POSTURE)
+    for lost in ({"x": None, "y": 2.0, "z": 3.0}, {"x": 1.0}):  # a point without coordinates is null in JSON
+        with pytest.raises(InputError, match="TR01 has no x, y and z"):
+            measured_of(document | {"points": points | {"TR01": lost}}, antenna, POSTURE)
+    with pytest.raises(EstimationError, match="no target was measured"):
+        correct_posture(antenna, Measured((), np.zeros((0, 3)), np.zeros((0, 0)), POSTURE))
     with pytest.raises(InputError, match="none of their points"):
         measured_of(document | {"points": {"OTHER": points["OTHER"]}}, antenna, POSTURE)
 
@@ -282,3 +291,14 @@ def test_a_group_with_a_motion_of_its_own_is_corrected_too(tmp_path):
     found = correct_posture(moving, seen)
     assert found.frames == (*MOVED, "arm")
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-9)
+
+
+def test_a_prior_without_play_is_refused(antenna):
+    """Four coefficients that only move together have a singular covariance, whose inverse says nothing true."""
+    motion = antenna.motions["feed_arm"]
+    covariance = np.zeros((24, 24))
+    covariance[8:12, 8:12] = 1e-6  # of shift_z
+    tied = replace(antenna, motions=antenna.motions | {"feed_arm": replace(motion, covariance=covariance)})
+    epochs = campaign(antenna, np.random.default_rng(14), 4)
+    with pytest.raises(EstimationError, match="'feed_arm' ties free coefficients"):
+        fit_model(tied, epochs, free={"feed_arm": ["shift_z"]})

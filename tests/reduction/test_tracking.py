@@ -66,6 +66,8 @@ def test_a_drive_goes_from_rest_to_rest_and_its_rates_are_derivatives(start, end
 def test_a_drive_that_cannot_move_is_refused():
     with pytest.raises(ValidityError, match=r"rate 0.0 of a drive"):
         Drive(0.0, 1.0, rate=0.0)
+    with pytest.raises(ValidityError, match=r"end inf of a drive"):
+        Drive(0.0, np.inf, rate=0.1)
 
 
 @pytest.mark.parametrize("frame", ["ground", "alidade", "elevation", "reflector"])
@@ -229,8 +231,16 @@ def test_stops_take_the_other_pointing_and_refuse_what_neither_reaches(ground):
         mounted(stations), lambda t: np.zeros((len(t), 1, 1, 3)) + stations.scan_point[0], START, intervals=1
     )
     assert at_home.status[0, 0] == Following.NOWHERE
-    with pytest.raises(ValidityError, match="nothing to follow"):
-        follow(mounted(stations), targets, START, intervals=0)
+    for told, message in (
+        ({"intervals": 0}, "nothing to follow"),
+        ({"intervals": 1, "interval": np.inf}, "nothing to follow"),
+        ({"intervals": 1, "interval": 1e-10}, "no whole number of nanoseconds"),
+        ({"intervals": 1, "interval": 0.1234567894}, "no whole number of nanoseconds"),
+        ({"intervals": 1, "limits": (75_000, -25_000)}, "not in order"),
+    ):
+        with pytest.raises(ValidityError, match=message):
+            follow(mounted(stations), targets, START, **told)
+    assert follow(mounted(stations), targets, START, intervals=1, interval=0.1 + 0.2).since[1] == 0.3
 
 
 def test_a_range_that_changes_by_half_a_wavelength_leaves_nothing_of_a_buffer():
@@ -240,3 +250,5 @@ def test_a_range_that_changes_by_half_a_wavelength_leaves_nothing_of_a_buffer():
     t = (np.arange(8192) + 0.5) * BUFFER / 8192
     taken = np.abs(np.mean(np.exp(-4j * np.pi * v[:, None] * t / wave), axis=1))
     np.testing.assert_allclose(left, taken, atol=1e-6)
+    with pytest.raises(ValidityError, match=r"wavelength -0\.2 m"):
+        smear(v, wavelength=-0.2)

@@ -172,6 +172,9 @@ def test_the_quadrant_detector_sees_a_gaussian_spot():
         ({"frequency_hz": 0.0}, "frequency_hz = 0.0 of a mode"),
         ({"damping_ratio": 1.0}, "damping_ratio = 1.0 of a mode"),
         ({"covariance": np.zeros((2, 2))}, "a variance of 0"),
+        ({"covariance": np.array([[1.0, 2.0], [2.0, 1.0]])}, "negative eigenvalue"),
+        ({"u_frequency_hz": -0.1}, "u_frequency_hz = -0.1 of a mode"),
+        ({"u_frequency_hz": np.nan}, "u_frequency_hz = nan of a mode"),
     ],
 )
 def test_a_mode_that_cannot_be_is_refused(change, message):
@@ -197,3 +200,20 @@ def test_what_does_not_swing_is_no_mode():
     drifting = np.cumsum(rng.standard_normal((400, 1)), axis=0) * 1e-3
     with pytest.raises(EstimationError, match=r"no vibration|did not settle"):
         find_modes(t, drifting, count=1, u_sample=1e-6, near_hz=[0.2])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"times": np.arange(40.0)[::-1]}, "times do not rise"),
+        ({"times": np.zeros(40)}, "times do not rise"),
+        ({"times": np.where(np.arange(40) == 5, np.nan, np.arange(40.0))}, "times do not rise"),
+        ({"u_sample": 0.0}, "u_sample = 0.0 m"),
+        ({"count": 2, "near_hz": [2.3]}, r"near_hz = \[2.3\] for 2 modes"),
+        ({"near_hz": [-2.3]}, "expected one above 0"),
+    ],
+)
+def test_what_modes_cannot_be_found_in_is_refused(change, message):
+    told = {"times": np.arange(40.0), "samples": np.sin(np.arange(40.0))[:, None], "count": 1, "u_sample": 0.1} | change
+    with pytest.raises(ValidityError, match=message):
+        find_modes(told.pop("times"), told.pop("samples"), **told)

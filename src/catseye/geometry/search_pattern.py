@@ -28,6 +28,10 @@ PITCH_OVER_REACH = 1.35  # of the spiral; sqrt(2) where turns are straight, less
 HALF_DIAGONAL = 0.5 * float(np.hypot(*BEAM_PER_COUNT))  # rad, of a count at sin Phi = 1, where it is largest
 LEAST_REACH = 1.5 * HALF_DIAGONAL  # rad, of a spiral that is rounded to whole counts
 MOST_PLACES = 2_000_000  # of one pattern
+SIDE, ONES = np.linspace(-1.0, 1.0, 65), np.ones(65)
+EDGE = np.stack(  # of a square of half width 1
+    [np.concatenate([SIDE, SIDE, ONES, -ONES]), np.concatenate([ONES, -ONES, SIDE, SIDE])], axis=-1
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +109,9 @@ def raster(
     limits       azimuth stops, counts
 
     The steps of rows and columns are the whole counts with the largest area whose half diagonal is within reach. The
-    size of an azimuth count is taken where it is largest in the rectangle, and a row's width where it is smallest; a
-    rectangle that reaches the azimuth axis is refused (a spiral serves there).
+    size of an azimuth count is taken where it is largest in the rectangle; rows and columns reach as far as the counts
+    of the rectangle's own edge, which is no rectangle in counts. A rectangle that reaches the azimuth axis is refused
+    (a spiral serves there).
 
     Source: geometry. No gap, rounding included: the places are whole counts.
     """
@@ -125,11 +130,12 @@ def raster(
         )
     size = BEAM_PER_COUNT * np.array([float(across.max()), 1.0])
     step = _whole_steps(size, reach)
-    cells = np.ceil(half / (BEAM_PER_COUNT * np.array([float(across.min()), 1.0])) / step - 0.5)
-    cells = np.maximum(cells, 0.0).astype(int)
-    _refuse_many(float(np.prod(2.0 * cells + 1.0)), "a raster")
-    columns = np.rint(middle[0]) + step[0] * np.arange(-cells[0], cells[0] + 1)
-    rows = np.rint(middle[1]) + step[1] * np.arange(-cells[1], cells[1] + 1)
+    around = counts_of_offsets(middle, zero, half * EDGE) - np.rint(middle)
+    before = np.maximum(np.ceil(-around.min(axis=0) / step - 0.5), 0.0)
+    behind = np.maximum(np.ceil(around.max(axis=0) / step - 0.5), 0.0)
+    _refuse_many(float(np.prod(before + behind + 1.0)), "a raster")
+    columns = np.rint(middle[0]) + step[0] * np.arange(-before[0], behind[0] + 1.0)
+    rows = np.rint(middle[1]) + step[1] * np.arange(-before[1], behind[1] + 1.0)
     there = np.tile(columns, (len(rows), 1))
     there[1::2] = there[1::2, ::-1]
     counts = np.stack([there.ravel(), np.repeat(rows, len(columns))], axis=-1)

@@ -49,6 +49,9 @@ class TimeTag:
                 f"day and nanoseconds are {day.dtype} and {nanoseconds.dtype}, not whole numbers "
                 "(expected both whole; a float MJD goes through TimeTag.from_mjd)"
             )
+        most = np.iinfo(np.int64).max  # before a cast wraps them round
+        if np.any(nanoseconds > most) or np.any(day > most):
+            raise ValidityError(f"day {day.max()} or {nanoseconds.max()} ns is too large (expected days to {LAST_DAY})")
         carry, rest = np.divmod(nanoseconds.astype(np.int64), PER_DAY)
         whole = day.astype(np.int64) + carry
         if np.any((whole < 0) | (whole > LAST_DAY)):
@@ -131,7 +134,8 @@ class TimeTag:
         """
         later = np.asarray(seconds, dtype=float)
         if not np.all(np.abs(later) <= LAST_DAY * SECONDS_PER_DAY):
-            raise ValidityError(f"{later.flat[0]} s is not a span of time within {LAST_DAY} days")
+            wrong = later[~(np.abs(later) <= LAST_DAY * SECONDS_PER_DAY)].flat[0]
+            raise ValidityError(f"{wrong} s is not a span of time within {LAST_DAY} days")
         whole = np.floor(later)
         rest = np.rint((later - whole) * PER_SECOND)
         return self.plus(whole.astype(np.int64) * PER_SECOND + rest.astype(np.int64))

@@ -83,16 +83,19 @@ def count_line(start: ArrayLike, end: ArrayLike, interval: ArrayLike) -> CountLi
 
 
 def miss(station: Station, counts: ArrayLike, points: ArrayLike) -> Array:
-    """Distance (...), m, by which the beam at given counts passes a point.
+    """Distance (...), m, by which the beam at given counts passes a point; from one behind it, to its start.
 
     station    ranger(s), broadcast against the rest
     counts     (..., 2) Na, Ne, direct or prime
     points     (..., 3), m, ground frame
 
-    Source: [PARKER04] eqs. 2.12-2.22 turned round (`pointing.ray`), and the distance of a point from a line. Exact.
+    Source: [PARKER04] eqs. 2.12-2.22 turned round (`pointing.ray`), and the distance of a point from a ray. Exact.
     """
     origin, direction = ray(station, np.asarray(counts, dtype=float))
-    return np.asarray(np.linalg.norm(np.cross(np.asarray(points, dtype=float) - origin, direction), axis=-1))
+    away = np.asarray(points, dtype=float) - origin
+    behind = np.sum(away * direction, axis=-1) < 0.0
+    passed = np.linalg.norm(np.cross(away, direction), axis=-1)
+    return np.where(behind, np.linalg.norm(away, axis=-1), passed)
 
 
 def apparent_motion(
@@ -182,7 +185,7 @@ def line_bound(
 
     However the target moves within these, it stays within reach = speed h + acceleration h^2/2 of where it was; the
     formulas at the top, taken at the worst place within reach, times h^2/8. Infinite where it could reach the azimuth
-    axis.
+    axis. Raises ValidityError for a speed, acceleration or interval below 0 (a rate has a sign, a speed none) or NaN.
 
     Source: derived at the top of this file. A strict bound, larger than what happens by a factor of some 2 to 5.
 
@@ -192,6 +195,9 @@ def line_bound(
     """
     p = _shaped(vector, 3, "vector")
     v0, a, h = (np.asarray(value, dtype=float) for value in (speed, acceleration, interval))
+    for name, value in (("speed", v0), ("acceleration", a), ("interval", h)):
+        if not np.all(value >= 0.0):
+            raise ValidityError(f"{name} {value[~(value >= 0.0)].flat[0]} is not 0 or more: its size is meant")
     reach, fastest = v0 * h + 0.5 * a * h**2, v0 + a * h
     axis, far = np.hypot(p[..., 0], p[..., 1]), np.linalg.norm(p, axis=-1)
     rho, r = axis - reach, far - reach

@@ -29,6 +29,7 @@ REQUIRED = ("alidade", "elevation", "reflector")  # each is the next one's paren
 PARENTS = {"alidade": ROOT, "elevation": "alidade", "reflector": "elevation", "subreflector": "prime_focus"}
 KEYS = ("shift_x_mm", "shift_y_mm", "shift_z_mm", "turn_x_arcsec", "turn_y_arcsec", "turn_z_arcsec")
 NARROW_DEG = 5.0  # a range of elevations narrower than this is in radians
+LEAST_AXIS_MM = 500.0  # of the elevation axis above the ground: below it is in metres
 SYMMETRY = 1e-9  # of the largest product of two standard uncertainties
 
 MOST_SHIFT_MM, MOST_TURN_ARCSEC = 3000.0, 20_000.0  # of a coefficient: beyond it nothing stands any more
@@ -62,6 +63,8 @@ class Basis(Record):
                 raise broken_rule(str(problem)) from problem
         for key in ("terms", "elevation_deg", "temperature_c"):
             values = getattr(self, key)
+            if key == "terms" and values is not None:
+                values = tuple("*".join(sorted(term.replace(" ", "").split("*"))) for term in values)
             if values is not None and len(set(values)) != len(values):
                 raise broken_rule(f"{key} = {list(values)} says one twice")
             if key != "terms" and values is not None and list(values) != sorted(values):
@@ -242,6 +245,13 @@ class StructuralModel(Certificate):
         for name in REQUIRED:
             if name not in parents:
                 raise broken_rule(f"frame {name!r} is missing (expected {', '.join(REQUIRED)} at least)")
+        below = [np.array(frame.origin_mm) for frame in self.frame if frame.name in ("alidade", "elevation")]
+        height = float(np.linalg.norm(np.sum(below, axis=0)))
+        if height < LEAST_AXIS_MM:
+            raise broken_rule(
+                f"frame 'elevation': origin_mm lies {height:g} mm from the ground's, which looks like metres "
+                f"(expected {LEAST_AXIS_MM:g} at least, the elevation axis's height in mm)"
+            )
         for name, parent in parents.items():
             wanted = PARENTS.get(name, parent)
             if parent != wanted:

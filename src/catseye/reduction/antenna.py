@@ -135,6 +135,16 @@ class Antenna:
         found = self.motions[name].six(posture) if name in self.motions else np.zeros((*posture.shape, 6))
         return found + np.asarray(added[name], dtype=float) if added and name in added else found
 
+    def refuse_strangers(self, added: Added | None) -> None:
+        """Raises InputError where something is added to what does not move as a whole: it would be lost in silence."""
+        own = {group.name for group in self.record.group if group.shifts is None}
+        for name in added or {}:
+            if name not in self.parents and name not in own:
+                raise InputError(
+                    f"{name!r} cannot be shifted and turned: it is no frame of the structural model and no group that "
+                    f"moves as a whole (these are {', '.join([*self.parents, *sorted(own)])})"
+                )
+
     def pivot(self, name: str) -> np.ndarray:
         """(3,) m, own nominal axes, about which a frame or group turns; its origin without a motion."""
         return self.motions[name].pivot if name in self.motions else np.zeros(3)
@@ -156,8 +166,9 @@ class Antenna:
         subreflector   its commanded position
         deformed       False gives the first order only, and refuses nothing
 
-        Raises ValidityError outside the model's range, InputError for an unknown frame.
+        Raises ValidityError outside the model's range, InputError for an unknown frame, also among what is added.
         """
+        self.refuse_strangers(added)
         if deformed:
             self.validity.refuse_outside(posture)
         found = Transforms(ROOT, ROOT, np.eye(3), np.zeros(3))

@@ -57,26 +57,45 @@ def find(
 
     A spiral of looks, without gaps for a spot that falls to the threshold no sooner than to half its peak (a status
     says so where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
-    until the spot's centre is well inside; then `fit_spot`.
+    until the spot's centre is well inside; then `fit_spot`. Light that turns out to be no spot (a spike, a reflection)
+    does not end the search: the spiral goes on.
 
     Source: the notes' practice of searching at predicted counts; patterns in `geometry.search_pattern`.
     """
-    looked: list[Array] = []
-    seen: list[float] = []
+    looked: dict[tuple[float, ...], float] = {}
 
     def look(at: Array) -> float:
-        value = float(measure(at))
-        looked.append(at)
-        seen.append(value)
-        return value
+        if tuple(at) not in looked:
+            looked[tuple(at)] = float(measure(at))
+        return looked[tuple(at)]
 
     within = max(float(reach(head.radius, 0.5)), LEAST_REACH)
     pattern = spiral(predicted, head.zeros, search_radius, within, head.azimuth_limits)
     kept, forbidden = _permitted(pattern, allowed)
-    hit = next((at for at in kept if look(at) > head.threshold_volt), None)
-    if hit is None:
+    spot, light = Spot(""), None
+    for at in kept:
+        before = tuple(at) in looked  # by a scan of light that was no spot
+        if look(at) > head.threshold_volt and not before:
+            spot, light = _centred(at, head, look, looked, allowed), at
+            if spot.found:
+                break
+    seen = list(looked.values())
+    status = spot.status
+    if light is None:
         status = _nothing(pattern, forbidden, seen, predicted, head, search_radius)
-        return Spot(status, looked_at=np.array(looked).reshape(-1, 2), seen=np.array(seen))
+    elif not spot.found:
+        status = f"{status} (light of {np.nanmax(seen):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
+    return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(seen))
+
+
+def _centred(
+    hit: Array,
+    head: Head,
+    look: Measure,
+    looked: Mapping[tuple[float, ...], float],
+    allowed: Allowed | None,
+) -> Spot:
+    """The spot about a place with light: scanned, and scanned again until its centre is well inside."""
     fine = float(max(0.5 * np.hypot(*count_size(hit, head.zeros)) * 1.001, 0.25 * head.radius))
     centre, half = hit, WIDER * head.radius
     spot = Spot("")
@@ -85,22 +104,17 @@ def find(
             scan = raster(centre, head.zeros, (half, half), fine, head.azimuth_limits)
         except ValidityError:  # the azimuth axis lies within the scan: a raster has no rows there
             scan = spiral(centre, head.zeros, half, max(fine, LEAST_REACH), head.azimuth_limits)
-        inner, forbidden = _permitted(scan, allowed)
-        known = {tuple(at) for at in looked}
-        for at in inner:
-            if tuple(at) not in known:
-                look(at)
-        near = offsets_of_counts(centre, head.zeros, np.array(looked))
+        for at in _permitted(scan, allowed)[0]:
+            look(at)
+        places, values = np.array(list(looked)), np.array(list(looked.values()))
+        near = offsets_of_counts(centre, head.zeros, places)
         use = np.hypot(near[:, 0], near[:, 1]) <= 2.0 * half
-        spot = fit_spot(np.array(looked)[use], np.array(seen)[use], head)
+        spot = fit_spot(places[use], values[use], head)
         off = offsets_of_counts(centre, head.zeros, spot.counts[None])[0] if spot.found else np.zeros(2)
         if not spot.found or np.hypot(*off) <= 0.5 * half:
             break
         centre = np.rint(spot.counts)
-    status = spot.status
-    if not spot.found:
-        status = f"{status} (light of {np.nanmax(seen):.2f} V near {hit[0]:.0f}, {hit[1]:.0f})"
-    return replace(spot, status=status, looked_at=np.array(looked), seen=np.array(seen))
+    return spot
 
 
 def found_point(
@@ -119,7 +133,7 @@ def found_point(
     """
     if not spot.found:
         raise ValidityError(f"no point for a target that was {spot.status}")
-    if not (distance > 0.0 and u_distance >= 0.0):
+    if not (0.0 < distance < np.inf and 0.0 <= u_distance < np.inf):
         raise ValidityError(f"distance {distance} m, u {u_distance} m: expected above 0, and 0 or more")
     origin, direction = ray(station, spot.counts)
     by_counts, turned, moved = ray_jacobian(station, spot.counts)
@@ -149,6 +163,7 @@ def search_results(results: Sequence[SearchResult]) -> str:
     if not found:
         raise ValidityError(f"none of {len(results)} targets was found: there is no table of search results to write")
     lines = [",".join(COLUMNS)]
+    _refuse_commas(found)
     for result in found:
         spot, u = result.spot, result.spot.u_counts
         numbers = [*(f"{n:.3f}" for n in spot.counts), *(f"{v:.4f}" for v in u), f"{spot.amplitude:.4f}"]
@@ -170,6 +185,7 @@ def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, Ar
     if missing or not found:
         what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
         raise ValidityError(f"{what}: there is nothing to adjust by")
+    _refuse_commas(found)
     lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,pointing,mjd_utc"]
     for result in found:
         na, ne = result.spot.counts
@@ -177,6 +193,12 @@ def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, Ar
         pointing = "prime" if ne < ne0 else "direct"
         lines.append(",".join([result.target, *where, f"{na:.3f}", f"{ne:.3f}", pointing, result.when.text()]))
     return "\n".join(lines) + "\n"
+
+
+def _refuse_commas(results: Sequence[SearchResult]) -> None:
+    for result in results:
+        if not result.target or any(mark in result.target for mark in ',"\r\n'):
+            raise ValidityError(f"target {result.target!r} is no name for a table (expected no comma, quote, line end)")
 
 
 def _permitted(pattern: Pattern, allowed: Allowed | None) -> tuple[Array, int]:

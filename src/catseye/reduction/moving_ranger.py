@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.antenna import Transforms, ground_from_alidade_at
-from catseye.geometry.deformation import Posture
+from catseye.geometry.deformation import Posture, carried_jacobian
 from catseye.geometry.frame import Transform
 from catseye.geometry.pointing import Station, counts_jacobian
 from catseye.geometry.rotation import skew
@@ -22,6 +22,7 @@ from catseye.records.structural_model import StructuralModel
 from catseye.records.target import FeedArmRanger
 from catseye.reduction.antenna import Antenna, SubreflectorPosition
 from catseye.reduction.pointing import feed_arm_station
+from catseye.reduction.structure_corrections import group_of
 from catseye.signal.vibration import State
 
 FEED_ARM = "feed_arm"
@@ -63,7 +64,8 @@ class Known:
 
     six           frame or group: (..., 6) m and rad, F of them
     covariance    (..., 6F, 6F), in the order of six
-    replaces      whether the covariance stands in for the model's own (measured, `correct_posture`), or comes on top
+    replaces      whether the covariance stands in for the model's own (measured by `correct_posture` in the posture for
+                  which it is used: in another one, what the model leaves is there anew), or comes on top
     """
 
     six: Mapping[str, np.ndarray]
@@ -112,19 +114,47 @@ class MovingRanger:
         return found
 
 
-def vibrating(record: StructuralModel, state: State, times: ArrayLike) -> Known:
+def tracked(
+    antenna: Antenna, target: str, coordinates: ArrayLike, covariance: ArrayLike, posture: Posture
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (N, 3), m, of a target in its frame's axes and their covariances: samples for the vibration filter.
+
+    antenna       the structural model, which says where the target is at rest
+    target        of one of its groups, such as one at the top of the feed arm
+    coordinates   (N, 3), m, ground frame, as ground rangers track it
+    covariance    (3, 3) or (N, 3, 3), m^2
+    posture       (N,), of each
+
+    Source: [PARKER04] section 2.6.1, the arm tracked by ground rangers.
+    """
+    group = group_of(antenna, target)
+    points = antenna.groups[group]
+    frame_from_ground = antenna.ground_from(points.frame, posture).inverse()
+    at_rest = antenna.in_frame(group, posture)[..., points.names.index(target), :]
+    turn = frame_from_ground.rotation
+    noise = turn @ np.asarray(covariance, dtype=float) @ np.swapaxes(turn, -1, -2)
+    return frame_from_ground.points(coordinates) - at_rest, noise
+
+
+def vibrating(
+    record: StructuralModel, state: State, times: ArrayLike, *, seen_at: tuple[Antenna, str] | None = None
+) -> Known:
     """What the vibration adds to the frames at times (...), s, foretold from the filter's state.
 
-    record    whose vibrations are the state's modes, in the same order, seen on two axes
-    state     of the filter, not after the times
+    record    whose vibrations are the state's modes, in the same order
+    state     of the filter, not after the times; two axes, those of the quadrant detector, or with `seen_at` three
     times     (...), s
+    seen_at   the antenna and the target on the vibrating frame whose displacements, by `tracked`, the filter follows
 
-    Raises InputError where the modes of record and state are not as many, or the detector has not two axes.
+    A target's displacement is, to first order, the mode's shift and turn at its place; the detector's x and y that
+    belong to it are taken back out by least squares. Raises InputError where the modes of record and state are not as
+    many, where the state has other axes, or where the target does not stand on the frame that vibrates.
     """
-    if len(record.vibration) != len(state.modes) or state.axes != 2:
+    axes = 2 if seen_at is None else 3
+    if len(record.vibration) != len(state.modes) or state.axes != axes:
         raise InputError(
             f"the filter follows {len(state.modes)} modes on {state.axes} axes, the structural model has "
-            f"{len(record.vibration)} vibrations seen on 2: start the filter from the model's"
+            f"{len(record.vibration)} vibrations seen on {axes}: start the filter from the model's"
         )
     values, spread = state.predicted_modes(times)
     flat = values.reshape(*values.shape[:-2], -1)
@@ -132,12 +162,25 @@ def vibrating(record: StructuralModel, state: State, times: ArrayLike) -> Known:
     response = np.zeros((6 * len(frames), flat.shape[-1]))
     for k, mode in enumerate(record.vibration):
         first = 6 * frames.index(mode.frame)
-        for axis, letter in enumerate("xy"):
+        columns = []
+        for letter in "xy":
             turn = np.array(getattr(mode, f"turn_arcsec_per_mm_{letter}")) * ARCSECOND / MILLIMETRE
-            response[first : first + 6, 2 * k + axis] = [*getattr(mode, f"shift_per_{letter}"), *turn]
+            columns.append([*getattr(mode, f"shift_per_{letter}"), *turn])
+        by_detector = np.array(columns).T
+        if seen_at is not None:
+            by_detector = by_detector @ np.linalg.pinv(_displaced(*seen_at, mode.frame) @ by_detector)
+        response[first : first + 6, axes * k : axes * (k + 1)] = by_detector
     six = flat @ response.T
     each = {frame: six[..., 6 * i : 6 * i + 6] for i, frame in enumerate(frames)}
     return Known(each, response @ spread @ response.T)
+
+
+def _displaced(antenna: Antenna, target: str, frame: str) -> np.ndarray:
+    """Displacement (3, 6) of a target in its frame's axes by the frame's shift and turn."""
+    points = antenna.groups[group_of(antenna, target)]
+    if points.frame != frame:
+        raise InputError(f"target {target!r} stands on {points.frame!r}, the vibration is of {frame!r}: track another")
+    return carried_jacobian(np.zeros(6), antenna.pivot(frame), points.position[points.names.index(target)])
 
 
 def moving_ranger(
@@ -228,7 +271,7 @@ def projected(
         slopes[group] = antenna.group_derivatives(group, wide, added=room, subreflector=moved)[group]
     covariance = _propagated(antenna, wide, slopes, known, room=True)
     covariance = covariance + antenna.u_points(group)[:, None, None] ** 2 * np.eye(3)
-    if frame != "alidade":  # what stands on the alidade does not follow the elevation
+    if "elevation" in antenna.chain(frame):  # what stands on the alidade does not follow the elevation
         covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide), drive)
     else:
         covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide)[..., :1], drive)

@@ -267,7 +267,7 @@ def _singular(correlations: Array) -> bool:
 
 
 def _surrounded(xy: Array, centre: Array) -> bool:
-    """Readings lie on all sides of the centre: no quarter of directions is empty."""
+    """Readings lie on all sides of the centre: no half of directions is empty."""
     around = np.sort(np.arctan2(*(xy - centre).T[::-1]))
     gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
     return bool(gaps.max() < np.pi)

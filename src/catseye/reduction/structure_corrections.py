@@ -50,7 +50,8 @@ class FrameMotion:
     names        targets
     six          (6,) m and rad, of the frame altogether
     correction   (6,) m and rad: six less the model's
-    covariance   (6, 6) of either; its turn is a further small one: apart by half the turn itself, 1e-3 or less
+    covariance   (6, 6) of either, by targets and sheet alone: the frames it stands on are taken to be where they are
+                 told; its turn is a further small one: apart by half the turn itself, 1e-3 or less
     residual     (n, 3) m, frame axes: measured less where the frame's motion takes the sheet's place
     pvv          weighted sum of squares
     degrees_of_freedom
@@ -104,7 +105,7 @@ def measured_of(
     posture        in which they were measured; a coordinates.json does not say the temperature
     subreflector   its commanded position
 
-    Raises InputError where keys are missing, or no point is the model's.
+    Raises InputError where keys or numbers are missing, or no point is the model's.
     """
     for key in ("points", "covariance_order", "covariance"):
         if key not in document:
@@ -113,9 +114,19 @@ def measured_of(
     if not names:
         raise InputError("coordinates: none of their points is in a group of the structural model")
     order = {label: i for i, label in enumerate(document["covariance_order"])}
-    at = [order[f"{name} {axis}"] for name in names for axis in "xyz"]
-    covariance = np.array(document["covariance"], dtype=float)[np.ix_(at, at)]
-    coordinates = np.array([[document["points"][name][axis] for axis in "xyz"] for name in names], dtype=float)
+    labels = [f"{name} {axis}" for name in names for axis in "xyz"]
+    lost = [label for label in labels if label not in order]
+    if lost:
+        raise InputError(f"coordinates: covariance_order has no {lost[0]!r} (expected x, y, z of each point)")
+    at = [order[label] for label in labels]
+    whole = np.array(document["covariance"], dtype=float)
+    if whole.shape != (len(order), len(order)):
+        raise InputError(f"coordinates: covariance has shape {whole.shape} (expected {len(order)} by {len(order)})")
+    covariance = whole[np.ix_(at, at)]
+    coordinates = np.array([[document["points"][name].get(axis) for axis in "xyz"] for name in names], dtype=float)
+    for name, row in zip(names, np.isfinite(coordinates).all(axis=1), strict=True):
+        if not row:
+            raise InputError(f"coordinates: {name} has no x, y and z (expected three numbers)")
     return Measured(names, coordinates, covariance, posture, subreflector)
 
 
@@ -167,6 +178,8 @@ def correct_posture(antenna: Antenna, measured: Measured) -> Corrections:
 
     Source: [JCGM102] section 6.2 (propagation), least squares with the corrections as observed unknowns.
     """
+    if not measured.names:
+        raise EstimationError("no target was measured: there is nothing to correct by")
     frames = _frames_of(antenna, measured.names)
     prior = np.zeros((6 * len(frames), 6 * len(frames)))
     for i, name in enumerate(frames):

@@ -127,7 +127,10 @@ def updated_model(
     measured_on   when
     report        where it is written up
 
-    Each motion keeps the covariance of its own coefficients; that between frames has no place in the file.
+    Each motion keeps the covariance of its own coefficients; that between frames, and that with the targets' places
+    (the sheet), has no place in the file. A second fit that begins with it on the same targets takes the sheet as
+    fresh: with the example's, two campaigns of 14 postures, its chi-squares are 1.2 where 1 is expected (u 10 % too
+    small). Fit all postures at once instead.
     """
     named = sorted({name for name, _ in fit.free})
     changed = {name: _motion_record(_owner(record, name), antenna, fit, name) for name in named}
@@ -252,7 +255,14 @@ def _priors(antenna: Antenna, layout: tuple[tuple[str, str], ...], size: int) ->
         covariance = antenna.motions[name].covariance[np.ix_(at, at)]
         known = np.diag(covariance) > 0.0
         if known.any():
-            inverse = np.linalg.inv(covariance[np.ix_(known, known)])
+            size_of = np.sqrt(np.diag(covariance)[known])
+            scaled = covariance[np.ix_(known, known)] / np.outer(size_of, size_of)
+            if np.linalg.eigvalsh(scaled)[0] < FLOATING:
+                raise EstimationError(
+                    f"the covariance of {name!r} ties free coefficients to one another without play: no prior can be "
+                    "made of it; take it out of the file, or give each its own variance"
+                )
+            inverse = np.linalg.inv(scaled) / np.outer(size_of, size_of)
             where = first + np.flatnonzero(known)
             normal[np.ix_(where, where)] = inverse
         first += len(at)

@@ -19,7 +19,7 @@ from catseye.geometry.antenna import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATI
 from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN, within
 from catseye.geometry.pointing import Station, counts
 from catseye.geometry.rotation import rx, rz
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.time_tag import PER_SECOND, TimeTag
 from catseye.geometry.track import CountLine, miss
 
 Array = NDArray[np.float64]
@@ -54,6 +54,9 @@ class Drive:
         for name, value in (("rate", self.rate), ("acceleration", self.acceleration)):
             if not 0.0 < value < np.inf:
                 raise ValidityError(f"{name} {value} of a drive is not above 0 and finite")
+        for name, value in (("start", self.start), ("end", self.end), ("begin", self.begin)):
+            if not np.isfinite(value):
+                raise ValidityError(f"{name} {value} of a drive is not finite")
 
     @property
     def peak(self) -> float:
@@ -245,14 +248,19 @@ def follow(
 
     Source: [PARKER04] eqs. 2.12-2.26, 2.45, 2.46.
     """
-    if intervals < 1 or not interval > 0.0:
+    if intervals < 1 or not 0.0 < interval < np.inf:
         raise ValidityError(f"{intervals} intervals of {interval} s are nothing to follow (expected 1 or more above 0)")
-    steps = np.rint(interval * 1e9).astype(np.int64) * np.arange(intervals + 1)
-    since = steps / 1e9
+    step = round(interval * PER_SECOND)
+    if abs(interval * PER_SECOND - step) > 1e-6 * max(1.0, 1e-6 * step):
+        raise ValidityError(f"interval {interval!r} s is no whole number of nanoseconds, as time tags are")
+    steps = step * np.arange(intervals + 1)
+    since = steps / PER_SECOND
     station = stations(since)
     nodes = counts(station, targets(since))
     nodes[..., 0] = np.unwrap(nodes[..., 0], period=COUNTS_PER_TURN, axis=0)
     low, high = (np.asarray(limits, dtype=float)[..., k] for k in (0, 1))
+    if not np.all(low < high):
+        raise ValidityError(f"azimuth limits {np.asarray(limits).tolist()} are not in order (expected low < high)")
     low, high = (np.broadcast_to(x, station.shape[1:2])[:, None] for x in (low, high))
     direct, allowed = _on_one_turn(nodes, low, high)
     zero = np.broadcast_to(station.zeros, (*station.shape, 2))
@@ -303,6 +311,8 @@ def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER)
     >>> (run + 0.0).round(6).tolist(), left.round(6).tolist()
     ([0.0, -6.283185], [1.0, 0.0])
     """
+    if not (0.0 < wavelength < np.inf and 0.0 < duration < np.inf):
+        raise ValidityError(f"wavelength {wavelength} m, duration {duration} s: expected both above 0 and finite")
     run = -2.0 * TWO_PI * np.asarray(range_rate, dtype=float) * duration / wavelength
     return run, np.abs(np.sinc(0.5 * run / np.pi))
 

@@ -41,11 +41,11 @@ class Mode:
     frequency_hz        Hz, above 0, damped
     damping_ratio       of critical, above 0, below 1
     covariance          (A, A) m^2, stationary, of each quadrature between the axes; its diagonal is the mean square
-    u_frequency_hz      Hz
+    u_frequency_hz      Hz, 0 or more
     u_damping           of the natural logarithm of the damping ratio; for the reader, the filter holds the damping
     drift_hz            Hz per square root of a second, the walk of the frequency
 
-    Raises ValidityError for a number that is not above zero.
+    Raises ValidityError for a number outside these, and for a covariance that is none.
     """
 
     frequency_hz: float
@@ -62,11 +62,17 @@ class Mode:
         ):
             if not 0.0 < value < most:
                 raise ValidityError(f"{name} = {value} of a mode (expected above 0 and below {most:g})")
+        for name, value in (("u_frequency_hz", self.u_frequency_hz), ("drift_hz", self.drift_hz)):
+            if not 0.0 <= value < np.inf:
+                raise ValidityError(f"{name} = {value} of a mode (expected 0 or more)")
         s = np.asarray(self.covariance, dtype=float)
         if s.ndim != 2 or s.shape[0] != s.shape[1] or not np.all(np.diag(s) > 0.0):
             raise ValidityError(
                 f"covariance of a mode has shape {s.shape} or a variance of 0 (expected (A, A), above 0)"
             )
+        scaled = s / np.sqrt(np.outer(np.diag(s), np.diag(s)))
+        if not np.allclose(scaled, scaled.T, rtol=0.0, atol=1e-9) or np.linalg.eigvalsh(scaled)[0] < -1e-9 * len(s):
+            raise ValidityError("covariance of a mode is not symmetric or has a negative eigenvalue")
         object.__setattr__(self, "covariance", s)
 
     @property

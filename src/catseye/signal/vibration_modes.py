@@ -31,10 +31,10 @@ def find_modes(
 ) -> tuple[Mode, ...]:
     """Frequencies, dampings and sizes of the modes in a stretch of samples, by maximum likelihood.
 
-    times      (N,) s, in order, any gaps
+    times      (N,) s, rising, any gaps
     samples    (N, A) m; NaN where lost
     count      of modes
-    u_sample   m, white noise of each axis
+    u_sample   m, above 0, white noise of each axis
     window     s, over which each sample is the mean
     near_hz    first guesses; without them the highest peaks of the spectrum below half the sampling rate
     drift_hz   walk of the frequencies, passed on to the modes
@@ -56,6 +56,10 @@ def find_modes(
         raise ValidityError(
             f"samples have shape {y.shape}, times {t.shape}, modes {count}: expected (N, A), (N,), 1 up"
         )
+    if not np.all(np.diff(t) > 0.0) or not 0.0 < u_sample < np.inf:
+        raise ValidityError(f"times do not rise, or u_sample = {u_sample} m is not above 0 and finite")
+    if near_hz is not None and (len(near_hz) != count or not all(0.0 < f < np.inf for f in near_hz)):
+        raise ValidityError(f"near_hz = {list(near_hz)} for {count} modes (expected one above 0 for each)")
     there = np.isfinite(y)
     if there.sum(axis=0).min() < 8 * count:
         raise EstimationError(
