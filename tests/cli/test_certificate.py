@@ -20,7 +20,7 @@ def test_a_record_gives_one_object_and_a_page(catseye, tmp_path, kind, record, m
     status, out, err = catseye("certificate", kind, record, "--out", page, "--json")
     assert (status, err) == (0, "")
     found = json.loads(out, parse_constant=pytest.fail)
-    assert set(found) == {"kind", "record", "sha256", "fields", "missing", "written"}
+    assert set(found) == {"kind", "record", "sha256", "fields", "notes", "missing", "written"}
     assert (found["kind"], found["record"], found["written"]) == (kind, record.name, str(page))
     assert found["sha256"] == hashlib.sha256(record.read_bytes()).hexdigest()
     assert all(set(field) == {"name", "key", "value", "u", "unit"} for field in found["fields"])

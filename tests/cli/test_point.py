@@ -99,6 +99,16 @@ def test_the_sun_answers_under_its_own_key(catseye):
     assert sun["free_at_mjd"] is None
 
 
+def test_the_beam_of_a_leaning_face_is_as_far_from_the_sun_as_its_target(catseye, tmp_path):
+    """Its counts are others, its beam is not."""
+    place = ["--at", "2003-09-10T17:00:00Z", "--longitude-deg=-79.84", "--latitude-deg", "38.4"]
+    (tmp_path / "ZP3.toml").write_text(ZP3.read_text() + "\nface_tilt_rad = 0.02\nu_tilt_rad = 1e-4\n")
+    leaning = ["--monument", ZY3, "--mirror", tmp_path / "ZP3.toml"]
+    plain, other = (answer(catseye, *at, "--to=5,30,30", *place)[0] for at in (NOTES, leaning))
+    assert abs(plain["azimuth_counts"] - other["azimuth_counts"]) > 100
+    assert other["sun"]["separation"] == pytest.approx(plain["sun"]["separation"], abs=1e-9)
+
+
 def test_a_beam_into_the_sun_is_refused_with_the_time_when_it_is_free(catseye):
     sun = answer(catseye, *NIGHT, "--to=0,0,50", *SUNNY)[0]["sun"]
     e, a = sun["altitude"], sun["azimuth"]
@@ -153,6 +163,16 @@ def test_without_uncertainties_u_is_unknown_and_with_them_it_is_given(catseye, t
         (["--to=1,2,3", "--sun-cone-deg", "0"], 2, "is not 0.5 to 60 degrees"),
         (["--to=1,2,3", "--at", "52892.5"], 1, "needs latitude_deg, which the record of ZY3 does not have"),
         (["--to=1,2,3", "--keep-out", "none.toml"], 1, "none.toml: missing"),
+        (["--to=1,2,3", "--keep-out", "."], 1, "catseye: .: is not a file (expected one)"),
+        (["--to=1e200,2,3"], 1, "m is too far (expected within 1e+12 m)"),
+        (["--to=1,2,3", "--sun-cone-deg", "7"], 2, "says nothing without --at"),
+        (["--to=1,2,3", "--longitude-deg", "7"], 2, "says nothing without --at"),
+        (["--to=1,2,3", "--posture", "0,45"], 2, "says nothing without --solids"),
+        (
+            ["--to=1,2,3", "--at", "52892.5", "--latitude-deg", "138", "--longitude-deg", "0"],
+            1,
+            "--latitude-deg 138 is outside -90 to 90 (degrees)",
+        ),
     ],
 )
 def test_what_cannot_be_done_says_so_in_one_line(catseye, change, status, complaint):
@@ -216,6 +236,15 @@ def test_visibility_answers_under_its_own_key(catseye):
     assert (turned["visible"], "above 30" in turned["reason"]) == (False, True)
     unknown = answer(catseye, *NIGHT, "--to=60,40,20", "--reflector", "ball")[0]["visibility"]
     assert (unknown["visible"], unknown["incidence"]) == (True, None)
+
+
+def test_what_no_pointing_reaches_is_not_visible_and_the_records_are_named(catseye, tmp_path):
+    mirror = tmp_path / "z.toml"
+    kept = [row for row in ZP3.read_text(encoding="utf-8").splitlines() if not row.startswith("az_")]
+    mirror.write_text("\n".join(["az_low_limit = 20000", "az_high_limit = 30000", *kept]), encoding="utf-8")
+    found = answer(catseye, "--monument", ZY3, "--mirror", mirror, "--to=0,100,20", "--reflector", "prism")[0]
+    assert found["visibility"]["reason"] == "beyond the azimuth stops"
+    assert (found["monument"], found["mirror"], found["mirror_of_monument"]) == ("ZY3", "ZP3", "ZP3")
 
 
 def test_a_solid_on_the_telescope_needs_a_posture(catseye):

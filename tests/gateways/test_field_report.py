@@ -155,6 +155,15 @@ def test_of_the_notes_examples_eleven_and_twenty_seven_fields_are_unknown():
 
 
 @pytest.mark.parametrize("kind", FORMS)
+def test_the_notes_of_a_record_stand_in_the_reports_notes(full, kind):
+    report = full(kind, lambda text: text + 'notes = "shims <new>\\nsecond line"\n')
+    assert '<div class="notes">shims &lt;new&gt;<br>second line</div>' in field_report(report, WHEN)
+    assert report_object(report, None)["notes"] == "shims <new>\nsecond line"
+    assert report.missing == ()
+    assert report_object(full(kind), None)["notes"] is None
+
+
+@pytest.mark.parametrize("kind", FORMS)
 def test_a_blank_form_has_its_units_and_nothing_else(kind):
     report = blank_report(kind)
     text = field_report(report, WHEN)

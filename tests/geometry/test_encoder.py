@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
@@ -88,6 +88,17 @@ def test_the_direct_pointing_wins_where_it_may_and_the_sooner_one_where_the_mirr
 def test_a_nearer_turn_is_taken_where_the_stops_are_more_than_a_turn_apart():
     chosen = encoder.choice([10_000.0, 0.0], [60_000.0, 0.0], low=-1e5, high=2e5, current=[115_000.0, 0.0])
     assert chosen.counts.tolist() == [110_000.0, 0.0]
+
+
+@example(na=60_000.0, low=-150_000.0, span=400_000, share=0.9975)  # a turn nearer would be beyond the stop
+@given(azimuths, azimuths, st.integers(0, 600_000), st.floats(0.0, 1.0))
+def test_of_several_turns_between_the_stops_the_nearest_to_where_the_mirror_stands_is_taken(na, low, span, share):
+    current = low + share * span
+    pointing = [na, 0.0]
+    chosen = encoder.choice(pointing, pointing, low=low, high=low + span, current=[current, 0.0])
+    reachable = [na + 1e5 * k for k in range(-12, 13) if low <= na + 1e5 * k <= low + span]
+    if reachable:
+        assert abs(chosen.counts[0] - current) == pytest.approx(min(abs(n - current) for n in reachable), abs=1e-6)
 
 
 def test_speeds_without_meaning_are_refused():

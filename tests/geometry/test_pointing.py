@@ -17,6 +17,7 @@ from catseye.geometry.pointing import (
     counts_covariance,
     counts_jacobian,
     ray,
+    ray_covariance,
     ray_jacobian,
 )
 
@@ -167,6 +168,18 @@ def test_claimed_covariance_is_the_scatter_of_the_counts():
     scattered = np.cov(counts(drawn, point + rng.normal(size=(n, 3)) * u_point).T)
     scale = np.sqrt(np.diag(claimed))
     # 5 sigma of a sample covariance of 10^5 draws
+    np.testing.assert_allclose(scattered / np.outer(scale, scale), claimed / np.outer(scale, scale), atol=5 * 0.0045)
+
+
+def test_claimed_covariance_of_a_ray_is_its_scatter():
+    rng = np.random.default_rng(17)
+    u = np.array([2e-4] * 3 + [2e-5, 3e-5, 4e-5] + [1e-5] * 3 + [2e-5, 1e-5] + [0.4, 0.3])
+    at, u_counts = counts(ZY3, np.array([-20.0, 60.0, 50.0])), 0.29
+    claimed = ray_covariance(ZY3, at, of_station=np.diag(u**2), of_counts=np.eye(2) * u_counts**2)
+    n = 100_000
+    drawn = Station.of_parameters(ZY3.parameters + rng.normal(size=(n, 13)) * u)
+    scattered = np.cov(np.concatenate(ray(drawn, at + rng.normal(size=(n, 2)) * u_counts), axis=-1).T)
+    scale = np.sqrt(np.diag(claimed))
     np.testing.assert_allclose(scattered / np.outer(scale, scale), claimed / np.outer(scale, scale), atol=5 * 0.0045)
 
 

@@ -115,7 +115,7 @@ def test_a_step_of_no_counts_is_refused():
 
 def test_a_short_way_round_is_taken_before_a_free_but_long_slew_to_the_other_pointing():
     own = guard()
-    start, target = AT_SUN + [-1400.0, -900.0], AT_SUN + [1400.0, 900.0]
+    start, target = np.add(AT_SUN, [-1400.0, -900.0]), np.add(AT_SUN, [1400.0, 900.0])
     prime = np.array([target[0] + 50_000.0, 2.0 * ZEROS[1] - target[1]])
     assert own.slew(MORNING, start, prime).allowed
     found = route(own, MORNING, start, target, step=(300.0, 150.0))

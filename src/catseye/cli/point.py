@@ -157,6 +157,12 @@ def point(
 
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
+    alone = {"--sun-cone-deg": sun_cone_deg, "--latitude-deg": latitude_deg, "--longitude-deg": longitude_deg}
+    for option, value in alone.items():
+        if at is None and value is not None:
+            raise typer.BadParameter("says nothing without --at.", param_hint=f"'{option}'")
+    if posture is not None and solids is None:
+        raise typer.BadParameter("says nothing without --solids.", param_hint="'--posture'")
     stands, mirrors = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
     where = np.array([_triple(text) for text in to or []]) if file is None else read_coordinates(file)
     zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
@@ -179,6 +185,7 @@ def point(
             facing=None if facing is None else np.array(_triple(facing)),
             solids=Solids() if solids is None else read_record(solids, Solids),
             posture=None if posture is None else _angles(posture),
+            reachable=found.allowed | found.prime_allowed,
         )
     if write is not None:
         from catseye.gateways.output import whole_file
@@ -186,7 +193,8 @@ def point(
         with whole_file(write, "--write", MARK) as page:
             page.append(output_dat(found, f"{mirrors.zp} on {stands.monument}"))
     if json:
-        say(json_line(pointing_objects(found, seen, visible)))
+        names = {"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp}
+        say(json_line([{**item, **names} for item in pointing_objects(found, seen, visible)]))
         return
     say(pointing_table(found))
     if stands.zp is not None and stands.zp != mirrors.zp:

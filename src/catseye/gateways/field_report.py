@@ -148,7 +148,8 @@ def _notes(report: Report) -> str:
         names = ", ".join(entry.name for entry in missing)
         count = f"{len(missing)} field{'' if len(missing) == 1 else 's'}"
         said = f"{count} not in the record and left blank: {escape(names)}."
-    return f'<h2>NOTES</h2><div class="notes">{said}</div>'
+    lines = [escape(line) for line in report.notes.splitlines()]
+    return f'<h2>NOTES</h2><div class="notes">{"<br>".join([*lines, *([said] if said else [])])}</div>'
 
 
 def _origin(report: Report, when: datetime) -> str:

@@ -76,6 +76,7 @@ class Report:
     sha256     of that file
     fields     in the form's order, the matrix last
     said       the record's provenance
+    notes      of the record
     """
 
     kind: str
@@ -83,6 +84,7 @@ class Report:
     sha256: str
     fields: tuple[Field, ...]
     said: dict[str, Any]
+    notes: str = ""
 
     @property
     def missing(self) -> tuple[Entry, ...]:
@@ -190,7 +192,7 @@ def read_report(kind: str, path: Path) -> Report:
     folder = Folder(path.parent)
     record = folder.record(path.name, FORMS[kind].record)
     said = {key: getattr(record, key) for key in PROVENANCE}
-    return Report(kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), said)
+    return Report(kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), said, record.notes or "")
 
 
 def blank_report(kind: str) -> Report:
@@ -211,6 +213,7 @@ def report_object(report: Report, written: str | None) -> dict[str, Any]:
             {"name": f.entry.name, "key": f.entry.key, "value": f.value, "u": f.u, "unit": f.entry.unit or None}
             for f in report.fields
         ],
+        "notes": report.notes or None,
         "missing": [entry.key for entry in report.missing],
         "written": written,
     }

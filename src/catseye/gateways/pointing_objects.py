@@ -101,7 +101,8 @@ def pointing_remarks(found: Pointings, sightings: list[Sighting], visible: Visib
         remarks.append(f"u of the counts unknown: the records do not have {', '.join(found.lacking)}")
     else:
         u = np.max(found.u, axis=0)
-        remarks.append(f"u of the counts at most {u[0]:.2f} in azimuth, {u[1]:.2f} in elevation")
+        most = [f"{v:.2f}" if np.isfinite(v) else "unknown" for v in u]
+        remarks.append(f"u of the counts at most {most[0]} in azimuth, {most[1]} in elevation")
     for seen in sightings:
         remarks += [v.reason for v in (seen.sun, seen.keep_out) if v is not None and not v.allowed]
     if visible is not None:

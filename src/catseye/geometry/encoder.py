@@ -202,5 +202,8 @@ def _turns(na: NDArray[np.float64], low: ArrayLike, high: ArrayLike, current: ND
     first = turned_within(na, low, high)
     if current is None:
         return first
-    near = first + COUNTS_PER_TURN * np.round((current - first) / COUNTS_PER_TURN)
+    most = np.floor((np.asarray(high, dtype=float) - first) / COUNTS_PER_TURN)
+    least = np.ceil((np.asarray(low, dtype=float) - first) / COUNTS_PER_TURN)
+    turns = np.maximum(np.minimum(np.round((current - first) / COUNTS_PER_TURN), most), least)
+    near = first + COUNTS_PER_TURN * turns
     return np.where(within(near, low, high), near, first)

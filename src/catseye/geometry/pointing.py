@@ -344,6 +344,27 @@ def counts_covariance(
     return answer
 
 
+def ray_covariance(
+    station: Station, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Covariance (..., 6, 6) of a beam's origin, m, and of its direction, rad, ground axes, in this order.
+
+    station, at_counts   as for `ray`
+    of_station           (..., 13, 13), of `PARAMETERS`, in their units
+    of_counts            (..., 2, 2), counts^2, independent of it; none if None
+
+    The direction's part is of rank two: it stays a unit vector. Source: [JCGM102] eq. 3, first order, `ray_jacobian`.
+    """
+    by_counts, direction, origin = ray_jacobian(station, at_counts)
+    slopes = np.concatenate([origin, direction], axis=-2)
+    answer = slopes @ np.asarray(of_station, dtype=float) @ np.swapaxes(slopes, -1, -2)
+    if of_counts is not None:
+        nothing = np.zeros_like(by_counts)
+        read = np.concatenate([nothing, by_counts], axis=-2)
+        answer = answer + read @ np.asarray(of_counts, dtype=float) @ np.swapaxes(read, -1, -2)
+    return answer
+
+
 def _turning_axes(station: Station) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Axes, a row each, about which alpha1..3 turn the mount's axes (..., 3, 3) and beta1, 2 the mirror's (..., 2, 3).
 

@@ -62,6 +62,7 @@ class MirrorGeometry(Certificate):
                         (a sample) times 65 536; fkp_0, fki_0, fkd_0, fil_0, fsi_0 its filter; erl_0 in counts; _1 is
                         elevation
     detector_defocus_mm, beam_divergence_rad  with u_ of each: of the optics, for the record
+    notes               what the report's NOTES say
     """
 
     format: Annotated[int | str, Version("mirror")] = 1
@@ -128,6 +129,7 @@ class MirrorGeometry(Certificate):
     fil_1: Gain | None = None
     fsi_1: Interval | None = None
     erl_1: CountLimit | None = None
+    notes: Annotated[str, Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _has_room_between_its_limits(self) -> Self:

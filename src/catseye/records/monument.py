@@ -28,6 +28,7 @@ class MonumentGeometry(Certificate):
     latitude_deg, longitude_deg (east positive, NAD83), elevation_m (above sea level)
     wv_x_m, wv_y_m, wv_z_m  West Virginia South state plane (NAD83): easting, northing, and elevation
     control_panel, ethernet_address, ip_address  of the ranger's cabinet
+    notes               what the report's NOTES say
     """
 
     format: Annotated[int | str, Version("monument")] = 1
@@ -55,6 +56,7 @@ class MonumentGeometry(Certificate):
     wv_x_m: Annotated[float, Within(1e5, 2e6)] | None = None
     wv_y_m: Annotated[float, Within(-1e6, 1e6)] | None = None
     wv_z_m: Elevation | None = None
+    notes: Text | None = None
 
     @model_validator(mode="after")
     def _stands_off_the_pintle(self) -> Self:

@@ -40,6 +40,8 @@ class Folder:
             state = "is not a file" if path.exists() else "missing"
         except OSError as problem:
             raise unreadable(file, problem) from problem
+        if not file:  # of a path such as . or /
+            raise refusal(str(path), f"{state} (expected one)")
         raise refusal(file, f"{state} in {self.directory}")
 
     def records_in(self, file: str) -> list[str]:

@@ -1,6 +1,6 @@
 """From records to stations, and to the counts of one mirror for given points: CAL.EQ."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from catseye.records.monument import MonumentGeometry
 from catseye.records.target import FeedArmRanger
 from catseye.reduction.places import nominal_frame
 
+FARTHEST = 1e12  # m, beyond the Sun; farther is a slip
+ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: nothing is known of an azimuth, uniform over a turn
+STEPS = {"axes": 1e-6, "tilts": 1e-7}  # m, rad, for derivatives
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
 
@@ -88,13 +91,42 @@ def offset_of(mirror: MirrorGeometry) -> np.ndarray:
 
 def imperfections_of(mirror: MirrorGeometry) -> Imperfections | None:
     """What the record says of offsets, tilts and encoder errors; None where it knows of none."""
-    found = Imperfections(
+    found = _imperfections(mirror)
+    return found if found.matter else None
+
+
+def _imperfections(mirror: MirrorGeometry) -> Imperfections:
+    return Imperfections(
         axes=np.array([getattr(mirror, key) for key in AXES]) * MILLIMETRE,
         tilts=np.array([getattr(mirror, key) for key in TILTS]),
         azimuth_waves=np.array([mirror.azimuth_encoder_cosine_counts, mirror.azimuth_encoder_sine_counts]),
         elevation_waves=np.array([mirror.elevation_encoder_cosine_counts, mirror.elevation_encoder_sine_counts]),
     )
-    return found if found.matter else None
+
+
+def imperfections_variance(station: Station, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
+    """(n, 2), counts^2, of the direct pointing's counts for points (n, 3), m, by what the record says it does not know
+    of offsets, tilts and encoder errors; zero where it says nothing.
+
+    Each term is independent. A cosine and a sine term of one order, known to u each, give u^2 at any angle.
+
+    Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
+    """
+    whole = _imperfections(mirror)
+    answer = np.zeros((len(to), 2))
+    for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
+        if u == 0.0:
+            continue
+        values, step = getattr(whole, part), STEPS[part]
+        for away in step * np.eye(len(values)):
+            ahead, behind = (
+                imperfect_counts(station, replace(whole, **{part: values + sign * away}), to) for sign in (1, -1)
+            )
+            apart = ahead - behind
+            apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
+            answer += np.square(u * apart / (2.0 * step))
+    orders = np.array([whole.azimuth_waves.shape[1], whole.elevation_waves.shape[1]])
+    return answer + np.square(mirror.u_encoder_counts or 0.0) * orders
 
 
 def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -129,7 +161,8 @@ class Pointings:
     prime                (n, 2) of the prime pointing: half a turn up or down, whichever is allowed, up where neither is
     autocollimation, back_retro   elevation counts at which the face, or the retroreflector behind it, looks there
     allowed, prime_allowed        azimuth within the limits
-    u                    (n, 2), counts, of the direct pointing by the records; NaN where they do not say it all
+    u                    (n, 2), counts, of the direct pointing by the records; NaN where they do not say it all; of an
+                         azimuth at most that of any turn; of an elevation on the azimuth axis itself NaN
     lacking              keys of uncertainties that the records lack
     """
 
@@ -148,11 +181,14 @@ class Pointings:
 def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
     """Encoder counts of one mirror for points (n, 3), m, ground.
 
-    Raises InputError for a point that has no direction, or that the beam of this mirror does not meet.
+    Raises InputError for a point that has no direction, is farther than FARTHEST, or that the beam of this mirror does
+    not meet.
 
     Source: [PARKER04] Figure 2.5 (CAL.EQ), eq. 2.12 to 2.26.
     """
     station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
+    for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
+        raise InputError(f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m)")
     found = aim(station, to)
     low, high = mirror.az_low_limit, mirror.az_high_limit
     direct = np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
@@ -176,7 +212,9 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     prime = np.column_stack([np.where(down, lower, prime[:, 0]), prime[:, 1]])
     covariance, lacking = station_covariance(monument, mirror)
     spread = counts_covariance(station, to, of_station=covariance)
-    u = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
+    variance = np.diagonal(spread, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to)
+    u = np.sqrt(variance)
+    u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
     return Pointings(
         to=to,
         aim=found,

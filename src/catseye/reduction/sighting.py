@@ -6,6 +6,7 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
+from catseye.geometry.imperfect import imperfect_ray
 from catseye.geometry.pointing import Station, ray
 from catseye.geometry.slew import Pace
 from catseye.geometry.sun import altitude_azimuth
@@ -15,6 +16,7 @@ from catseye.records.monument import MonumentGeometry
 from catseye.records.solids import Solids
 from catseye.reduction.earth_rotation import Place, sun_at
 from catseye.reduction.guard import Verdict, guard_of
+from catseye.reduction.pointing import imperfections_of
 from catseye.reduction.visibility import Retroreflectors, Visibility, frames_at, visibility
 
 STANDING = Pace((1.0, 1.0), (1.0, 1.0))  # a pointing asks nothing of the axes' speeds
@@ -43,11 +45,14 @@ class Sighting:
 def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None) -> Place:
     """Where on Earth the site is: the options, else the monument's record.
 
-    Raises InputError where neither says it.
+    Raises InputError where neither says it, and for one that is no place.
     """
     given = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
     found = {key: getattr(monument, key) if value is None else value for key, value in given.items()}
-    for key, value in found.items():
+    for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
+        value = found[key]
+        if value is not None and not limits[0] <= value <= limits[1]:
+            raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
             raise InputError(
                 f"the Sun's place needs {key}, which the record of {monument.monument} does not have (expected it "
@@ -78,6 +83,7 @@ def sightings(
     free = replace(whole, azimuth_limits=(-np.inf, np.inf))
     under_sun = None if mjd is None else replace(free, boxes=())
     boxed = replace(free, place=None) if keep_out.box else None
+    imperfections = imperfections_of(mirror)
     answer = []
     for n in counts:
         seen: dict[str, object] = {}
@@ -86,7 +92,8 @@ def sightings(
         if under_sun is not None and mjd is not None and place is not None:
             sun = sun_at(mjd, place)
             altitude, azimuth = altitude_azimuth(sun.direction)
-            direction = ray(station, n).direction
+            beam = ray(station, n) if imperfections is None else imperfect_ray(station, imperfections, n)
+            direction = beam.direction
             apart = np.arctan2(np.linalg.norm(np.cross(direction, sun.direction)), direction @ sun.direction)
             seen |= {
                 "mjd": mjd,
@@ -109,6 +116,7 @@ def seen_from(
     facing: np.ndarray | None,
     solids: Solids,
     posture: tuple[float, float] | None,
+    reachable: np.ndarray | None = None,
 ) -> Visibility:
     """Whether retroreflectors at points (n, 3), m, ground, serve one ranger.
 
@@ -116,6 +124,7 @@ def seen_from(
     facing    (3,) of all of them, ground: outward normal; None: incidence is not judged
     solids    that may stand in the way
     posture   azimuth, elevation, rad, of the telescope that carries some of them
+    reachable (n,) bool: within the azimuth stops in one of the pointings
 
     Raises InputError for a solid on the telescope without a posture.
     """
@@ -130,4 +139,5 @@ def seen_from(
         Retroreflectors(("",) * len(to), (kind,) * len(to), to, np.broadcast_to(axis, to.shape)),
         solids,
         frames_at(*(posture or (0.0, 0.0))),
+        reachable=None if reachable is None else reachable[None],
     )
