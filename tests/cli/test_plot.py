@@ -44,6 +44,15 @@ def test_a_servo_move_takes_a_mirrors_settings(catseye, tmp_path):
     assert not its["motor_off"]
 
 
+def test_a_move_that_takes_for_ever_is_refused(catseye, tmp_path):
+    mirror, out = tmp_path / "z.toml", tmp_path / "servo.svg"
+    mirror.write_text(f"abv_0 = 1\naba_0 = 1\n{SETTINGS}" + ZP3.read_text(encoding="utf-8"), encoding="utf-8")
+    status, said, problem = catseye("plot", "servo", "--mirror", mirror, "--counts", "1000000", "--out", out)
+    assert (status, said) == (1, "")
+    assert "abv 1, aba 1 takes up to 22369622 s" in problem
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "complaint"),
     [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.sun import SUN_RATE, altitude_azimuth, apparent_geocentric, refracted, sun_direction
+from catseye.geometry.sun import LATEST_MJD, SUN_RATE, altitude_azimuth, apparent_geocentric, refracted, sun_direction
 from sun_scene import DEGREE, GREEN_BANK, apart, astropy_sun
 
 ARCSECOND = DEGREE / 3600
@@ -90,6 +90,15 @@ def test_two_places_see_the_sun_apart_by_their_distance():
         assert np.linalg.norm(seen[i] - seen[0] - expected) < 0.7 * ARCSECOND
 
 
+def test_to_the_last_day_the_theory_says_nothing_and_beyond_it_is_refused():
+    # erfa warns from 2100-01-01 on; warnings are errors here.
+    assert np.linalg.norm(sun_direction(LATEST_MJD, 0.67, -1.39)) == pytest.approx(1.0)
+    apparent_geocentric([15_020.0, LATEST_MJD])
+    for late in (LATEST_MJD + 0.6, 88_119.58):
+        with pytest.raises(ValidityError, match="mjd"):
+            sun_direction(late, 0.67, -1.39)
+
+
 def test_ut1_turns_the_sky_westward():
     early, late = (sun_direction(52_889.65, 0.67, -1.39, ut1_minus_utc=s) for s in (-0.5, 0.5))
     pole = np.array([0, np.cos(0.67), np.sin(0.67)])
@@ -135,7 +144,7 @@ def test_refraction_without_air_is_nothing_and_the_zenith_stays():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((2_452_889.5, 0.67, -1.39, 0), "mjd = 2452889.5 is outside 41317 to 88128"),
+        ((2_452_889.5, 0.67, -1.39, 0), "mjd = 2452889.5 is outside 41317 to 88069"),
         ((41_316.9, 0.67, -1.39, 0), "mjd"),
         ((np.nan, 0.67, -1.39, 0), "mjd = nan"),
         ((52_889.0, 38.4, -1.39, 0), "latitude = 38.4 is outside"),

@@ -1,4 +1,4 @@
-"""No pointing and no slew that the guard accepts comes into the Sun's cone.
+"""No pointing, slew, track or search path that the guard accepts comes into the Sun's cone.
 
 The check shares nothing with the guard: astropy's Sun, scipy's rotations, integrated speeds (tests/sun_scene.py). It is
 shown to fail where the guard is wrong.
@@ -11,9 +11,22 @@ import pytest
 
 from catseye.geometry.keep_out import TOUCH
 from catseye.geometry.pointing import Station, counts
+from catseye.geometry.search_pattern import spiral
 from catseye.geometry.slew import trapezoid
 from catseye.reduction.earth_rotation import Place
-from sun_scene import DEGREE, GREEN_BANK, STATION, ZEROS, apart, astropy_sun, beam, guard, profile, random_counts
+from sun_scene import (
+    DEGREE,
+    GREEN_BANK,
+    STATION,
+    STOPS,
+    ZEROS,
+    apart,
+    astropy_sun,
+    beam,
+    guard,
+    profile,
+    random_counts,
+)
 
 LOOKS = 65
 CONE = 5 * DEGREE
@@ -125,6 +138,63 @@ def test_a_guard_that_looks_only_at_the_ends_is_found_out():
 
     rng = np.random.default_rng(474)
     assert violations_of_slews(own, rng, days(rng, 2), 500, ends_only)[0] > 20
+
+
+def deepest_of_track(mjd, seconds, points):
+    """Least angle, rad, from astropy's Sun to a beam that goes straight between counts (n, 2) at times (n,), s."""
+    time = np.linspace(0.0, seconds[-1], 4001)
+    way = np.stack([np.interp(time, seconds, points[:, k]) for k in (0, 1)], axis=-1)
+    return np.min(apart(beam(way), suns(mjd)(time)))
+
+
+def test_no_accepted_track_of_many_comes_into_the_cone():
+    own, rng = guard(), np.random.default_rng(477)
+    accepted = refused = ends_only = 0
+    for mjd in days(rng, 4):
+        for _ in range(25):
+            # Three minutes about the Sun, four time tags.
+            seconds = np.array([0.0, 45.0, 120.0, 180.0])
+            points = seen_at(mjd) + rng.normal(0, 1, (4, 2)) * [4000, 2000]
+            points[:, 0] = np.clip(points[:, 0], *STOPS)
+            tags = mjd + seconds / 86_400
+            deepest = deepest_of_track(mjd, seconds, points)
+            if own.track(tags, points).allowed:
+                accepted += 1
+                assert deepest > CONE
+            else:
+                refused += 1
+                assert deepest < CONE + 60 / 3600 * DEGREE  # looks are apart, pieces of the Sun's way widen the cone
+                ends_only += bool(np.all(own.clearance(tags, points) > TOUCH))
+    assert accepted > 20
+    assert refused > 20
+    assert ends_only > 3  # what looks at the time tags alone would have let pass
+
+
+def test_no_accepted_search_of_many_comes_into_the_cone():
+    own, rng = guard(), np.random.default_rng(478)
+    accepted = refused = moved_in = 0
+    for mjd in days(rng, 4):
+        for _ in range(10):
+            off = rng.choice([-1, 1]) * rng.uniform(5.2, 6.2) * DEGREE
+            centre = np.add(seen_at(mjd), [0.0, off / (4 * np.pi) * 1e5])
+            looks = spiral(np.rint(centre), STATION.zeros, 0.4 * DEGREE, 2e-3, STOPS).counts
+            verdict = own.route(mjd, looks, dwell=3.0)
+            moves = trapezoid(looks[:-1], looks[1:], own.pace)
+            time, way = profile(looks[:-1], looks[1:], 17)
+            begin = 3.0 * np.arange(1, len(looks)) + np.concatenate([[0.0], np.cumsum(moves.total)[:-1]])
+            sun = suns(mjd)(begin[:, None] + time)
+            deepest = np.min(apart(beam(way), sun))
+            if verdict.allowed:
+                accepted += 1
+                assert deepest > CONE
+            else:
+                refused += 1
+                assert deepest < CONE + 60 / 3600 * DEGREE
+                # A list of counts asked for at one time goes stale while the search goes on: the Sun moves.
+                moved_in += bool(np.all(own.clearance(mjd, looks) > TOUCH))
+    assert accepted > 5
+    assert refused > 5
+    assert moved_in > 0
 
 
 @pytest.mark.slow

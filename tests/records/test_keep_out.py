@@ -34,6 +34,11 @@ def test_what_is_not_said_has_the_usual_value(tmp_path):
     assert kept.boxes()[0].size.tolist() == [1.0, 2.0, 3.0]
 
 
+def test_why_is_kept_in_one_line(tmp_path):
+    text = '[[box]]\nname = "room"\nwhy = """people\n  work"""\nlow_mm = [0, 0, 0]\nhigh_mm = [1000, 2000, 3000]\n'
+    assert read(tmp_path, text).boxes()[0].why == "people work"
+
+
 def test_both_ways_of_giving_a_box_agree(tmp_path):
     a = read(tmp_path, ROOM + "low_mm = [100, 200, 300]\nhigh_mm = [1100, 2200, 3300]\nturn_deg = 10\n").boxes()[0]
     b = read(tmp_path, ROOM + "centre_mm = [600, 1200, 1800]\nsize_mm = [1000, 2000, 3000]\nturn_deg = 10\n").boxes()[0]

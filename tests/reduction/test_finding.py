@@ -249,8 +249,8 @@ def test_the_table_for_the_adjustment_has_the_columns_that_its_calibration_reads
     header, *rows = adjustment_readings(results, {"A": [1, 2, 3], "B": [4, 5, 6.00001]}, 1434.0).splitlines()
     assert set(LAYOUT.required) <= set(header.split(",")) <= {*LAYOUT.required, *LAYOUT.optional, "mjd_utc"}
     assert rows == [
-        "A,1.00000,2.00000,3.00000,9000.123,5000.000,direct,52889.25000000001",
-        "B,4.00000,5.00000,6.00001,59000.123,-5000.000,prime,52889.25000000001",
+        "A,1.00000,2.00000,3.00000,9000.123,5000.000,0.2,0.3,direct,52889.25000000001",
+        "B,4.00000,5.00000,6.00001,59000.123,-5000.000,0.2,0.3,prime,52889.25000000001",
     ]
     with pytest.raises(ValidityError, match="B was found and has no place"):
         adjustment_readings(results, {"A": [1, 2, 3]}, 0.0)

@@ -140,11 +140,33 @@ def test_a_slew_through_the_sun_is_refused_with_the_time_when_it_may_go():
         assert not own.slew(MORNING + early * (verdict.free_at_mjd - 12 * SECOND - MORNING), start, end).allowed
 
 
+def test_a_slew_into_the_sunrise_says_how_near_it_comes():
+    # The cone counts for the whole of a move during which the Sun may rise: also where it has not yet.
+    mjd = 52_889.0 + np.arange(0.4, 0.5, 1e-5)
+    height = sun_at(mjd, GREEN_BANK).direction[:, 2] + np.sin(2 * DEGREE)
+    rise = float(mjd[np.flatnonzero(np.diff(np.sign(height)))[0]])
+    n = counts(STATION, STATION.scan_point + 100 * sun_at(rise, GREEN_BANK).direction)
+    for early in (2.0, 1.5, 0.5):
+        verdict = guard().slew(rise - early * SECOND, n - [9000, 0], n)
+        assert not verdict.allowed
+        assert "is 5.0 deg from the Sun" in verdict.reason
+        assert 0.0 <= verdict.clearance <= TOUCH
+
+
+def test_nothing_is_told_beyond_the_time_looked_ahead(monkeypatch):
+    own = guard()
+    n = counts(STATION, STATION.scan_point + 100 * sun_at(MORNING + 0.16, GREEN_BANK).direction)
+    comes = own.until(MORNING, n)
+    assert 0.13 < comes - MORNING < 0.15
+    monkeypatch.setattr("catseye.reduction.guard.LOOK_AHEAD", 0.12)
+    assert own.until(MORNING, n) is None
+
+
 def test_boxes_are_named_and_never_become_free():
     target = np.array([107.0, -21.0, 4.0])  # in the control room
     own = guard(boxes=boxes()[:1])
     verdict = own.pointing(MORNING, counts(STATION, target))
-    assert "hits control-room; a box does not go away" in verdict.reason
+    assert "hits control-room; a box does not go away (people work behind the windows): choose" in verdict.reason
     assert verdict.free_at_mjd is None
     over = counts(STATION, [95.0, -21.0, 9.3])  # 0.3 m above its near edge, and rising
     near = own.pointing(MORNING, over)
@@ -286,6 +308,10 @@ def test_a_time_is_written_rounded_up():
     [
         (lambda: guard(azimuth_limits=(10, -10)), "azimuth limits"),
         (lambda: guard(half_angle=5.0), "half angle"),
+        (lambda: guard(horizon=-2.0), "horizon"),  # degrees; at 5.0 or NaN the Sun would never count
+        (lambda: guard(horizon=5.0), "horizon"),
+        (lambda: guard(horizon=np.nan), "horizon"),
+        (lambda: guard().route(MORNING, [[0, 0], [1, 1]], dwell=np.inf), "dwell"),
         (lambda: guard().pointing(MORNING, [1, 2, 3]), "two finite numbers"),
         (lambda: guard().slew(MORNING, [0, np.nan], [1, 2]), "two finite numbers"),
         (lambda: guard().route(MORNING, [[0, 0]]), "waypoints"),

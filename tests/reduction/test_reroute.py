@@ -108,6 +108,12 @@ def test_random_ways_are_found_and_verified():
     assert RouteStatus.AROUND in kinds
 
 
+@pytest.mark.parametrize("target", [[np.nan, 5000.0], [0.0, 5000.0, 1.0], [np.inf, 0.0]])
+def test_a_target_that_is_no_pair_of_counts_is_refused(target):
+    with pytest.raises(ValidityError, match="two finite numbers"):
+        route(guard(), MORNING, START, target)
+
+
 def test_a_step_of_no_counts_is_refused():
     with pytest.raises(ValidityError, match="step"):
         route(guard(), MORNING, START, END, step=(0.0, 100.0))

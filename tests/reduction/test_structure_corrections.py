@@ -209,6 +209,33 @@ def test_the_models_coefficients_scatter_as_claimed_in_many_trials(antenna):
     fits(antenna, 60, 9)
 
 
+def test_coefficients_that_stay_as_they_are_do_not_average_out_over_postures(antenna):
+    """The alidade's lean is off by one draw in all postures: fits that took it anew in each would be too sure."""
+    rng = np.random.default_rng(21)
+    document = antenna.record.model_dump(exclude_none=True)
+    motion = next(f["motion"] for f in document["frame"] if f["name"] == "alidade")
+    k = len(antenna.motions["alidade"].basis)
+    u = np.zeros(6 * k)
+    u[[0, k, 3 * k]] = 3.0, 3.0, 15.0  # mm, mm, arc seconds: constant terms of shift x, shift y, turn x
+    motion["covariance"] = tuple(tuple(float(v) for v in row) for row in np.diag(u**2))
+    unsure = antenna_of(StructuralModel.model_validate(document))
+    squares, naive = [], []
+    for _ in range(4):
+        true, truth = changed(antenna.record, antenna, rng)
+        moved = true.record.model_dump(exclude_none=True)
+        lean = next(f["motion"] for f in moved["frame"] if f["name"] == "alidade")
+        for key, size in (("shift_x_mm", 3.0), ("shift_y_mm", 3.0), ("turn_x_arcsec", 15.0)):
+            first, *rest = lean.get(key, (0.0,) * k)
+            lean[key] = (first + size * rng.standard_normal(), *rest)
+        epochs = campaign(antenna_of(StructuralModel.model_validate(moved)), rng, 14)
+        for model, told in ((unsure, squares), (antenna, naive)):
+            fit = fit_model(model, epochs, free=FREE)
+            told.append(distance(coefficients(fit, antenna) - truth, fit.covariance))
+    p = len(truth)
+    assert np.mean(squares) < p + 4 * np.sqrt(2 * p / 4)
+    assert np.mean(naive) > 1.5 * p  # which takes the lean as known
+
+
 def test_the_update_is_a_new_file_whose_next_fit_begins_with_what_was_learnt(antenna, tmp_path):
     rng = np.random.default_rng(10)
     true, truth = changed(antenna.record, antenna, rng)

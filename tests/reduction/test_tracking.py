@@ -12,7 +12,7 @@ from catseye.geometry.antenna import (
     ground_from_alidade,
     ground_from_reflector,
 )
-from catseye.geometry.pointing import Station
+from catseye.geometry.pointing import Station, counts, ray
 from catseye.geometry.time_tag import TimeTag
 from catseye.geometry.track import apparent_motion, count_motion, line_bound, line_estimate
 from catseye.reduction.pointing import station_of
@@ -28,6 +28,7 @@ from catseye.reduction.tracking import (
     follow,
     misses,
     mounted,
+    safe_intervals,
     smear,
 )
 
@@ -252,3 +253,39 @@ def test_a_range_that_changes_by_half_a_wavelength_leaves_nothing_of_a_buffer():
     np.testing.assert_allclose(left, taken, atol=1e-6)
     with pytest.raises(ValidityError, match=r"wavelength -0\.2 m"):
         smear(v, wavelength=-0.2)
+
+
+@pytest.mark.parametrize("frame", ["alidade", "elevation", "reflector"])
+def test_no_acceleration_exceeds_the_most_that_is_told(frame):
+    points = np.concatenate([DISH, [[30.0, -20.0, 40.0], [0.0, 0.0, 0.0]]])
+    _, _, a = SLEW.motion(points, frame, np.linspace(-1.0, SLEW.azimuth.duration + 1.0, 3000))
+    size = np.linalg.norm(a, axis=-1)
+    most = SLEW.most_acceleration(points, frame)
+    assert np.all(size <= most * (1 + 1e-12))
+    far = most > 0.01
+    assert np.all(size.max(axis=0)[far] > 0.3 * most[far])  # and it is no idle bound
+
+
+@pytest.mark.parametrize("limit", [{"limit_counts": 0.25}, {"limit_angle": 1e-5}])
+def test_over_a_safe_interval_the_line_holds_its_limit(ground, limit):
+    stations, _limits = ground
+    times = np.array([5.0, 40.0, 80.0])
+    safe = safe_intervals(stations, DISH, "reflector", SLEW, times, **limit)
+    assert safe.shape == (3, 12, 9)
+    assert np.all(safe > 0.0)
+    targets = fixed(DISH, "reflector", SLEW)
+    for i, begin in enumerate(times):
+        for r, p in ((0, 0), (3, 4), (7, 8), (11, 2)):
+            h = np.floor(safe[i, r, p] * 1e9) / 1e9
+            at, one = np.linspace(0.0, 1.0, 33), stations[r]
+            n = np.unwrap(counts(one, targets(begin + at * h)[:, 0, p]), period=1e5, axis=0)
+            line = n[0] + at[:, None] * (n[-1] - n[0])
+            off = np.abs(n - line)
+            if "limit_counts" in limit:
+                assert off.max() <= 0.25
+            else:
+                sight = ray(one, line).direction
+                true = ray(one, n).direction
+                assert np.max(np.linalg.norm(sight - true, axis=-1)) <= 1e-5
+    with pytest.raises(InputError, match="frame 'sky' is not known"):
+        SLEW.most_acceleration(DISH, "sky")

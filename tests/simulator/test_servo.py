@@ -208,6 +208,43 @@ def test_a_target_that_turns_back_is_followed():
     assert np.max(np.abs(trace.error)) < 4.0
 
 
+def test_after_a_track_a_move_is_as_fast_as_before():
+    made = axis()
+    usual = made.abv()
+    made.follow([20.7, 20.7, 20.7])
+    assert made.abv() == usual  # not the 0 counts/s of the track's end, below the acceleration
+    made.abp(10_000)
+    assert made.stt()
+    assert made.wai(2.0).success
+
+
+@pytest.mark.parametrize(("to", "samples"), [([np.nan], 375), ([1.0, np.inf], 375), ([], 375), ([5.0], 0)])
+def test_a_track_that_cannot_be_is_refused(to, samples):
+    with pytest.raises(ValidityError, match="counts to follow"):
+        axis().follow(to, samples)
+
+
+def test_homing_during_a_move_with_another_acceleration_says_so_and_does_not_wait():
+    made = axis(AxisDesign(index_count=3000))
+    made.abp(10_000)
+    made.stt()
+    made.skip(100)
+    made.aba(acceleration_integer(20_000))
+    refused = made.fhm()
+    assert not refused.success
+    assert "ABA" in refused.text
+    assert refused.seconds == 0.0
+    assert not made.chip.seeking
+    assert made.wai().success
+    assert made.fhm().success
+
+
+@pytest.mark.parametrize("seconds", [np.inf, np.nan])
+def test_no_wait_is_without_end(seconds):
+    with pytest.raises(ValidityError, match="no end"):
+        axis().wai(seconds)
+
+
 def test_commands_answer_what_is_loaded_and_refuse_the_rest():
     made = ServoAxis(MotionChip(), Motor(AxisDesign()))
     assert not made.enabled

@@ -148,6 +148,11 @@ def test_moves_that_tell_nothing_are_refused():
         ({"crossover_hz": 0.0}, "crossover 0 Hz is outside"),
         ({"crossover_hz": 2000.0}, "crossover 2000 Hz is outside"),
         ({"crossover_hz": 0.2}, "FKP: proportional gain 0"),
+        ({"phase_margin": 55.0}, "check its unit"),
+        ({"phase_margin": -1.0}, "phase margin -1 rad"),
+        ({"phase_margin": float("nan")}, "phase margin nan rad"),
+        ({"interval": -1}, "FSI"),
+        ({"interval": 256, "crossover_hz": 1.0}, "FSI"),
     ],
 )
 def test_a_loop_that_cannot_be_had_is_refused(keys, said):
@@ -164,6 +169,13 @@ def test_other_refusals():
         margins(PLANT, Filter(0, 0, 0, 0))
     with pytest.raises(ValidityError, match="starts at its target"):
         step_metrics([0.0, 1.0], [5.0, 5.0], target=5.0)
+    for time, position in (([0.0, 1.0], [0.0, np.nan]), ([], []), ([0.0, 1.0], [0.0])):
+        with pytest.raises(ValidityError, match="finite numbers"):
+            step_metrics(time, position, target=5.0)
+    one = Trace(np.zeros(1), *np.zeros((5, 1)))
+    for traces in ((), (one,)):
+        with pytest.raises(EstimationError, match="no moves"):
+            identify(*traces)
 
 
 def test_the_limit_of_the_integral_holds_the_friction():

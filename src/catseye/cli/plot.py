@@ -13,6 +13,7 @@ from catseye.errors import InputError
 KINDS = ("sky", "servo")
 MARK = "<!-- catseye plot"
 USUAL_COUNTS_PER_S, USUAL_COUNTS_PER_S2 = 12_000.0, 40_000.0  # of axes whose record does not say
+LONGEST_MOVE = 120.0  # s, of a drawn move: a few seconds of computing
 
 
 def _known(kind: str) -> str:
@@ -175,7 +176,13 @@ def _servo(mirror: Path | None, axis: int, counts: int) -> tuple[str, dict[str, 
     made.abp(counts)
     made.stt()
     rate = velocity / 65_536
-    trace = made.run(round(counts / rate + 2.0 * rate * 65_536 / acceleration + 0.5 / SAMPLE_TIME))
+    samples = round(counts / rate + 2.0 * rate * 65_536 / acceleration + 0.5 / SAMPLE_TIME)
+    if samples * SAMPLE_TIME > LONGEST_MOVE:
+        raise InputError(
+            f"a move of {counts} counts with abv {velocity}, aba {acceleration} takes up to "
+            f"{samples * SAMPLE_TIME:.0f} s (expected up to {LONGEST_MOVE:g} s)"
+        )
+    trace = made.run(samples)
     found, came = margins(plant, chosen), step_metrics(trace.time, trace.actual, target=counts)
     return move_figure(trace, target=counts, plant=plant), {
         "axis": "assumed: nothing public says inertia, torque and friction of the ZY's",

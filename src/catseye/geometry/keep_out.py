@@ -110,6 +110,7 @@ class Box:
     size      (3,), m, whole lengths before the turn, above 0
     turn      rad, right-handed about z: x towards y
     length    m, of the beam: what lies further from the scan point does not count
+    why       what it keeps the beam off, for a refusal
     """
 
     centre: NDArray[np.float64]
@@ -117,6 +118,7 @@ class Box:
     turn: float = 0.0
     length: float = np.inf
     name: str = "a box"
+    why: str = ""
 
     def __post_init__(self) -> None:
         for name in ("centre", "size"):

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import DEGREE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
-EARLIEST_MJD, LATEST_MJD = 41_317.0, 88_128.0  # 1972, when leap seconds begin, to the end of the theory, 2100
+EARLIEST_MJD, LATEST_MJD = 41_317.0, 88_069.0  # 1972, when leap seconds begin, to 2100, the end of the theory
 MJD_ZERO = 2_400_000.5  # JD
 EARTH_RATE = 7.292_115e-5  # rad/s
 SUN_RATE = 7.3e-5  # rad/s: no faster does the Sun move in the ground frame
@@ -39,7 +39,7 @@ def sun_direction(
 ) -> NDArray[np.float64]:
     """Unit vector (..., 3) to the middle of the Sun as it is seen without air: x east, y north, z up.
 
-    mjd              (...), UTC, 41317 to 88128 (1972 to 2100)
+    mjd              (...), UTC, 41317 to 88069 (1972 to 2099)
     latitude         (...), rad, geodetic, -pi/2 to pi/2
     longitude        (...), rad, east positive
     height           (...), m above the ellipsoid, -1000 to 100 000
@@ -77,7 +77,7 @@ def sun_direction(
 def apparent_geocentric(tt_mjd: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Right ascension in [0, 2 pi), declination, rad, and distance, m, of the Sun from the Earth's centre, (...) each.
 
-    tt_mjd    (...), Terrestrial Time, 15020 to 88128 (1900 to 2100)
+    tt_mjd    (...), Terrestrial Time, 15020 to 88069 (1900 to 2099)
 
     True equator and equinox of date, with aberration: what an almanac prints. Raises ValidityError outside the years.
 

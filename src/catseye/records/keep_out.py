@@ -20,7 +20,7 @@ class KeepOutBox(Record):
     low_mm, high_mm      corners with the least and the greatest x, y, z, before the turn
     centre_mm, size_mm   instead
     turn_deg             about its vertical middle axis, from x towards y
-    why                  what it keeps the beam off
+    why                  what it keeps the beam off; a refusal says it
     """
 
     name: Name
@@ -63,7 +63,7 @@ class KeepOutBox(Record):
     def box(self, length: float = np.inf) -> Box:
         """In metres and radians, for a beam of a length, m."""
         centre, size = (np.array(v) * MILLIMETRE for v in self._centre_and_size_mm())
-        return Box(centre, size, self.turn_deg * DEGREE, length, self.name)
+        return Box(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
 
     def _centre_and_size_mm(self) -> tuple[list[float], list[float]]:
         if self.centre_mm is not None and self.size_mm is not None:
@@ -83,7 +83,7 @@ class KeepOut(Certificate):
     """The whole of a file.
 
     beam_length_m   what lies further from a scan point does not count; without it the beam has no end
-    margin_counts   how far azimuth and elevation axis may be off their profile
+    margin_counts   how far azimuth and elevation axis may be off their profile, a later start of one axis included
     """
 
     format: Annotated[int | str, Version("keep-out")] = 1

@@ -101,7 +101,7 @@ def rotation_at(mjd: ArrayLike) -> Rotation:
 def sun_at(mjd: ArrayLike, place: Place | Location) -> SunSeen:
     """Where the Sun stands over a site, in its ground frame: `sun_direction` with UT1 - UTC by the tables.
 
-    mjd      (...), UTC, 41317 to 88128
+    mjd      (...), UTC, 41317 to 88069
     place    a Place, or [site] of a site record: the origin of the ground frame, for all rangers of it
 
     A Place with a pressure gives the Sun as it is seen through the air. Many times that lie close together are

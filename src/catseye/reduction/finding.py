@@ -186,12 +186,13 @@ def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, Ar
         what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
         raise ValidityError(f"{what}: there is nothing to adjust by")
     _refuse_commas(found)
-    lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,pointing,mjd_utc"]
+    lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,u_azimuth_counts,u_elevation_counts,pointing,mjd_utc"]
     for result in found:
-        na, ne = result.spot.counts
+        (na, ne), u = result.spot.counts, result.spot.u_counts
         where = [f"{x:.5f}" for x in np.asarray(places[result.target], dtype=float)]
         pointing = "prime" if ne < ne0 else "direct"
-        lines.append(",".join([result.target, *where, f"{na:.3f}", f"{ne:.3f}", pointing, result.when.text()]))
+        counts = (f"{na:.3f}", f"{ne:.3f}", f"{u[0]:.3g}", f"{u[1]:.3g}")
+        lines.append(",".join([result.target, *where, *counts, pointing, result.when.text()]))
     return "\n".join(lines) + "\n"
 
 

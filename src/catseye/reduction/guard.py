@@ -85,7 +85,8 @@ class Guard:
     place             origin of the ground frame, or None: the Sun is not watched
     boxes             structure and people
     half_angle        rad, of the Sun's cone about its middle
-    margin_counts     how far each axis may be off its profile: following, overshoot, settling
+    margin_counts     how far each axis may be off its profile: following, overshoot, settling, and one axis starting
+                      after the other (10 ms at 10 000 counts/s are 100 counts)
     horizon           rad: below this altitude the Sun is set; -pi/2 keeps its cone for ever
     off_beam          rad: how far the real mirror's beam may be off the perfect one's, by tilts and encoder errors
     """
@@ -112,6 +113,8 @@ class Guard:
             raise ValidityError(f"{self.name}: stations {self.station.shape} (expected one)")
         if not 0.0 <= self.off_beam < 0.5 * np.pi:
             raise ValidityError(f"{self.name}: off_beam {self.off_beam:g} rad is outside 0 to pi/2: check its unit")
+        if not -0.5 * np.pi <= self.horizon <= 0.5 * np.pi:
+            raise ValidityError(f"{self.name}: horizon {self.horizon:g} rad is outside -pi/2 to pi/2: check its unit")
         object.__setattr__(self, "margin", servo_margin(self.margin_counts) + self.off_beam)
 
     def clearance(self, mjd: ArrayLike, counts: ArrayLike, *, exact_below: float = np.inf) -> NDArray[np.float64]:
@@ -165,7 +168,7 @@ class Guard:
     def route(self, mjd: float, waypoints: ArrayLike, dwell: float = 0.0) -> Verdict:
         """Whether the mirror may go through counts (n, 2), halting at each for a dwell, s; n at least 2."""
         points = np.asarray(waypoints, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not dwell >= 0.0:
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not 0.0 <= dwell < np.inf:
             raise ValidityError(
                 f"{self.name}: waypoints {points.shape} and dwell {dwell} s: expected (n, 2), 0 or above"
             )
@@ -204,7 +207,8 @@ class Guard:
             return Verdict(True, "", float(np.min(self.clearance(mjd, moves.start[0]))))
         at, n, zone, inside = bad
         when = mjd + at / SECONDS_PER_DAY
-        left = float(self.clearance(when, n)[zone])
+        # A cone that counts for some of a move counts for all of it, also where the Sun is not up yet.
+        left = float(replace(self, horizon=-0.5 * np.pi).clearance(when, n)[zone])
         place = f"starts at {_shown(n)}, which" if inside else f"after {at:.3f} s at {_shown(n)}"
         text = f"{self.name}: {word} to {_shown(moves.end[-1])} {place} {self._nearness(zone, left)}"
         free = (self._free_start(mjd, before, moves) if waits else self._change(when, n)) if zone == 0 else None
@@ -259,7 +263,8 @@ class Guard:
 
     def _refused(self, text: str, zone: int, left: float, free: float | None, at: float | None) -> Verdict:
         if zone > 0:
-            ending = "a box does not go away: choose another way or target"
+            why = self.boxes[zone - 1].why
+            ending = f"a box does not go away{f' ({why})' if why else ''}: choose another way or target"
         elif free is None:
             ending = f"not free within {LOOK_AHEAD:g} day: choose another way or target"
         else:
@@ -308,6 +313,7 @@ class Guard:
         start, looks = mjd, FIRST_LOOKS
         while start <= mjd + LOOK_AHEAD:
             grid = start + SCAN * np.arange(looks)
+            grid = grid[grid <= mjd + LOOK_AHEAD]
             hit = np.flatnonzero(done(grid))
             if len(hit):
                 before, after = grid[hit[0]] - SCAN, grid[hit[0]]

@@ -81,17 +81,20 @@ def route(
     step      counts between nodes of the grid, azimuth and elevation
     either    the other setting that points the same, and other turns of azimuth, serve as well
 
-    Without a way the status says why. Raises ValidityError for steps that are not above 0.
+    Without a way the status says why. Raises ValidityError for steps that are not above 0, and for counts that are not
+    two finite numbers.
 
     Source: [DIJKSTRA59] for the shortest way; verified by conservative advancement, `keep_out.first_entry`.
     """
     if not (len(step) == 2 and step[0] > 0.0 and step[1] > 0.0):
         raise ValidityError(f"step {step} is not two numbers of counts above 0")
-    here = np.asarray(start, dtype=float)
+    here, there = np.asarray(start, dtype=float), np.asarray(target, dtype=float)
+    if there.shape != (2,) or not np.isfinite(there).all():
+        raise ValidityError(f"target {there.tolist()} is not two finite numbers (azimuth, elevation, counts)")
     none = np.zeros((0, 2))
     if not guard.pointing(mjd, here).allowed:
         return Route(RouteStatus.STARTS_INSIDE, none, np.nan)
-    goals, prime = _goals(guard, np.asarray(target, dtype=float), either)
+    goals, prime = _goals(guard, there, either)
     slack = _longest(guard) * SUN_RATE
     open_ = np.min(guard.clearance(mjd, goals), axis=-1) > TOUCH if len(goals) else np.zeros(0, dtype=bool)
     goals, prime = goals[open_], prime[open_]

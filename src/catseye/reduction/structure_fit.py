@@ -1,8 +1,9 @@
 """The structural model's coefficients from targets measured in many postures, and its new file.
 
-Three things make the measured targets differ from the model: its coefficients, the same in all postures; the targets'
-places in their frames (the sheet), the same in all postures too, hence parameters with a prior; and what the model
-leaves in each posture anew (u of a motion), which is noise there, correlated between the targets of a posture.
+Four things make the measured targets differ from the model: its free coefficients, the same in all postures; the
+coefficients that stay as they are but have a covariance, the same in all postures too, hence parameters with a prior
+that is not improved; the targets' places in their frames (the sheet), likewise with a prior; and what the model leaves
+in each posture anew (u of a motion), which is noise there, correlated between the targets of a posture.
 """
 
 from collections.abc import Mapping, Sequence
@@ -79,11 +80,12 @@ def fit_model(
     start, prior_normal = _priors(antenna, layout, size)
     theta, place = start.copy(), np.zeros(3 * len(targets))
     u = np.array([u_sheet(antenna, name) for name in targets])
+    held, known = _held(antenna, layout), size + len(place)
     for _ in range(ITERATIONS):
-        normal = np.zeros((size + len(place), size + len(place)))
+        normal = np.zeros((known + held.count, known + held.count))
         right, pvv, residuals, before = np.zeros(len(normal)), 0.0, [], []
         for epoch in epochs:
-            design, misfit, spread = _rows(antenna, epoch, layout, targets, theta - start, place)
+            design, misfit, spread = _rows(antenna, epoch, layout, targets, theta - start, place, held)
             weighted = np.linalg.solve(spread, np.column_stack([design, misfit]))
             normal += design.T @ weighted[:, :-1]
             right += design.T @ weighted[:, -1]
@@ -91,19 +93,24 @@ def fit_model(
             residuals.append(misfit.reshape(-1, 3))
             before.append(design)
         normal[:size, :size] += prior_normal
-        normal[size:, size:] += np.diag(np.repeat(u**-2, 3))
+        normal[size:known, size:known] += np.diag(np.repeat(u**-2, 3))
+        normal[known:, known:] += np.eye(held.count)
         right[:size] -= prior_normal @ (theta - start)
-        right[size:] -= place * np.repeat(u**-2, 3)
+        right[size:known] -= place * np.repeat(u**-2, 3)
         pvv += float((theta - start) @ prior_normal @ (theta - start) + place @ (place * np.repeat(u**-2, 3)))
-        inverse = _inverse(normal, [*_labels(antenna, layout), *(f"place of {n} {a}" for n in targets for a in "xyz")])
+        labels = [*_labels(antenna, layout), *(f"place of {n} {a}" for n in targets for a in "xyz")]
+        inverse = _inverse(normal, [*labels, *(f"held {k}" for k in range(held.count))])
         step = inverse @ right
-        theta, place = theta + step[:size], place + step[size:]
-        if max(float(np.max(np.abs(design @ step))) for design in before) < SETTLED:
+        theta, place = theta + step[:size], place + step[size:known]
+        pvv -= float(
+            right[known:] @ np.linalg.solve(normal[known:, known:], right[known:])
+        )  # what the held ones explain
+        if max(float(np.max(np.abs(design[:, :known] @ step[:known]))) for design in before) < SETTLED:
             break
     else:
         raise EstimationError(f"coefficients did not settle in {ITERATIONS} steps: a target is measured far off")
     rows = sum(3 * len(epoch.names) for epoch in epochs)
-    held = int(np.linalg.matrix_rank(prior_normal)) if prior_normal.any() else 0
+    priors = int(np.linalg.matrix_rank(prior_normal)) if prior_normal.any() else 0
     return ModelFit(
         layout,
         _spread_out(antenna, layout, theta),
@@ -111,7 +118,7 @@ def fit_model(
         {name: place[3 * i : 3 * i + 3] for i, name in enumerate(targets)},
         tuple(residuals),
         pvv,
-        rows + held - size,
+        rows + priors - size,
     )
 
 
@@ -185,8 +192,9 @@ def _rows(
     targets: list[str],
     change: np.ndarray,
     place: np.ndarray,
+    held: "_Held",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Design (3n, coefficients and places), misfit (3n,) and covariance of one posture."""
+    """Design (3n, coefficients, places and held ones), misfit (3n,) and covariance of one posture."""
     added: dict[str, np.ndarray] = {}
     row_of = {name: antenna.motions[name].basis.rows(epoch.posture) for name in {name for name, _ in layout}}
     first = 0
@@ -213,17 +221,47 @@ def _rows(
         by_place[at, column : column + 3] = out[group]
         fresh = antenna.u_points(group)[antenna.groups[group].names.index(name)] ** 2 - u_sheet(antenna, name) ** 2
         spread[at, at] += max(fresh, 0.0) * np.eye(3)
+    by_held = np.zeros((rows, held.count))
     for name, slope in slopes.items():
         if name in antenna.motions:
             motion = antenna.motions[name]
-            given = np.array([(name, c) in layout for c in COMPONENTS])
-            anew = np.diag(motion.u**2)
-            if not given.all():  # coefficients that stay still carry their uncertainty, here as if anew
-                held = motion.six_covariance(epoch.posture) - anew
-                anew = anew + np.where(np.outer(~given, ~given), held, 0.0)
-            spread += slope @ anew @ slope.T
+            spread += slope @ np.diag(motion.u**2) @ slope.T
+            if name in held.factors:
+                begin, factor = held.factors[name]
+                whole = np.kron(np.eye(len(COMPONENTS)), motion.basis.rows(epoch.posture)[None])  # (6, 6 k)
+                by_held[:, begin : begin + factor.shape[1]] = slope @ whole @ factor
     misfit = (epoch.coordinates - predicted).ravel()
-    return np.concatenate([*columns, by_place], axis=1), misfit, spread
+    return np.concatenate([*columns, by_place, by_held], axis=1), misfit, spread
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Coefficients that are not free: values off the model's = factor z, z standard normal, the same in all postures.
+
+    factors   frame: its first z, and (6 k, m) m and rad
+    count     of all z
+    """
+
+    factors: dict[str, tuple[int, np.ndarray]]
+    count: int
+
+
+def _held(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> _Held:
+    factors: dict[str, tuple[int, np.ndarray]] = {}
+    first = 0
+    for name, motion in antenna.motions.items():
+        covariance = np.array(motion.covariance)
+        if any(frame == name for frame, _ in layout):
+            free = _indices(antenna, layout, name)
+            covariance[free, :], covariance[:, free] = 0.0, 0.0
+        size = np.sqrt(np.diag(covariance))
+        scale = np.where(size > 0.0, size, 1.0)
+        values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+        real = values > FLOATING
+        if real.any():
+            factors[name] = (first, scale[:, None] * vectors[:, real] * np.sqrt(values[real]))
+            first += int(real.sum())
+    return _Held(factors, first)
 
 
 def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[str, str], ...]:

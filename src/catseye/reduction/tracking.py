@@ -17,10 +17,10 @@ from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.geometry.antenna import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
 from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN, within
-from catseye.geometry.pointing import Station, counts
+from catseye.geometry.pointing import Station, counts, in_mirror_axes
 from catseye.geometry.rotation import rx, rz
 from catseye.geometry.time_tag import PER_SECOND, TimeTag
-from catseye.geometry.track import CountLine, miss
+from catseye.geometry.track import CountLine, longest_interval, miss
 
 Array = NDArray[np.float64]
 
@@ -132,6 +132,27 @@ class AntennaPath:
             azimuth_bend * swing + azimuth_rate**2 * np.cross(spin, swing) + 2.0 * azimuth_rate * np.cross(spin, v) + a
         )
         return place, azimuth_rate * swing + v, acceleration
+
+    def most_acceleration(self, points: ArrayLike, frame: str) -> Array:
+        """What the acceleration (n,), m/s^2, of points fixed in a frame never exceeds, wherever the drives are.
+
+        points, frame    as for `motion`
+
+        Of rates w and accelerations b of azimuth and elevation, the distance R from the elevation axis and the most
+        that a point comes to from the azimuth axis, r: b_a r + w_a^2 r + 2 w_a w_e R + b_e R + w_e^2 R.
+        """
+        at = np.asarray(points, dtype=float)
+        w_a, b_a = self.azimuth.peak, self.azimuth.acceleration * (self.azimuth.peak > 0.0)
+        if frame == "ground":
+            return np.zeros(at.shape[:-1])
+        if frame == "alidade":
+            return (b_a + w_a**2) * np.hypot(at[..., 0], at[..., 1])
+        if frame not in ("elevation", "reflector"):
+            raise InputError(f"frame {frame!r} is not known (expected ground, alidade, elevation or reflector)")
+        shifted = at + (np.asarray(self.reflector_to_elevation) if frame == "reflector" else 0.0)
+        arm = np.hypot(shifted[..., 1], shifted[..., 2])
+        w_e, b_e = self.elevation.peak, self.elevation.acceleration * (self.elevation.peak > 0.0)
+        return (b_a + w_a**2) * np.hypot(shifted[..., 0], arm) + (2.0 * w_a * w_e + b_e + w_e**2) * arm
 
     def rotation(self, t: ArrayLike) -> Array:
         """Axes of the reflector in the ground frame (t..., 3, 3), one a column."""
@@ -274,6 +295,38 @@ def follow(
     status = np.where((status == Following.FOLLOWED) & fast, Following.TOO_FAST, status)
     status = np.where(np.isfinite(chosen).all(axis=(0, -1)), status, Following.NOWHERE)
     return Track(begin.plus(steps[:-1]), since, lines, second, status.astype(np.int64))
+
+
+def safe_intervals(
+    stations: Station,
+    points: ArrayLike,
+    frame: str,
+    path: AntennaPath,
+    times: ArrayLike,
+    *,
+    limit_counts: float = 0.25,
+    limit_angle: float | None = None,
+    longest: float = 10.0,
+) -> Array:
+    """How long (t, r, n), s, an interval may be for the line surely to hold a limit, for rangers on the ground.
+
+    stations       (r,), on the ground
+    points         (n, 3), m, fixed in the frame
+    frame, path    of the telescope, as for `fixed`
+    times          (t,) s: beginnings of intervals
+    limit_counts, limit_angle, longest   as for `track.longest_interval`
+
+    The minimum over pairs, as `follow` takes one interval for all, is for the caller: pairs near a mirror's azimuth
+    axis ask for a short one.
+
+    Source: `track.longest_interval` with the path's own speed and the most of its acceleration.
+    """
+    when = np.asarray(times, dtype=float)
+    place, velocity, _ = path.motion(points, frame, when)
+    sight = in_mirror_axes(stations[None, :, None], place[:, None])
+    speed = np.linalg.norm(velocity, axis=-1)[:, None]
+    most = path.most_acceleration(points, frame)
+    return longest_interval(sight, speed, most, limit_counts=limit_counts, limit_angle=limit_angle, longest=longest)
 
 
 def misses(

@@ -302,7 +302,10 @@ class ServoAxis:
         for sense in (direction, -direction):
             chip.find_index()
             self.abp(self.acp() + sense * turn)
-            self.stt()
+            if not self.stt():
+                chip.seeking = False
+                text = "the acceleration (ABA) was changed during a move: home when it has ended"
+                return Homing(False, text, (self.samples - begin) * self.motor.sample)
             while self.samples < end and not (chip.index_found or chip.trajectory_complete):
                 self._step()
             found = chip.index_found
@@ -331,21 +334,30 @@ class ServoAxis:
         counts    where the target is after each interval, with fractions
         samples   of an interval: 375 are 128 ms
 
-        Velocity mode, a new speed each interval: from where the profile is to where the target will be. The profile
+        Velocity mode, a new speed each interval: from where the profile is to where the target will be. Afterwards the
+        velocity loaded is what it was, for the next move. The profile
         holds fractions of a count, so nothing adds up. A change of speed dv takes dv/a, and its dv^2/2a of way are made
         good in the next interval.
 
-        Raises ValidityError: a speed beyond the chip, or the acceleration changed during a move.
+        Raises ValidityError: no counts, or not finite; a speed beyond the chip; the acceleration changed during a move.
         """
-        rows = []
+        if not len(counts) or not np.isfinite(counts).all() or samples < 1:
+            raise ValidityError(
+                f"{len(counts)} counts to follow, {samples} samples each (expected finite counts, 1 or more of both)"
+            )
+        rows, usual = [], self.chip.loaded_velocity
         for to in counts:
             way = to - self.chip.position / FRACTION
             speed = checked("ABV", round(abs(way) / samples * FRACTION))
             self.chip.load_trajectory(velocity=speed, mode="velocity", direction=1 if way >= 0.0 else -1)
-            if not self.stt():
+            started = self.stt()
+            self.chip.load_trajectory(velocity=usual)
+            if not started:
                 raise ValidityError("ABA: the acceleration was changed during a move (expected the same until it ends)")
             rows.append(self.run(samples))
         return Trace(*(np.concatenate([getattr(row, name) for row in rows]) for name in ("time", *COLUMNS)))
 
     def _samples_of(self, seconds: float) -> int:
+        if not np.isfinite(seconds):
+            raise ValidityError(f"waiting {seconds} s has no end (expected a finite time)")
         return max(0, round(seconds / self.motor.sample))

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import EstimationError, ValidityError
-from catseye.ranger.motion_units import LARGEST_GAIN, LIMITS, SAMPLE_TIME
+from catseye.ranger.motion_units import LARGEST_GAIN, LIMITS, SAMPLE_TIME, checked
 from catseye.simulator.motion_chip import MotionChip
 from catseye.simulator.motor import AxisDesign, Motor
 from catseye.simulator.servo import ServoAxis, Trace
@@ -151,6 +151,8 @@ def identify(*traces: Trace, output_bits: int = 8) -> Plant:
     Raises EstimationError: the moves do not tell the three apart, or the drive's sign is wrong.
     """
     rows, words = [], []
+    if not traces or min(len(trace.time) for trace in traces) < 2:
+        raise EstimationError("identify: no moves, or a trace of less than two samples")
     for trace in traces:
         sample = float(trace.time[1] - trace.time[0])
         acceleration = np.gradient(trace.velocity, sample)
@@ -231,12 +233,15 @@ def design_filter(
 
     plant          the axis
     crossover_hz   where the loop's gain is one
-    phase_margin   rad, left there
-    interval       of the derivative, samples less one: a longer one is quieter and costs phase
+    phase_margin   rad, left there; above 0, below pi/2
+    interval       of the derivative, samples less one, 0 to 255: a longer one is quieter and costs phase
 
     The integral's limit is three times the friction and at least 16 steps: it must hold what friction eats, no more.
     Raises ValidityError: the margin cannot be had there, or an integer would not fit its register.
     """
+    checked("FSI", interval)
+    if not 0.0 < phase_margin < 0.5 * pi:
+        raise ValidityError(f"phase margin {phase_margin:g} rad is outside 0 to pi/2: check its unit")
     frequency = TWO_PI * crossover_hz
     if not 0.0 < frequency < pi / plant.sample / (interval + 1):
         raise ValidityError(f"crossover {crossover_hz:g} Hz is outside 0 to half the derivative's rate")
@@ -298,12 +303,14 @@ def step_metrics(time: ArrayLike, position: ArrayLike, *, target: float, toleran
     target      counts, where it should end
     tolerance   counts about the target
 
-    Raises ValidityError: no step.
+    Raises ValidityError: no step, or positions that are not (n,) finite numbers, n above 1.
 
     >>> step_metrics([0, 1, 2, 3], [0, 50, 150, 100], target=100)
     StepMetrics(rise=1.2, overshoot=0.5, settling=3.0)
     """
     t, y = np.asarray(time, dtype=float), np.asarray(position, dtype=float)
+    if t.shape != y.shape or t.ndim != 1 or len(t) < 2 or not np.isfinite([t, y]).all():
+        raise ValidityError(f"step response: times {t.shape}, positions {y.shape} (expected (n,) finite numbers each)")
     size = target - y[0]
     if size == 0.0:
         raise ValidityError(f"step response: it starts at its target, {target:g} counts (expected another)")

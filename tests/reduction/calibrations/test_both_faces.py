@@ -165,3 +165,10 @@ def test_whole_turns_of_the_azimuth_do_not_matter():
     numbers["azimuth_counts"][1] -= 100_000.0
     turned = POINTING.recipe(table(POINTING, numbers, words, **SHEET), False)
     assert turned.value("face_tilt_rad") == pytest.approx(plain.value("face_tilt_rad"), abs=1e-12)
+
+
+def test_a_target_has_one_known_direction():
+    numbers, words = pointings(POINT, targets=sky()[:3])
+    numbers["theta_deg"][1] += 0.01
+    with pytest.raises(InputError, match=r"line 3, theta_deg = .* was .* before \(expected one direction for each\)"):
+        POINTING.recipe(table(POINTING, numbers, words, **SHEET, u_direction_arcsec=2.0, u_frame_arcsec=2.0), False)

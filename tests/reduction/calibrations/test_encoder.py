@@ -60,6 +60,36 @@ def test_what_the_autocollimator_shows_is_added_with_its_sign_and_factor(display
     np.testing.assert_allclose([q.value for q in found.quantities], [3.0, -1.0, -2.0, 0.5], atol=1e-6)
 
 
+@pytest.mark.parametrize("cut", [90.0, 180.0, 330.0])
+def test_angles_that_begin_again_at_a_whole_turn_are_the_same_table(cut):
+    numbers, words = polygon(TRUTH, np.random.default_rng(3))
+    plain = calibrated(numbers, words)
+    again = calibrated(
+        {**numbers, "angle_deg": [a - 360.0 * (a >= cut) for a in numbers["angle_deg"]]}, words, u_reading_arcsec=None
+    )
+    np.testing.assert_allclose([q.value for q in again.quantities], [q.value for q in plain.quantities], atol=0.01)
+
+
+def test_counts_that_do_not_go_with_the_angles_are_refused():
+    numbers, words = polygon(TRUTH)
+    with pytest.raises(InputError, match=r"counts = .* lie [-+]\d+ from where the run's angles have them"):
+        calibrated({**numbers, "angle_deg": [-a for a in numbers["angle_deg"]]}, words)
+    psi = np.radians(np.linspace(-70, 70, 15))
+    beam = {"angle_deg": np.degrees(2 * psi), "counts": 1434.0 + PER_RADIAN * psi}
+    with pytest.raises(InputError, match="is angle_is right"):
+        calibrated(beam, axis="elevation", angle_is="axis", zero_counts=1434.0)
+
+
+def test_an_encoder_without_waves_is_seldom_said_to_have_them_from_few_readings():
+    flagged, tables = 0, 200
+    for seed in range(tables):
+        psi = np.radians(np.arange(0, 360, 60.0))
+        n = 2691.0 + PER_RADIAN * psi + 0.1 * np.random.default_rng([8, seed]).standard_normal(6)
+        found = calibrated({"angle_deg": np.degrees(psi), "counts": n}, orders=1, u_counts=0.0, u_reading_arcsec=None)
+        flagged += found.decisions[0].statistic > found.decisions[0].limit
+    assert flagged <= 22  # 5 % of 200 are 10; more than 22 is a chance of 1e-4
+
+
 def test_a_second_run_from_another_face_tells_the_polygon_from_the_encoder():
     one, two = (calibrated(*polygon(TRUTH, starts=starts), u_face_arcsec=20.0) for starts in ((0,), (0, 3, 6, 9)))
     assert one.u("azimuth_encoder_cosine_1_counts") > 4 * two.u("azimuth_encoder_cosine_1_counts")

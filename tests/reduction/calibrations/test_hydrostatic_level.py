@@ -148,6 +148,16 @@ def test_misclosures_scatter_as_their_u_says(table):
     assert np.mean(np.square(ratio)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 150))
 
 
+def test_the_micrometers_scale_acts_on_what_they_show_and_not_on_the_elevation_of_the_held_mark(table):
+    low, high = (
+        calibrate_level(run(table, RING * 2, [1] * 4 + [2] * 4, u_scale_ppm=100.0, held_height_mm=height))
+        for height in (0.0, 806_420.0)
+    )
+    for mark in "BCD":
+        assert high.value(f"height_{mark}_mm") - low.value(f"height_{mark}_mm") == pytest.approx(806_420.0, abs=1e-6)
+        assert high.u(f"height_{mark}_mm") == pytest.approx(low.u(f"height_{mark}_mm"), rel=1e-6)
+
+
 @pytest.mark.parametrize("runs", RUNS)
 def test_heights_and_constant_scatter_as_claimed(table, scatters_as_claimed, runs):
     rng, values, covariances = np.random.default_rng(52), [], []

@@ -1,5 +1,6 @@
 """Limits: inside of both stops by margin and scatter, whole counts, what cannot be reached."""
 
+import numpy as np
 import pytest
 
 from catseye.errors import EstimationError, InputError
@@ -26,6 +27,19 @@ def test_limits_stand_inside_of_the_stops_by_the_margin_and_three_deviations_of_
 
 def test_unstated_scatter_comes_from_the_touches():
     assert calibrated().u("az_low_stop_counts") == pytest.approx(1 / 3**0.5, rel=1e-6)
+
+
+def test_a_touch_to_come_passes_the_limit_as_seldom_where_the_touches_show_the_scatter():
+    passed, runs = 0, 2000
+    for seed in range(runs):
+        rng = np.random.default_rng([2, seed])
+        stop = np.repeat([-21_810.0, 76_191.0], 2)
+        touches = stop + 40.0 * rng.standard_normal(4)  # many counts: the rounding is no help
+        words = {"stop": ["low", "low", "high", "high"]}
+        record = RECIPE.recipe(table(RECIPE, {"azimuth_counts": touches}, words, margin_counts=0.0), False).record
+        passed += -21_810.0 + 40.0 * rng.standard_normal() > record["az_low_limit"]
+        passed += 76_191.0 + 40.0 * rng.standard_normal() < record["az_high_limit"]
+    assert passed <= 15  # 0.135 % of 4000 are 5.4; with three deviations of so few touches it is 5 %
 
 
 def test_the_directions_out_of_reach_are_named_by_theta():

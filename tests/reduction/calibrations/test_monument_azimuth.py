@@ -169,6 +169,14 @@ def test_a_closure_is_shared_by_time(readings):
     assert strict.decisions[0].passed is False
 
 
+def test_a_closure_between_two_references_has_the_u_of_their_directions(readings):
+    other = {"name": "M105", "v_block_deg": 90.0, "u_v_block_arcsec": 3.0}
+    after = [("M105", r, f) for _, r, f in lab()]
+    sheet = {"reference": [{**M102, "u_v_block_arcsec": 4.0}, other], "u_transport_arcsec": 12.0}
+    found = calibrate_azimuth(readings(seen(("ZY104",)), lab(), after, **sheet, u_direction_arcsec=0.01))
+    assert found.decisions[0].limit == pytest.approx(3.0 * 13.0, rel=1e-3)
+
+
 def test_a_leaning_axis_is_corrected_and_its_sign_is_right(readings):
     plate = {"plate_zero_deg": float(np.degrees(0.4)), "u_plate_zero_arcsec": 0.0}
     lean = (20 * ARCSECOND, -30 * ARCSECOND)

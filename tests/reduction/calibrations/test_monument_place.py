@@ -9,7 +9,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.readings import read_readings
 from catseye.reduction.calibrations.monument_place import LAYOUT, RECIPE, measure_place, monument_place
-from monument_scene import HEIGHT, LATITUDE, LONGITUDE, topocentric
+from monument_scene import HEIGHT, topocentric
 
 COVARIANCE = np.array([[4.0, 1.0, -0.5], [1.0, 9.0, 2.0], [-0.5, 2.0, 1.0]])  # mm²
 WHERE = np.array([[119.2, -13.1, 0.4], [-60.0, 103.5, 1.0]])
@@ -52,7 +52,10 @@ def test_state_plane_coordinates_give_the_same_place(table):
     # Scale and convergence in the covariance: eastings grow by 1/0.999814 on the ground, axes turn by 0.717°.
     turn, scale = np.radians(0.7181), 1 / (0.999935 * 0.999878)
     axes = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]) * [scale, scale, 1]
-    np.testing.assert_allclose(c.covariance[:3, :3], axes @ COVARIANCE @ axes.T, atol=3e-3)
+    tilted = np.diag([0.0, 0.0, (119.2e3**2 + 13.1e3**2) * (np.pi / 648_000) ** 2])  # 1" of deflection, the height's
+    np.testing.assert_allclose(c.covariance[:3, :3], axes @ COVARIANCE @ axes.T + tilted, atol=3e-3)
+    # From the ground frame the same tilt is in the elevation, where z is given.
+    assert ground.u("elevation_m") * 1e3 == pytest.approx(np.sqrt(1.0 + tilted[2, 2]), rel=1e-3)
     off = measure_place(
         table(LAYOUT, *survey(plane), **{**SHEET, "xi_arcsec": 0.0, "eta_arcsec": 2.0}, system="state-plane")
     )
@@ -75,7 +78,8 @@ def test_the_table_of_an_adjustment_is_read_as_it_stands(tmp_path):
     (tmp_path / "zy104.toml").write_text("\n".join(sheet))
     c = RECIPE.recipe(read_readings(tmp_path / "coordinates.csv", LAYOUT, tmp_path / "zy104.toml"), False)
     assert c.record["x_mm"] == pytest.approx(119_200.0)
-    assert HEIGHT < 800 < 1e3 * LATITUDE < 1e3 * -LONGITUDE
+    longitude, latitude, _ = topocentric().transform(*WHERE[0], direction="INVERSE")
+    assert (c.record["latitude_deg"], c.record["longitude_deg"]) == pytest.approx((latitude, longitude), abs=1e-12)
 
 
 def test_propagation_agrees_with_drawn_places(table):
@@ -103,5 +107,12 @@ def test_a_point_that_is_not_there_feet_and_bad_covariances_are_refused(table):
     numbers["cov_xx_mm2"] = np.array([-4.0, 4.0])
     with pytest.raises(InputError, match="not positive"):
         measure_place(table(LAYOUT, numbers, words, **SHEET, system="ground"))
+    for pair in ("cov_xx_mm2", "cov_xy_mm2"):  # a small variance beside large ones
+        numbers, words = survey(WHERE)
+        numbers["cov_zz_mm2"] = np.array([1e8, 1.0])
+        numbers["cov_xz_mm2"] = numbers["cov_yz_mm2"] = np.zeros(2)
+        numbers[pair] = np.array([-4.0 if pair == "cov_xx_mm2" else 7.0, 1.0])
+        with pytest.raises(InputError, match="not positive"):
+            measure_place(table(LAYOUT, numbers, words, **SHEET, system="ground"))
     with pytest.raises(InputError, match="unknown"):
         monument_place(None, WHERE[0], COVARIANCE, system="feet")

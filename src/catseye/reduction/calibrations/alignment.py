@@ -193,7 +193,12 @@ def _told(readings: Readings, found: CurvedFit, theta: np.ndarray) -> Calibratio
         decisions=fit.decisions(),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=(*_effects(sheet, found), *scatter_notes(fit, "mm", 1.0, 4)),
+        notes=(
+            *_effects(sheet, found),
+            "a mirror's record has one u_axis_mm for four values and one u_tilt_rad for three; these are of the beam "
+            "alone: keep the larger of them and the record's",
+            *scatter_notes(fit, "mm", 1.0, 4),
+        ),
         curve=_circles(readings, found),
         axes=("p, from the screen's middle (mm)", "q, from the screen's middle (mm)"),
         method="Spots of the beam on screens that turn with the mount go round circles; their radius vectors at "

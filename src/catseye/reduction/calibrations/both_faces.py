@@ -157,6 +157,10 @@ def _told(readings: Readings, found: CurvedFit, words: dict[str, tuple[str, ...]
     given, covariance = found.quantities(wanted)
     record: dict[str, Any] = {q.key: q.value for q in given}
     record["u_axis_mm"] = max(q.u for q in given)
+    notes.append(
+        f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in given)}: keep "
+        "the larger of it and the record's"
+    )
     if known and np.any([word == TARGET for word in words["to"]]):
         notes.append(f"the ranger's zero came out as {found.value('zero'):+.4f} mm (u {found.u('zero'):.4f} mm)")
     rows = tuple(

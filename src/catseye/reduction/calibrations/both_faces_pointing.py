@@ -35,6 +35,7 @@ COUNTS = Within(-1_000_000, 1_000_000)
 Offset = Annotated[float, Within(-10, 10)]
 Arcseconds = Annotated[float, Within(0, 3600)]
 STEP = 1e-5  # rad
+SAME = 1e-9  # degrees
 OFFSETS = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 AXES = gamma(0.0, 0.0, 0.0)  # mirror axes of ground vectors for a mount that is not turned
 NONE = np.zeros((2, 0))  # encoders without waves
@@ -167,12 +168,27 @@ def _parameters(readings: Readings, names: list[str], which: np.ndarray, prime: 
             readings.get("phi_deg") * DEGREE,
             sheet.u_direction_arcsec * ARCSECOND,
         )
+        _one_direction_each(readings, which)
     for k, name in enumerate(names):
         first = int(np.argmax(which == k))
         across = np.sin(phi[first])  # u is across the sight
         mirror.append(Parameter(f"theta of {name}", float(theta[first]), STEP, u / across))
         mirror.append(Parameter(f"phi of {name}", float(phi[first]), STEP, u))
     return mirror
+
+
+def _one_direction_each(readings: Readings, which: np.ndarray) -> None:
+    """The known direction of a target is one; another one is another target."""
+    for name in ("theta_deg", "phi_deg"):
+        given = readings.get(name)
+        for row in range(len(given)):
+            first = given[np.argmax(which == which[row])]
+            if abs(given[row] - first) > SAME:
+                raise readings.refuse(
+                    row,
+                    f"{name} = {given[row]:.10g} of target {readings.words['target'][row]!r} was {first:.10g} before "
+                    "(expected one direction for each)",
+                )
 
 
 WANTED = (

@@ -20,10 +20,11 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.readings import Layout, Readings, Sheet
 from catseye.records.record import Within
+from catseye.records.refusal import refusal
 from catseye.reduction.calibration import Calibration, Decision, Quantity
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes, student
 
 KIND = "detector-focus"
 PLACE, VOLTS = Within(-100, 100), Within(0, 20, above=True)
@@ -31,7 +32,7 @@ BEAM, CURVE = "gaussian_beam", "curve"
 SMALL = 1e-6  # fill: the detector is a point
 SHARED = 6  # parameters before the shape's own
 LEAST = 5  # readings, of a test for a further parameter
-ODD = 3.0  # standard uncertainties of an odd term
+ODD = 3.0  # standard uncertainties of an odd term; more where few readings show the scatter
 Model = Callable[..., np.ndarray]
 
 
@@ -68,11 +69,18 @@ def calibrate_detector_focus(readings: Readings, reject: bool = False) -> Calibr
                FocusSheet
     reject     leave out what the tests reject
 
-    Raises EstimationError where the amplitudes show no top.
+    Raises InputError where a curve was installed outside of its run, EstimationError where the amplitudes show no top.
 
     Source: [SIEGMAN86] chapter 17 for the Gaussian spot and the part of it in a round aperture; [PARKER04] chapter 6.
     """
     sheet, place = readings.sheet, readings.get("position_mm")
+    low, high = place[readings.active].min(), place[readings.active].max()
+    if sheet.model == CURVE and not low <= sheet.installed_mm <= high:
+        raise refusal(
+            readings.sheet_file,
+            f"installed_mm = {sheet.installed_mm:g} lies outside of the run, {low:g} to {high:g} mm: a curve says "
+            f"nothing there (expected a longer run, or model = {BEAM!r})",
+        )
     observed = np.log(readings.get("amplitude_volt"))
     model = _model(sheet, place)
     found = _fitted(readings, observed, model, _parameters(sheet, place, observed), reject)
@@ -234,8 +242,9 @@ def _symmetry(longer: CurvedFit | None) -> tuple[Decision, ...]:
     if longer is None:
         return ()
     ratio = abs(longer.value("skew")) / longer.u("skew")
-    text = "both sides fall alike" if ratio <= ODD else "the sides differ (aberration): take model = 'curve'"
-    return (Decision("odd term: |skew| / u", ratio, ODD, bool(ratio <= ODD), text),)
+    limit = float(student(longer.fit.effective[-1], ODD))  # the skew is the last that is sought
+    text = "both sides fall alike" if ratio <= limit else "the sides differ (aberration): take model = 'curve'"
+    return (Decision("odd term: |skew| / u", ratio, limit, bool(ratio <= limit), text),)
 
 
 RECIPE = Kind(

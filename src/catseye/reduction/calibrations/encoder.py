@@ -28,6 +28,8 @@ from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
 KIND = "encoder"
 COUNTS = Within(-1_000_000, 1_000_000)
 ANGLE = Within(-720, 720)
+MANY = 1e6  # degrees of freedom: F is chi-square
+FAR = 2000.0  # counts, 7 degrees: no disc is so far off its centre
 TURN = np.linspace(0.0, TWO_PI, 721)
 
 
@@ -88,7 +90,13 @@ def calibrate_encoder(readings: Readings, reject: bool = False) -> Calibration:
     if "face" in readings.words and sheet.u_face_arcsec is None:
         raise refusal(readings.sheet_file, "u_face_arcsec is missing (expected with the column face)")
     counts, order = readings.get("counts"), np.arange(1, sheet.orders + 1)
-    parameters = _parameters(sheet, runs, which, (counts - sheet.zero_counts) / COUNTS_PER_RADIAN - turn)
+    off = (counts - sheet.zero_counts) / COUNTS_PER_RADIAN - turn
+    for k in range(len(runs)):  # a table that begins again at 360 degrees: the counts decide the whole turns
+        rows = which == k
+        whole = TWO_PI * np.round((off[rows] - off[rows][0]) / TWO_PI)
+        turn[rows], off[rows] = turn[rows] + whole, off[rows] - whole
+    _refuse_far(readings, which, off)
+    parameters = _parameters(sheet, runs, which, off)
     if "face" in readings.words:
         u = sheet.u_face_arcsec * ARCSECOND
         parameters += [Parameter(f"face {name}", 0.0, 1e-5, u) for name in faces]
@@ -116,6 +124,19 @@ def _labels(readings: Readings, name: str) -> tuple[list[str], np.ndarray]:
     return names, np.array([names.index(word) for word in words])
 
 
+def _refuse_far(readings: Readings, which: np.ndarray, off: np.ndarray) -> None:
+    """Counts that do not go with the angles are no waves: another unit, sense or axis."""
+    for row in np.flatnonzero(readings.active):
+        run = (which == which[row]) & readings.active
+        far = float(COUNTS_PER_RADIAN * (off[row] - np.median(off[run])))
+        if abs(far) > FAR:
+            raise readings.refuse(
+                int(row),
+                f"counts = {readings.get('counts')[row]:g} lie {far:+.0f} from where the run's angles have them "
+                f"(expected within {FAR:g}: do counts and angles grow together, is angle_is right?)",
+            )
+
+
 def _wave(psi: np.ndarray, terms: np.ndarray, order: np.ndarray) -> np.ndarray:
     angle = psi[:, None] * order
     return np.cos(angle) @ terms[: len(order)] + np.sin(angle) @ terms[len(order) :]
@@ -124,7 +145,6 @@ def _wave(psi: np.ndarray, terms: np.ndarray, order: np.ndarray) -> np.ndarray:
 def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np.ndarray) -> list[Parameter]:
     """Cosines, sines, then how each run stands to the zero."""
     waves = [f"{part} {k}" for part in ("cosine", "sine") for k in range(1, sheet.orders + 1)]
-    # turns may differ by whole ones within a run: the counts decide
     return [Parameter(name, 0.0, 0.1) for name in waves] + [
         Parameter(f"start of run {name}".rstrip(), float(np.median(off[which == k])), 1e-5)
         for k, name in enumerate(runs)
@@ -183,19 +203,26 @@ def _told(readings: Readings, found: CurvedFit, psi: np.ndarray) -> Calibration:
 
 
 def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[Decision, ...]:
-    """Whether each order is there at all: its squared Mahalanobis distance from zero, chi-square with two degrees.
+    """Whether each order is there at all: its squared Mahalanobis distance from zero.
+
+    Chi-square of two degrees where the scatter is claimed, else twice Fisher's F with the scatter's own degrees.
 
     Source: [FOERSTNER16] chapter 4, test of a group of parameters.
     """
+    from scipy.special import fdtri
+
     told = []
+    sought = [p.name for p in found.parameters if np.isinf(p.u)]
     for k in range(1, n + 1):
         at = [found.index(f"cosine {k}"), found.index(f"sine {k}")]
         pair = found.values[at]
         statistic = float(pair @ np.linalg.solve(found.covariance[np.ix_(at, at)], pair))
-        limit = float(-2.0 * np.log(level / n))  # chi-square of two degrees is exponential
+        degrees = min(found.fit.effective[sought.index(f"{part} {k}")] for part in ("cosine", "sine"))
+        # chi-square of two degrees is exponential
+        limit = 2.0 * fdtri(2.0, degrees, 1.0 - level / n) if degrees < MANY else -2.0 * np.log(level / n)
         size = float(np.hypot(*pair))
         text = f"{size:.3g} counts, {'more than chance makes' if statistic > limit else 'which chance makes as well'}"
-        told.append(Decision(f"order {k}: squared distance from none", statistic, limit, None, text))
+        told.append(Decision(f"order {k}: squared distance from none", statistic, float(limit), None, text))
     return tuple(told)
 
 

@@ -111,13 +111,13 @@ def calibrate_level(readings: Readings, reject: bool = False) -> Calibration:
         climb[row, marks.index(first)] -= 1.0
         climb[row, marks.index(last)] += 1.0
     density, by_warmth = _density(readings)
-    observed = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE + density
-    observed = observed - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
+    shown = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE
+    observed = shown + density - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
     # observed = climb of the others - side C
     design, names = climb[:, 1:], [f"height of {mark}" for mark in marks[1:]]
     effects = [
         Effect("thermometers, °C", side * by_warmth, sheet.u_temperature_c),
-        Effect("micrometers, ppm", PPM * (observed - density), sheet.u_scale_ppm),
+        Effect("micrometers, ppm", PPM * shown, sheet.u_scale_ppm),
         Effect("height of the held mark, mm", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm),
     ]
     if sheet.constant_mm is not None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.records.readings import Layout, Readings
 from catseye.reduction.calibration import Calibration, Quantity
@@ -60,19 +61,23 @@ def quantities(
         slope = np.eye(len(variance)) if turn is None else np.asarray(turn, dtype=float)
         estimated = np.einsum("qp,pr,qr->q", slope, fit.scattered, slope)
         least = np.array([np.min(fit.effective[row != 0.0], initial=np.inf) for row in slope])
-        coverage = _coverage(least * (variance / np.maximum(estimated, 1e-300)) ** 2)
+        coverage = student(least * (variance / np.maximum(estimated, 1e-300)) ** 2, 2.0)
     return tuple(
         Quantity(key, float(v), float(np.sqrt(s)), unit, meaning, float(k))
         for (key, unit, meaning), v, s, k in zip(keys, values, variance, coverage, strict=True)
     )
 
 
-def _coverage(degrees: np.ndarray) -> np.ndarray:
-    """Factor of Student's interval that holds as much as two sigma of a normal one; 2 for infinite degrees."""
+def student(degrees: ArrayLike, deviations: float) -> np.ndarray:
+    """Standard deviations, of a scatter from so many degrees of freedom, that hold as much as these of a normal one.
+
+    >>> student([2.0, np.inf], 3.0).round(2).tolist()
+    [19.21, 3.0]
+    """
     from scipy.special import ndtr, stdtrit
 
     most = np.minimum(degrees, 1e9)
-    return np.where(degrees < 1e9, stdtrit(most, ndtr(2.0)), 2.0)
+    return np.where(most < 1e9, stdtrit(most, ndtr(deviations)), deviations)
 
 
 def residuals_by_number(fit: Fit, scale: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -1,7 +1,8 @@
 """The azimuth's mechanical stops, each touched several times, to the limits that the commands keep.
 
 A stop's place is the mean of its touches. The limit stands inside of it by the margin and by as much as a touch to
-come may differ (three standard deviations), rounded inwards to whole counts.
+come may differ, rounded inwards to whole counts: three standard deviations, or where the touches themselves show the
+scatter as many as Student's distribution needs for the same chance.
 """
 
 from typing import Annotated
@@ -15,7 +16,7 @@ from catseye.records.refusal import refusal
 from catseye.reduction.calibration import Calibration, Decision
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes, student
 
 KIND = "limits"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -79,7 +80,11 @@ def calibrate_limits(readings: Readings, reject: bool = False) -> Calibration:
 
 def _told(readings: Readings, found: CurvedFit, high: np.ndarray, single: float) -> Calibration:
     sheet, fit = readings.sheet, found.fit
-    inwards = [sheet.margin_counts + WIDE * float(np.hypot(single, found.u(f"{name} stop"))) for name in STOPS]
+    wide = [float(times) for times in student(fit.effective, WIDE)]
+    inwards = [
+        sheet.margin_counts + times * float(np.hypot(single, found.u(f"{name} stop")))
+        for name, times in zip(STOPS, wide, strict=True)
+    ]
     low_limit = int(np.ceil(found.value("low stop") + inwards[0]))
     high_limit = int(np.floor(found.value("high stop") - inwards[1]))
     if low_limit >= high_limit:
@@ -119,7 +124,8 @@ def _told(readings: Readings, found: CurvedFit, high: np.ndarray, single: float)
         },
         axes=("touch", "counts from the stop's mean (counts)"),
         method=f"Each stop is the mean of its touches. The limits stand inside by the margin of "
-        f"{sheet.margin_counts:g} counts and by {WIDE:g} standard deviations of a touch to come, rounded inwards.",
+        f"{sheet.margin_counts:g} counts and by {max(wide):.3g} standard deviations of a touch to come, rounded "
+        "inwards.",
         record={"az_low_limit": low_limit, "az_high_limit": high_limit},
     )
 

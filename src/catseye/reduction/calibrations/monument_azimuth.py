@@ -214,23 +214,23 @@ def _fitted(sights: Sights, linear: dict[str, Any], active: np.ndarray, *, rejec
     )
 
 
-def _closures(sights: Sights, fit: Fit) -> list[tuple[str, float, float]]:
-    """Set, lab after less before (rad), its u from the scatter of the readings and the transport."""
+def _closures(sights: Sights, fit: Fit, effects: list[Effect]) -> list[tuple[str, float, float]]:
+    """Set, lab after less before (rad), its u: scatter of readings, transport, what both visits do not share."""
     told = []
-    sheet, plain = sights.readings.sheet, None
+    plain = sights.observed - geometry_of(sights, float(fit.x[0]), Conditions())[0]
     for k, name in enumerate(sights.sets):
         rows = [fit.active & (sights.of_set == k) & (sights.place == end) for end in (BEFORE, AFTER)]
         if not (rows[0].any() and rows[1].any()):
             continue
-        if plain is None:
-            plain = wrapped(sights.observed - geometry_of(sights, float(fit.x[0]), Conditions())[0])
-        ends = []
-        for one in rows:  # faces have one mean each, so that the collimation goes out where both were read
-            faces = [plain[one & (sights.face == f)] for f in np.unique(sights.face[one])]
-            ends.append(np.mean([plain[one][0] + np.mean(wrapped(v - plain[one][0])) for v in faces]))
-        spread = [np.mean(fit.sigma[one] ** 2) / np.count_nonzero(one) for one in rows]
-        u = float(np.sqrt((sheet.u_transport_arcsec * ARCSECOND) ** 2 + sum(spread)))
-        told.append((name, float(wrapped(np.array(ends[1] - ends[0]))), u))
+        weight = np.zeros(len(plain))
+        for one, sign in zip(rows, (-1.0, 1.0), strict=True):
+            faces = np.unique(sights.face[one])
+            for f in faces:  # faces have one mean each, so that the collimation goes out where both were read
+                there = one & (sights.face == f)
+                weight[there] = sign / (len(faces) * np.count_nonzero(there))
+        closure = float(weight @ wrapped(plain - plain[np.argmax(rows[0])]))
+        shared = sum((float(weight @ e.column) * e.u) ** 2 for e in effects)
+        told.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
     return told
 
 
@@ -253,7 +253,7 @@ def _told(sights: Sights, fit: Fit, linear: dict[str, Any], tied: bool) -> Calib
             bool(abs(closure) <= CLOSURE_FACTOR * u),
             "circle against the mount, lab after less before; limit three standard uncertainties",
         )
-        for name, closure, u in _closures(sights, fit)
+        for name, closure, u in _closures(sights, fit, linear["effects"])
     ]
     residual = fit.residual / ARCSECOND
     turned, zenith = geometry_of(sights, float(fit.x[0]), Conditions())

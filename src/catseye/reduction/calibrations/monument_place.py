@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from catseye.constants import DEGREE, MILLIMETRE
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.local_frame import LocalFrame, elevation_factor, grid
 from catseye.records.readings import TEXT, Layout, Readings
@@ -23,6 +23,7 @@ from catseye.reduction.calibrations.kind import Kind, provenance, quantities
 
 KIND = "monument-place"
 ROUNDING_MM = 2e-5  # of geocentric coordinates and PROJ's inverse
+TILT = 10.0 * ARCSECOND  # of derivatives by the deflection, straight to 1e-9 over it
 STEP = 0.5  # m, of derivatives of a map that is straight to 1e-10 over it
 SYMMETRIC = ("xx", "xy", "xz", "yy", "yz", "zz")
 NAMES = ("x", "y", "z")
@@ -90,6 +91,7 @@ def measure_place(readings: Readings, reject: bool = False) -> Calibration:
     frame = frame_of(sheet)
     try:
         values, covariance = monument_place(frame, given, _covariance(readings, row), system=sheet.system)
+        covariance = covariance + _by_deflection(sheet, given)
     except ValueError as problem:
         raise refusal(readings.file, f"{readings.where[row]}, {problem}") from problem
     return _told(readings, row, frame, values, covariance)
@@ -134,10 +136,24 @@ def _covariance(readings: Readings, row: int) -> np.ndarray:
     """(3, 3), m², of one row; InputError where it is no covariance."""
     cells = {pair: float(readings.get(f"cov_{pair}_mm2")[row]) for pair in SYMMETRIC}
     matrix = np.array([[cells["".join(sorted(a + b))] for b in NAMES] for a in NAMES])
-    size = float(np.abs(matrix).max())
-    if np.linalg.eigvalsh(matrix).min() < -1e-6 * size:
+    u = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    scale = np.where(u > 0.0, u, 1.0)  # correlations: a bad small variance hides behind large ones
+    if np.diag(matrix).min() < 0.0 or np.linalg.eigvalsh(matrix / np.outer(scale, scale)).min() < -1e-6:
         raise readings.refuse(row, "cov_..._mm2 is not positive: a direction would have u² below 0")
     return matrix * MILLIMETRE**2
+
+
+def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
+    """What the deflection's u adds to the covariance: heights above the geoid tilt with it, 1 mm at 2" and 100 m."""
+    total = np.zeros((len(KEYS), len(KEYS)))
+    for name in ("xi", "eta"):
+        ends = [
+            monument_place(frame_of(sheet, **{name: sign * TILT}), given, np.zeros((3, 3)), system=sheet.system)[0]
+            for sign in (1.0, -1.0)
+        ]
+        slope = (ends[0] - ends[1]) / (2.0 * TILT)
+        total += (sheet.u_deflection_arcsec * ARCSECOND) ** 2 * np.outer(slope, slope)
+    return total
 
 
 def _told(readings: Readings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray) -> Calibration:

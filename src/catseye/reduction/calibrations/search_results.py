@@ -35,6 +35,7 @@ from catseye.reduction.pointing import imperfections_of, station_covariance, sta
 
 KIND = "search-results"
 COUNTS, PLACE = Within(-1_000_000, 1_000_000), Within(-10_000, 10_000)
+UNCERTAIN = Within(0, 1000, above=True)
 P = len(PARAMETERS)
 STEPS = (*[1e-4] * 3, *[1e-6] * 3, *[1e-4] * 3, *[1e-6] * 2, *[0.1] * 2)  # m, rad, m, rad, counts
 IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
@@ -54,12 +55,13 @@ SHOWN = 0.3  # of a unit combination: parameters named in it
 class SearchSheet(Sheet):
     """Sheet of a campaign's search results.
 
-    u_counts         of each count: the resolution of the search
+    u_counts         of each count: the resolution of the search; the columns u_azimuth_counts and u_elevation_counts
+                     say it for each target instead
     u_target_mm      of each coordinate of each target; a target seen more than once keeps its error
     [monument], [mirror]   the station's records as tables, with the u_... keys of angles and zeros
     """
 
-    u_counts: Annotated[float, Within(0, 1000, above=True)]
+    u_counts: Annotated[float, UNCERTAIN] | None = None
     u_target_mm: Annotated[float, Within(0, 1000)]
     monument: Annotated[MonumentGeometry, Field()]
     mirror: Annotated[MirrorGeometry, Field()]
@@ -80,7 +82,7 @@ LAYOUT = Layout(
         "azimuth_counts": COUNTS,
         "elevation_counts": COUNTS,
     },
-    optional={"pointing": TEXT},
+    optional={"pointing": TEXT, "u_azimuth_counts": UNCERTAIN, "u_elevation_counts": UNCERTAIN},
 )
 
 
@@ -88,7 +90,7 @@ def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibr
     """A station's parameters from targets found in the field, compared with the laboratory's.
 
     readings   columns target (its name), x_m, y_m, z_m (ground frame), azimuth_counts, elevation_counts, perhaps
-               pointing ("direct" if missing, "prime"); sheet SearchSheet
+               pointing ("direct" if missing, "prime"), u_azimuth_counts, u_elevation_counts; sheet SearchSheet
     reject     leave out what the tests reject, both counts of a target together
 
     Raises InputError for records without the standard uncertainties that weigh them, EstimationError where the targets
@@ -138,13 +140,26 @@ def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibr
         observed.ravel(),
         predict,
         parameters,
-        Scatter(sheet.u_counts**2 * np.eye(2 * m)),
+        Scatter(np.diag(_u_counts(readings).ravel() ** 2)),
         active=np.repeat(readings.active, 2),
         together=np.repeat(np.arange(m), 2),
         reject=reject,
         level=sheet.level,
     )
     return _told(readings, found, predict)
+
+
+def _u_counts(readings: Readings) -> np.ndarray:
+    """(m, 2) of azimuth and elevation: the columns', else the sheet's."""
+    columns = []
+    for name in ("u_azimuth_counts", "u_elevation_counts"):
+        if name in readings.numbers:
+            columns.append(readings.get(name))
+        elif readings.sheet.u_counts is None:
+            raise refusal(readings.sheet_file, f"u_counts is missing (expected here, or a column {name})")
+        else:
+            columns.append(np.full(len(readings), readings.sheet.u_counts))
+    return np.column_stack(columns)
 
 
 def _prime(readings: Readings) -> np.ndarray:
