@@ -457,4 +457,9 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1007/BF01386390",
         used="problem 2: the shortest way",
     ),
+    "ISO75": Source(
+        title="ISO 2533:1975, Standard Atmosphere",
+        locator="International Organization for Standardization, Geneva, 1975",
+        used="section 2: pressure by height in the troposphere",
+    ),
 }

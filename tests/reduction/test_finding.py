@@ -1,5 +1,7 @@
 """Finding targets by their return. The spots are real ones, by diffraction; the fit knows only Gaussians."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -69,7 +71,7 @@ def test_a_target_that_is_not_there_is_a_status_that_says_what_was_searched():
     assert "the largest was 0.0" in spot.status
     assert len(spot.looked_at) > 30
     assert np.isnan(spot.counts).all()
-    half = find(TRUE, HEAD, dark, search_radius=1e-3, allowed=lambda n: n[:, 0] > TRUE[0])
+    half = find(TRUE, HEAD, dark, search_radius=1e-3, allowed=lambda _, n: n[0] > TRUE[0])
     assert "forbidden" in half.status
     assert np.all(half.looked_at[:, 0] > TRUE[0])
     gone = find(TRUE, HEAD, lambda at: np.nan, search_radius=5e-4)
@@ -299,3 +301,17 @@ def test_a_name_that_would_break_the_table_is_refused():
         search_results([result])
     with pytest.raises(ValidityError, match="'A,B' is no name for a table"):
         adjustment_readings([result], {"A,B": [1, 2, 3]}, 0.0)
+
+
+def test_every_move_of_a_search_is_asked_for_from_where_the_mirror_stands():
+    asked, at = [], np.add(np.rint(TRUE), [40.0, 10.0])
+
+    def allowed(start, end):
+        asked.append((*start, *end))
+        return len(asked) < 60  # then the Sun has come
+
+    stopped = find(at, HEAD, lambda n: 0.0, search_radius=2e-3, allowed=allowed, standing=np.add(at, [500.0, 0.0]))
+    assert asked[0][:2] == (at[0] + 500.0, at[1])
+    assert all(before[2:] == after[:2] for before, after in pairwise(asked[:59]))
+    assert len(stopped.looked_at) == 59
+    assert "forbidden" in stopped.status

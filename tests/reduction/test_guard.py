@@ -10,6 +10,7 @@ from catseye.geometry.pointing import counts, ray
 from catseye.geometry.slew import straight, trapezoid
 from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
+from catseye.records.site import Location
 from catseye.reduction.earth_rotation import Place, place_of, sun_at
 from catseye.reduction.guard import _cut, guard_of, utc_text
 from sun_scene import (
@@ -322,3 +323,25 @@ def test_a_time_is_written_rounded_up():
 def test_nonsense_is_refused(act, said):
     with pytest.raises(ValidityError, match=said):
         act()
+
+
+def test_axes_that_start_apart_widen_the_margin_and_elevations_beyond_a_turn_are_refused():
+    together, apart_by = guard(), guard(pace=replace(PACE, start_skew=0.01))
+    late = np.linalg.norm(np.array(PACE.velocity) * 0.01 * 2 * np.pi / 1e5 * [1, 2])
+    assert apart_by.margin - together.margin == pytest.approx(late, rel=0.05)
+    assert "more than a turn" in guard().pointing(MORNING, [20_000.0, 1e9]).reason
+    with pytest.raises(ValidityError, match=r"start_skew = -1 s is not 0 or more"):
+        replace(PACE, start_skew=-1)
+
+
+def test_the_sun_is_kept_off_where_it_is_seen_not_where_it_would_be_without_air():
+    """Near the horizon the air lifts it by half a degree: a beam 5.02 degrees above the airless Sun is 4.5 off."""
+    site = Location(latitude_deg=38.433, longitude_deg=280.16, elevation_of_z0_m=807.0)
+    mjd = 52_889.459  # just after sunrise
+    bare = sun_at(mjd, place_of(site, pressure_hpa=0.0)).direction
+    up = np.array([0.0, 0.0, 1.0]) - bare[2] * bare
+    beam_up = np.cos(5.02 * DEGREE) * bare + np.sin(5.02 * DEGREE) * up / np.linalg.norm(up)
+    n = counts(STATION, STATION.scan_point + 1e3 * beam_up)
+    assert abs(np.degrees(np.arcsin(bare[2]))) < 2.0
+    assert guard(place=place_of(site, pressure_hpa=0.0)).pointing(mjd, n).allowed
+    assert not guard(place=place_of(site)).pointing(mjd, n).allowed

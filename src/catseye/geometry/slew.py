@@ -24,6 +24,7 @@ class Pace:
     """What the axes may do: speed (azimuth, elevation), counts/s, and acceleration, counts/s^2, all above 0.
 
     coordinated    both axes share one profile, straight in counts; else each has its own
+    start_skew     s, 0 or more: by how much one axis may start after the other; a guard widens its margin by it
 
     Raises ValidityError otherwise.
     """
@@ -31,8 +32,11 @@ class Pace:
     velocity: tuple[float, float]
     acceleration: tuple[float, float]
     coordinated: bool = False
+    start_skew: float = 0.0
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.start_skew < np.inf:
+            raise ValidityError(f"start_skew = {self.start_skew} s is not 0 or more and finite")
         for name in ("velocity", "acceleration"):
             value = tuple(float(v) for v in getattr(self, name))
             if len(value) != 2 or not all(0.0 < v < np.inf for v in value):

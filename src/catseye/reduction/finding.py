@@ -29,7 +29,7 @@ from catseye.reduction.spot_fit import Head, Spot, fit_spot
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN where there is no reading
-Allowed = Callable[[Array], NDArray[np.bool_]]  # of (n, 2) counts
+Allowed = Callable[[Array, Array], bool]  # from counts (2,) to counts (2,), now
 
 WIDER = 1.6  # half a scan's width over the spot's radius
 RECENTRED = 3  # scans at most
@@ -45,7 +45,13 @@ COLUMNS = (
 
 
 def find(
-    predicted: ArrayLike, head: Head, measure: Measure, *, search_radius: float, allowed: Allowed | None = None
+    predicted: ArrayLike,
+    head: Head,
+    measure: Measure,
+    *,
+    search_radius: float,
+    allowed: Allowed | None = None,
+    standing: ArrayLike | None = None,
 ) -> Spot:
     """The pointing at which a target returns most, searched for about a predicted one.
 
@@ -53,7 +59,9 @@ def find(
     head            the ranger
     measure         amplitude at (2,) whole counts
     search_radius   rad on the sky, 0 or more
-    allowed         which of (n, 2) counts may be looked at (Sun, structure); all if None
+    allowed         whether the mirror may go from counts to counts now (Sun, structure: `Guard.slew`); asked before
+                    every look, so that a long search meets no Sun that has come meanwhile; always if None
+    standing        (2,) counts where the mirror stands at first; at the first look if None
 
     A spiral of looks, without gaps for a spot that falls to the threshold no sooner than to half its peak (a status
     says so where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
@@ -63,26 +71,33 @@ def find(
     Source: the notes' practice of searching at predicted counts; patterns in `geometry.search_pattern`.
     """
     looked: dict[tuple[float, ...], float] = {}
+    refused: set[tuple[float, ...]] = set()
+    here = None if standing is None else np.asarray(standing, dtype=float)
 
     def look(at: Array) -> float:
-        if tuple(at) not in looked:
-            looked[tuple(at)] = float(measure(at))
+        nonlocal here
+        if tuple(at) in looked:
+            return looked[tuple(at)]
+        if allowed is not None and not allowed(at if here is None else here, at):
+            refused.add(tuple(at))
+            return np.nan
+        here = at
+        looked[tuple(at)] = float(measure(at))
         return looked[tuple(at)]
 
     within = max(float(reach(head.radius, 0.5)), LEAST_REACH)
     pattern = spiral(predicted, head.zeros, search_radius, within, head.azimuth_limits)
-    kept, forbidden = _permitted(pattern, allowed)
     spot, light = Spot(""), None
-    for at in kept:
+    for at in pattern.counts:
         before = tuple(at) in looked  # by a scan of light that was no spot
         if look(at) > head.threshold_volt and not before:
-            spot, light = _centred(at, head, look, looked, allowed), at
+            spot, light = _centred(at, head, look, looked), at
             if spot.found:
                 break
     seen = list(looked.values())
     status = spot.status
     if light is None:
-        status = _nothing(pattern, forbidden, seen, predicted, head, search_radius)
+        status = _nothing(pattern, len(refused), seen, predicted, head, search_radius)
     elif not spot.found:
         status = f"{status} (light of {np.nanmax(seen):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
     return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(seen))
@@ -93,7 +108,6 @@ def _centred(
     head: Head,
     look: Measure,
     looked: Mapping[tuple[float, ...], float],
-    allowed: Allowed | None,
 ) -> Spot:
     """The spot about a place with light: scanned, and scanned again until its centre is well inside."""
     fine = float(max(0.5 * np.hypot(*count_size(hit, head.zeros)) * 1.001, 0.25 * head.radius))
@@ -104,7 +118,7 @@ def _centred(
             scan = raster(centre, head.zeros, (half, half), fine, head.azimuth_limits)
         except ValidityError:  # the azimuth axis lies within the scan: a raster has no rows there
             scan = spiral(centre, head.zeros, half, max(fine, LEAST_REACH), head.azimuth_limits)
-        for at in _permitted(scan, allowed)[0]:
+        for at in scan.counts:
             look(at)
         places, values = np.array(list(looked)), np.array(list(looked.values()))
         near = offsets_of_counts(centre, head.zeros, places)
@@ -200,13 +214,6 @@ def _refuse_commas(results: Sequence[SearchResult]) -> None:
     for result in results:
         if not result.target or any(mark in result.target for mark in ',"\r\n'):
             raise ValidityError(f"target {result.target!r} is no name for a table (expected no comma, quote, line end)")
-
-
-def _permitted(pattern: Pattern, allowed: Allowed | None) -> tuple[Array, int]:
-    if allowed is None or not len(pattern):
-        return pattern.counts, 0
-    good = np.asarray(allowed(pattern.counts), dtype=bool)
-    return pattern.counts[good], int(np.sum(~good))
 
 
 def _nothing(

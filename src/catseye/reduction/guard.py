@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import within
+from catseye.geometry.encoder import COUNTS_PER_TURN, within
 from catseye.geometry.keep_out import (
     TOUCH,
     Box,
@@ -115,7 +115,8 @@ class Guard:
             raise ValidityError(f"{self.name}: off_beam {self.off_beam:g} rad is outside 0 to pi/2: check its unit")
         if not -0.5 * np.pi <= self.horizon <= 0.5 * np.pi:
             raise ValidityError(f"{self.name}: horizon {self.horizon:g} rad is outside -pi/2 to pi/2: check its unit")
-        object.__setattr__(self, "margin", servo_margin(self.margin_counts) + self.off_beam)
+        late = np.array(self.pace.velocity) * self.pace.start_skew
+        object.__setattr__(self, "margin", servo_margin(np.add(self.margin_counts, late)) + self.off_beam)
 
     def clearance(self, mjd: ArrayLike, counts: ArrayLike, *, exact_below: float = np.inf) -> NDArray[np.float64]:
         """Angle (..., 1 + boxes), rad, from standing beams to the Sun's cone, then the boxes; margin taken off.
@@ -283,7 +284,12 @@ class Guard:
 
     def _beyond(self, n: NDArray[np.float64]) -> str:
         low, high = self.azimuth_limits
-        return "" if within(n[0], low, high) else f"azimuth count {n[0]:.1f} is outside {low:g} to {high:g}"
+        if not within(n[0], low, high):
+            return f"azimuth count {n[0]:.1f} is outside {low:g} to {high:g}"
+        zero = float(self.station.zeros[1])
+        if abs(n[1] - zero) > COUNTS_PER_TURN:
+            return f"elevation count {n[1]:.1f} is more than a turn from {zero:.1f}"
+        return ""
 
     def _cone(self, mjd: NDArray[np.float64], total: NDArray[np.float64]) -> Cone:
         """The Sun's cone for paths that begin at mjd (...) and take a total (...) s; not counting while it is set."""

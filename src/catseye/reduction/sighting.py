@@ -14,7 +14,7 @@ from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import MirrorGeometry
 from catseye.records.monument import MonumentGeometry
 from catseye.records.solids import Solids
-from catseye.reduction.earth_rotation import Place, sun_at
+from catseye.reduction.earth_rotation import Place, standard_pressure_hpa, sun_at
 from catseye.reduction.guard import Verdict, guard_of
 from catseye.reduction.pointing import imperfections_of
 from catseye.reduction.visibility import Retroreflectors, Visibility, frames_at, visibility
@@ -43,7 +43,7 @@ class Sighting:
 
 
 def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None) -> Place:
-    """Where on Earth the site is: the options, else the monument's record.
+    """Where on Earth the site is: the options, else the monument's record; with standard air, which lifts the Sun.
 
     Raises InputError where neither says it, and for one that is no place.
     """
@@ -58,9 +58,9 @@ def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, l
                 f"the Sun's place needs {key}, which the record of {monument.monument} does not have (expected it "
                 f"there, or --{key.replace('_', '-')})"
             )
-    return Place(
-        float(found["latitude_deg"]) * DEGREE, float(found["longitude_deg"]) * DEGREE, monument.elevation_m or 0.0
-    )
+    height = monument.elevation_m or 0.0
+    latitude, longitude = float(found["latitude_deg"]) * DEGREE, float(found["longitude_deg"]) * DEGREE
+    return Place(latitude, longitude, height, standard_pressure_hpa(height))
 
 
 def sightings(

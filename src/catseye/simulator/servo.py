@@ -297,6 +297,8 @@ class ServoAxis:
         and acceleration are those loaded; the target loaded is zero afterwards.
         """
         begin, chip, turn = self.samples, self.chip, self.motor.design.counts_per_turn
+        if not chip.stops_on_error:
+            return Homing(False, "no position error limit is set: ERL first, or a stop would be pushed against", 0.0)
         end = begin + self._samples_of(timeout)
         found = False
         for sense in (direction, -direction):
