@@ -274,7 +274,7 @@ class Guard:
 
     def _nearness(self, zone: int, left: float) -> str:
         """How near a beam is to a zone of which `left` (rad, margin off) remains."""
-        margin = f"{self.margin / DEGREE:.2f} deg for the servo"
+        margin = f"{self.margin / DEGREE:.2f} deg for {'servo, tilts and encoders' if self.off_beam else 'the servo'}"
         if zone == 0:
             angle = (left + self.margin + self.half_angle) / DEGREE
             return f"is {angle:.1f} deg from the Sun (limit {self.half_angle / DEGREE:.1f} deg and {margin})"
