@@ -204,6 +204,17 @@ def test_the_compiled_form_keeps_quadrants_axes_and_batch_shapes():
         counts(stations(5, np.random.default_rng(0)), np.zeros((5, 3)), compiled=True)
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+def test_counts_go_where_the_caller_wants_them(compiled):
+    rng = np.random.default_rng(30)
+    station, points, own = stations(3, rng)[:, None], rng.uniform(-60, 60, (50, 3)), np.empty((3, 50, 2))
+    assert counts(station, points, compiled=compiled, out=own) is own
+    np.testing.assert_array_equal(own, counts(station, points, compiled=compiled))
+    for wrong in (np.empty((50, 3, 2)), np.empty((3, 50, 2), dtype=np.float32), np.empty((3, 50, 4))[..., ::2]):
+        with pytest.raises(ValidityError, match=r"expected \(3, 50, 2\), float64, contiguous"):
+            counts(station, points, compiled=compiled, out=wrong)
+
+
 def test_stations_are_indexed_as_arrays_are():
     station = stations(4, np.random.default_rng(9))
     assert station[:, None].shape == (4, 1)

@@ -183,35 +183,49 @@ def aim(station: Station, points: ArrayLike) -> Aim:
     return Aim(distance, theta, phi, azimuth_counts(theta, na0), elevation_counts(phi, ne0))
 
 
-def counts(station: Station, points: ArrayLike, *, compiled: bool | None = None) -> NDArray[np.float64]:
+def counts(
+    station: Station,
+    points: ArrayLike,
+    *,
+    compiled: bool | None = None,
+    out: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
     """Encoder counts (..., 2), azimuth and elevation, for points in the direct pointing, as `aim` gives them.
 
     station, points    as for `aim`
     compiled           by the kernel, equal within 1e-9 counts; None for a million or more, every station to every point
+    out                (..., 2), where to put them and what is returned; new memory if None
 
-    Raises ValidityError where the kernel is asked for stations and points that go in pairs.
+    Raises ValidityError where the kernel is asked for stations and points that go in pairs, and for an `out` of another
+    shape or kind.
     """
     at = np.asarray(points, dtype=float)
-    shape = np.broadcast_shapes(station.shape, at.shape[:-1])
+    shape = (*np.broadcast_shapes(station.shape, at.shape[:-1]), 2)
     each = _stations_by_points(station.shape, at.shape[:-1])
     if compiled and not each:
         raise ValidityError(
             f"stations {station.shape} and points {at.shape} go in pairs, which the kernel does not do (expected every "
             "station to every point, stations in front)"
         )
-    if each and (compiled or (compiled is None and int(np.prod(shape)) >= COMPILED_FROM)):
+    if out is not None and (out.shape != shape or out.dtype != float or not out.flags.c_contiguous):
+        raise ValidityError(f"out has shape {out.shape} and type {out.dtype}, expected {shape}, float64, contiguous")
+    answer = np.empty(shape) if out is None else out
+    if each and (compiled or (compiled is None and answer.size // 2 >= COMPILED_FROM)):
         from catseye.geometry.pointing_kernel import stations_by_points
 
         _refuse_points(at)
-        answer = stations_by_points(
+        table = np.ascontiguousarray(at.reshape(-1, 3))
+        stations_by_points(
             _table(station.mirror_from_ground, station.shape, (3, 3)),
             _table(station.scan_point, station.shape, (3,)),
             _table(station.zeros, station.shape, (2,)),
-            np.ascontiguousarray(at.reshape(-1, 3)),
+            table,
+            answer.reshape(-1, len(table), 2),
         )
-        return answer.reshape(*shape, 2)
+        return answer
     found = aim(station, at)
-    return np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+    answer[..., 0], answer[..., 1] = found.azimuth_counts, found.elevation_counts
+    return answer
 
 
 def _table(part: NDArray[np.float64], batch: tuple[int, ...], tail: tuple[int, ...]) -> NDArray[np.float64]:
