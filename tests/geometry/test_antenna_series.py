@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import FrameError, ValidityError
 from catseye.geometry.antenna import (
-    Transforms,
     ground_from_alidade_at,
     ground_from_reflector,
     ground_from_reflector_at,
     reflector_from_feed_arm,
     reflector_from_prime_focus,
 )
+from catseye.geometry.frame import Transforms
 
 # azimuth deg, elevation deg, vertex mm, focus mm: printed for eq. 2.44 by the observatory's drawing
 CHECKS = [

@@ -4,6 +4,7 @@ Names cancel: ground_from_dish = ground_from_alidade @ alidade_from_dish.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,3 +87,81 @@ class Transform:
             self.rotation @ other.rotation,
             self.rotation @ other.translation + self.translation,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Transforms:
+    """Many rigid transforms between the same two frames; a `Transform` with batch axes in front.
+
+    to             name of the frame of the results
+    from_          name of the frame of the arguments
+    rotation       (..., 3, 3), orthonormal; not tested, since what makes them builds them from angles
+    translation    (..., 3), m
+
+    Batch axes broadcast against those of points; `transforms[:, None]` makes room for several points at each time.
+    Raises ValidityError for other shapes and FrameError where names do not cancel.
+
+    >>> lifted = Transforms("ground", "arm", np.eye(3), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]]))
+    >>> lifted.points([5.0, 0.0, 0.0]).tolist()
+    [[5.0, 0.0, 1.0], [5.0, 0.0, 2.0]]
+    """
+
+    to: str
+    from_: str
+    rotation: NDArray[np.float64]
+    translation: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        rotation, translation = np.asarray(self.rotation, dtype=float), np.asarray(self.translation, dtype=float)
+        if rotation.shape[-2:] != (3, 3) or translation.shape[-1:] != (3,):
+            raise ValidityError(
+                f"{self}: rotations and translations have shapes {rotation.shape} and {translation.shape}, "
+                "expected (..., 3, 3) and (..., 3)"
+            )
+        batch = np.broadcast_shapes(rotation.shape[:-2], translation.shape[:-1])
+        object.__setattr__(self, "rotation", np.broadcast_to(rotation, (*batch, 3, 3)))
+        object.__setattr__(self, "translation", np.broadcast_to(translation, (*batch, 3)))
+
+    def __str__(self) -> str:
+        return f"{self.to}_from_{self.from_}"
+
+    @classmethod
+    def of(cls, transform: "Transform | Transforms") -> "Transforms":
+        """The same, without batch axes where it is a single Transform."""
+        return cls(transform.to, transform.from_, transform.rotation, transform.translation)
+
+    @property
+    def single(self) -> Transform:
+        """The Transform that this is, where there are no batch axes."""
+        return Transform(self.to, self.from_, self.rotation, self.translation)
+
+    def __getitem__(self, index: Any) -> "Transforms":
+        """Batch axes indexed, as numpy does it; None makes a new one."""
+        at = index if isinstance(index, tuple) else (index,)
+        at = at if Ellipsis in at else (*at, Ellipsis)
+        rotation = self.rotation[(*at, slice(None), slice(None))]
+        translation = self.translation[(*at, slice(None))]
+        return Transforms(self.to, self.from_, rotation, translation)
+
+    def points(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Points of the frame `from_`, (..., 3) in metres, in the frame `to`."""
+        return self.directions(x) + self.translation
+
+    def directions(self, v: ArrayLike) -> NDArray[np.float64]:
+        """Directions or displacements of the frame `from_`, (..., 3), in the frame `to`: turned, not moved."""
+        vectors = np.asarray(v, dtype=float)
+        if vectors.shape[-1:] != (3,):
+            raise ValidityError(f"{self}: points have shape {vectors.shape}, expected (..., 3)")
+        return np.einsum("...ij,...j->...i", self.rotation, vectors)
+
+    def inverse(self) -> "Transforms":
+        """The transforms back."""
+        back = np.swapaxes(self.rotation, -1, -2)
+        return Transforms(self.from_, self.to, back, -np.einsum("...ij,...j->...i", back, self.translation))
+
+    def __matmul__(self, other: "Transform | Transforms") -> "Transforms":
+        if not isinstance(other, Transform | Transforms):
+            return NotImplemented
+        if self.from_ != other.to:
+            raise FrameError(f"cannot join {other} to {self}: '{self.from_}' is not '{other.to}'")
+        return Transforms(self.to, other.from_, self.rotation @ other.rotation, self.points(other.translation))

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import FrameError, ValidityError
-from catseye.geometry.antenna import Transforms
-from catseye.geometry.frame import Transform
+from catseye.geometry.frame import Transform, Transforms
 from catseye.geometry.rotation import rx, ry, rz
 
 HOME = Transform("prime_focus", "subreflector", np.eye(3), np.zeros(3))  # chosen: both frames agree at rest

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna import Transforms, alidade_from_elevation_at, ground_from_alidade_at
+from catseye.geometry.antenna import alidade_from_elevation_at, ground_from_alidade_at
 from catseye.geometry.deformation import (
     Motion,
     Posture,
@@ -25,6 +25,7 @@ from catseye.geometry.deformation import (
     carried_jacobian,
     left_jacobian,
 )
+from catseye.geometry.frame import Transforms
 from catseye.geometry.subreflector import turned
 from catseye.records.structural_model import (
     KEYS,

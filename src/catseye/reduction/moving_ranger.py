@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna import Transforms, ground_from_alidade_at
+from catseye.geometry.antenna import ground_from_alidade_at
 from catseye.geometry.deformation import Posture, carried_jacobian
-from catseye.geometry.frame import Transform
+from catseye.geometry.frame import Transform, Transforms
 from catseye.geometry.pointing import Station, counts_jacobian
 from catseye.geometry.rotation import skew
 from catseye.records.mirror import MirrorGeometry

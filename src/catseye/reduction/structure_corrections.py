@@ -15,8 +15,8 @@ import numpy as np
 
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.rigid_body import fit_transformation
-from catseye.geometry.antenna import Transforms
 from catseye.geometry.deformation import Posture
+from catseye.geometry.frame import Transforms
 from catseye.geometry.rotation import to_vector
 from catseye.reduction.antenna import Added, Antenna, SubreflectorPosition
 
