@@ -266,7 +266,7 @@ def _told(readings: Readings, found: CurvedFit, predict: Any) -> Calibration:
             "the counts decide nothing of the station: u_counts is far above what its records leave open"
         )
     free = [PARAMETERS[k] for k in compared.free]
-    meaning = "as the laboratory and the field have it together"
+    meaning = "lab and field together"
     given, covariance = found.quantities([(name, *IN_FILES[name][:2], meaning, IN_FILES[name][2]) for name in free])
     rank, loose = _inseparable(found, predict)
     notes = [
