@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
-from catseye.geometry.time_tag import EXACT_DECIMALS, PER_DAY, TimeTag, tag_step
+from catseye.geometry.time_tag import EXACT_DECIMALS, PER_DAY, TimeTag, mjd_of, tag_step, utc_text
 
 days = st.integers(0, 100_000)
 nanoseconds = st.integers(0, PER_DAY - 1)
@@ -107,3 +107,11 @@ def test_batches_carry_and_give_single_instants():
 def test_what_is_no_instant_is_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
+
+
+def test_times_as_people_write_them_are_utc_unless_they_say_a_zone():
+    assert mjd_of("2003-09-10T14:00:00Z") == mjd_of("2003-09-10T14:00:00") == mjd_of("2003-09-10T10:00:00-04:00")
+    assert mjd_of("2003-09-10T14:00:00Z") == pytest.approx(52_892 + 14 / 24, abs=1e-10)
+    assert utc_text(mjd_of("2003-09-10T14:00:00Z")) == "2003-09-10T14:00:00Z"
+    with pytest.raises(ValidityError, match="'noon' is neither an MJD nor a time"):
+        mjd_of("noon")

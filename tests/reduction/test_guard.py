@@ -8,11 +8,12 @@ from catseye.errors import ValidityError
 from catseye.geometry.keep_out import TOUCH, Box, servo_margin
 from catseye.geometry.pointing import counts, ray
 from catseye.geometry.slew import straight, trapezoid
+from catseye.geometry.time_tag import utc_text
 from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
 from catseye.records.site import Location
 from catseye.reduction.earth_rotation import Place, place_of, sun_at
-from catseye.reduction.guard import _cut, guard_of, utc_text
+from catseye.reduction.guard import _cut, guard_of
 from sun_scene import (
     DEGREE,
     GREEN_BANK,

@@ -1,8 +1,6 @@
 """The command of pointing."""
 
 import math
-import re
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -11,29 +9,21 @@ import typer
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
 from catseye.constants import DEGREE
+from catseye.errors import ValidityError
 
-EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
-DAY = 86_400.0
 REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.visibility, whose import --help spares itself
 
 
 def time_text(text: str | None) -> str | None:
-    """As given, if it can be read: an MJD, or UTC as 2003-09-07T15:12:09Z."""
+    """As given, if it is a time."""
     if text is not None:
-        as_mjd(text)
+        from catseye.geometry.time_tag import mjd_of
+
+        try:
+            mjd_of(text)
+        except ValidityError as problem:
+            raise typer.BadParameter(f"{problem}.") from problem
     return text
-
-
-def as_mjd(text: str) -> float:
-    if re.fullmatch(r"[0-9]+(\.[0-9]*)?", text):
-        return float(text)
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError as problem:
-        raise typer.BadParameter(f"{text!r} is neither an MJD nor a time such as 2003-09-07T15:12:09Z.") from problem
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=UTC)
-    return (moment - EPOCH).total_seconds() / DAY
 
 
 def _points(texts: list[str] | None) -> list[str] | None:
@@ -145,6 +135,7 @@ def point(
 
     from catseye.gateways.objects import json_line
     from catseye.gateways.pointing_objects import MARK, output_dat, pointing_objects, pointing_remarks, pointing_table
+    from catseye.geometry.time_tag import mjd_of
     from catseye.records.coordinate_list import read_coordinates
     from catseye.records.keep_out import KeepOut
     from catseye.records.mirror import MirrorGeometry
@@ -168,7 +159,7 @@ def point(
     zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
     if sun_cone_deg is not None:
         zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})
-    mjd = None if at is None else as_mjd(at)
+    mjd = None if at is None else mjd_of(at)
     place = None if mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
     found = pointed(stands, mirrors, where)
     station = station_of(stands, mirrors)

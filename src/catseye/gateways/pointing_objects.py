@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.reduction.guard import Verdict, utc_text
+from catseye.geometry.time_tag import utc_text
+from catseye.reduction.guard import Verdict
 from catseye.reduction.pointing import Pointings
 from catseye.reduction.sighting import Sighting
 from catseye.reduction.visibility import Visibility

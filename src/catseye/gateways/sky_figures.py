@@ -16,8 +16,9 @@ from catseye.geometry.keep_out import TOUCH
 from catseye.geometry.pointing import ray
 from catseye.geometry.slew import Slew, trapezoid
 from catseye.geometry.sun import altitude_azimuth
+from catseye.geometry.time_tag import utc_text
 from catseye.reduction.earth_rotation import Place, sun_at
-from catseye.reduction.guard import Guard, utc_text
+from catseye.reduction.guard import Guard
 from catseye.reduction.reroute import Route
 
 EDGE = 100.0  # degrees from the zenith to the rim of the map

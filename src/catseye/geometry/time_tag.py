@@ -9,6 +9,7 @@ A day has 86 400 s here. A Modified Julian Day in UTC has no name for a leap sec
 
 import re
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import ValidityError
 
+MJD_EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
 PER_SECOND = 1_000_000_000
 PER_DAY = 86_400 * PER_SECOND
 LAST_DAY = 106_000  # the difference of any two instants still fits 64 bits
@@ -158,3 +160,31 @@ def tag_step(decimals: int) -> float:
     if not 0 <= decimals <= MOST_DECIMALS:
         raise ValidityError(f"decimals = {decimals} is outside 0 to {MOST_DECIMALS}")
     return float(SECONDS_PER_DAY / 10**decimals)
+
+
+def utc_text(mjd: float) -> str:
+    """A time as people write it, rounded up to a second.
+
+    >>> utc_text(52889.6334491)
+    '2003-09-07T15:12:11Z'
+    """
+    when = MJD_EPOCH + timedelta(seconds=float(np.ceil(round(mjd * SECONDS_PER_DAY, 3))))
+    return when.strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def mjd_of(text: str) -> float:
+    """The MJD of a time as people write it: the number itself, or UTC such as 2003-09-07T15:12:09Z.
+
+    Without a zone it is UTC. Good to a microsecond. Raises ValidityError for any other text.
+
+    >>> mjd_of("2003-09-07T12:00:00Z"), mjd_of("52889.5")
+    (52889.5, 52889.5)
+    """
+    if TEXT.fullmatch(text):
+        return float(text)
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError as problem:
+        raise ValidityError(f"{text!r} is neither an MJD nor a time such as 2003-09-07T15:12:09Z") from problem
+    moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return (moment - MJD_EPOCH).total_seconds() / SECONDS_PER_DAY

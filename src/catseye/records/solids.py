@@ -1,6 +1,7 @@
 """solids.toml: simple solids that stand between rangers and retroreflectors."""
 
 import re
+from abc import abstractmethod
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -37,9 +38,9 @@ class SolidRecord(Record):
     name: Words
     frame: SolidFrame
 
+    @abstractmethod
     def solid(self) -> solids.Solid:
         """In metres, in its frame."""
-        raise NotImplementedError
 
 
 class BoxRecord(SolidRecord):

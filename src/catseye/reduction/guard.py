@@ -16,7 +16,6 @@ w^2 and `BENDING` times that where refraction bends it most, bounds how wrong th
 """
 
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +37,7 @@ from catseye.geometry.keep_out import (
 from catseye.geometry.pointing import Station, ray
 from catseye.geometry.slew import Pace, Slew, straight, trapezoid
 from catseye.geometry.sun import SUN_RATE
+from catseye.geometry.time_tag import utc_text
 from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import MirrorGeometry
 from catseye.reduction.earth_rotation import Place, sun_at
@@ -53,7 +53,6 @@ HIGH = 5.0 * DEGREE
 WIDEST = 0.99 * np.pi  # a cone that leaves no way
 LONGEST = 60.0  # s, of the pieces into which a halt or a track is cut: the Sun moves on between them
 SETTLED = 1e-3  # s, of the time when a beam becomes free
-MJD_EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -378,16 +377,6 @@ def guard_of(
         keep_out.sun.horizon_deg * DEGREE,
         servo_margin(encoder) + tilt,
     )
-
-
-def utc_text(mjd: float) -> str:
-    """A time as people write it, rounded up to a second.
-
-    >>> utc_text(52889.6334491)
-    '2003-09-07T15:12:11Z'
-    """
-    when = MJD_EPOCH + timedelta(seconds=float(np.ceil(round(mjd * SECONDS_PER_DAY, 3))))
-    return when.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _pair(counts: ArrayLike) -> NDArray[np.float64]:

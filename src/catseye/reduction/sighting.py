@@ -84,26 +84,24 @@ def sightings(
     under_sun = None if mjd is None else replace(free, boxes=())
     boxed = replace(free, place=None) if keep_out.box else None
     imperfections = imperfections_of(mirror)
+    sun = None if mjd is None or place is None else sun_at(mjd, place)
     answer = []
     for n in counts:
-        seen: dict[str, object] = {}
-        if boxed is not None:
-            seen["keep_out"] = boxed.pointing(mjd or 0.0, n)
-        if under_sun is not None and mjd is not None and place is not None:
-            sun = sun_at(mjd, place)
+        seen = Sighting(keep_out=None if boxed is None else boxed.pointing(mjd or 0.0, n))
+        if sun is not None and under_sun is not None and mjd is not None:
             altitude, azimuth = altitude_azimuth(sun.direction)
             beam = ray(station, n) if imperfections is None else imperfect_ray(station, imperfections, n)
-            direction = beam.direction
-            apart = np.arctan2(np.linalg.norm(np.cross(direction, sun.direction)), direction @ sun.direction)
-            seen |= {
-                "mjd": mjd,
-                "sun": under_sun.pointing(mjd, n),
-                "separation": float(apart),
-                "altitude": float(altitude),
-                "azimuth": float(azimuth),
-                "earth_rotation": str(sun.status),
-            }
-        answer.append(Sighting(**seen))  # type: ignore[arg-type]
+            across = np.linalg.norm(np.cross(beam.direction, sun.direction))
+            seen = replace(
+                seen,
+                mjd=mjd,
+                sun=under_sun.pointing(mjd, n),
+                separation=float(np.arctan2(across, beam.direction @ sun.direction)),
+                altitude=float(altitude),
+                azimuth=float(azimuth),
+                earth_rotation=str(sun.status),
+            )
+        answer.append(seen)
     return answer
 
 
