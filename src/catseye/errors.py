@@ -7,6 +7,8 @@ CatseyeError
 └── EstimationError   an adjustment that gave no answer, raised only when the answer is required
 """
 
+from typing import Any
+
 
 class CatseyeError(Exception):
     """Anything that catseye refuses; the command line prints its one line and exits with 1."""
@@ -17,7 +19,14 @@ class InputError(CatseyeError):
 
 
 class ValidityError(CatseyeError, ValueError):
-    """A value outside the range where a formula holds."""
+    """A value outside the range where a formula holds.
+
+    mask   bool array of the shape of the argument that was refused, True where it is outside; None for a single value
+    """
+
+    def __init__(self, text: str, mask: Any = None) -> None:
+        super().__init__(text)
+        self.mask = mask
 
 
 class FrameError(CatseyeError, ValueError):

@@ -2,6 +2,7 @@
 
 import importlib
 import tomllib
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,14 @@ def test_a_printed_number_is_reproduced(vector):
     module, function = vector["function"].split(".")
     got = getattr(importlib.import_module(f"catseye.atmosphere.{module}"), function)(**vector["inputs"])
     if "field" in vector:
-        got = getattr(got, vector["field"])
+        got = attrgetter(vector["field"])(got)
     assert float(got) / vector.get("scale", 1.0) == pytest.approx(
         vector["expected"], rel=0.0, abs=vector["tolerance"]
     ), f"{vector['source']}: {vector['why']}"
 
 
 def test_carbon_dioxide_moves_the_group_index_as_stated():
-    from catseye.atmosphere.ciddor_hill1999 import group_refractivity
+    from catseye.atmosphere.air import group_refractivity
 
     grown = group_refractivity(20.0, 1013.25, 50.0, co2_ppm=550.0) - group_refractivity(20.0, 1013.25, 50.0)
     # the fact sheet's 0.0145 ppm per 100 ppm is truncated: 0.534e-6 of the dry air's 272.4 ppm is 0.014 55

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from catseye.atmosphere import ciddor_hill1999, path
+from catseye.atmosphere import path
+from catseye.atmosphere.air import group_refractivity
 
 
 def test_the_notes_lapse_is_the_hydrostatic_one_at_the_site():
@@ -38,7 +39,7 @@ def test_two_stations_at_one_height_give_their_mean():
 
 def test_five_nodes_are_enough_for_the_air_over_the_telescope():
     def real_air(z):
-        return ciddor_hill1999.group_refractivity(20.0 - 0.0098 * z, path.pressure_at(933.0, 0.0, z), 50.0)
+        return group_refractivity(20.0 - 0.0098 * z, path.pressure_at(933.0, 0.0, z), 50.0)
 
     # checked against ourselves with more nodes: the quadrature alone, not the air
     fine = path.mean_over_height(real_air, 0.0, 200.0, nodes=40)

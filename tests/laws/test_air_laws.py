@@ -52,7 +52,7 @@ def test_the_group_index_is_the_phase_index_less_wavelength_times_its_slope(t, p
 @given(st.floats(-39.0, 49.0), pressures, st.floats(1.0, 99.0), models)
 def test_a_small_change_of_weather_moves_the_index_by_its_sensitivity(t, p, h, model):
     slopes = air(t, p, h, model=model).sensitivity
-    for axis, slope in enumerate(slopes):
+    for axis, slope in enumerate(slopes[:3]):
         step = np.eye(3)[axis] * 1e-3
         up, down = (group_refractivity(*(np.array([t, p, h]) + s), model=model) for s in (step, -step))
         # rounding of the refractivity, 1e-19, over 2e-3

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.humidity import PA_PER_HPA, saturation, vapour_pressure_hpa
-from catseye.atmosphere.model import Limit, Model, Partials
+from catseye.atmosphere.humidity import PA_PER_HPA
+from catseye.atmosphere.model import DensitySlopes, Dispersion, Gases, Limit, Model
 from catseye.constants import ZERO_CELSIUS_K
 
 # [CIDDOR96] appendix A, k1/(k0 - sigma²) + k3/(k2 - sigma²): 1e8 refractivity of standard dry air; um^-2
@@ -41,17 +41,6 @@ class Compressibility(NamedTuple):
     per_fraction: Any
 
 
-class Coefficients(NamedTuple):
-    """Refractivity times K/Pa that a partial pressure of each gas adds when divided by Z T.
-
-    dry      of dry air
-    vapour   of water vapour
-    """
-
-    dry: Any
-    vapour: Any
-
-
 def compressibility(temperature_c, pressure_hpa, vapour_fraction) -> Compressibility:
     """Compressibility of moist air with its slopes.
 
@@ -79,7 +68,48 @@ def compressibility(temperature_c, pressure_hpa, vapour_fraction) -> Compressibi
     )
 
 
-def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Coefficients:
+def densities(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
+    """Partial pressure over Z T of each gas, in Pa/K: what densities are proportional to.
+
+    temperature_c         air temperature, -40 to 100 °C
+    pressure_hpa          total pressure, 100 to 1400 hPa
+    vapour_pressure_hpa   partial pressure of water vapour, 0 to the total pressure
+
+    Source: [CIDDOR96] eq. 4; gas constant and molar masses cancel against the standard densities', carbon dioxide's
+    too.
+
+    >>> round(float(densities(20.0, 1013.25, 11.7429).vapour), 4)
+    4.0073
+    """
+    p, e = np.asarray(pressure_hpa, float), np.asarray(vapour_pressure_hpa, float)
+    z_kelvin = compressibility(temperature_c, p, e / p).z * (np.asarray(temperature_c, float) + ZERO_CELSIUS_K)
+    return Gases(PA_PER_HPA * (p - e) / z_kelvin, PA_PER_HPA * e / z_kelvin)
+
+
+def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
+    """Derivatives of both densities by temperature, total pressure and vapour pressure; arguments as above.
+
+    Source: [CIDDOR96] eq. 4 and appendix A differentiated.
+
+    >>> [round(float(slope), 4) for slope in density_slopes(20.0, 1013.25, 11.7429).dry]
+    [-1.1693, 0.3414, -0.3402]
+    """
+    p, e = np.asarray(pressure_hpa, float), np.asarray(vapour_pressure_hpa, float)
+    kelvin, x = np.asarray(temperature_c, float) + ZERO_CELSIUS_K, e / p
+    z = compressibility(temperature_c, p, x)
+    density = densities(temperature_c, p, e)
+    # shares of themselves: of 1/(Z T), the vapour's fraction x = e/p moving Z with both pressures
+    by_t = -(1.0 / kelvin + z.per_k / z.z)
+    by_p = -(z.per_pa * PA_PER_HPA - z.per_fraction * x / p) / z.z
+    by_e = -z.per_fraction / (p * z.z)
+    one = PA_PER_HPA / (z.z * kelvin)
+    return Gases(
+        DensitySlopes(density.dry * by_t, density.dry * by_p + one, density.dry * by_e - one),
+        DensitySlopes(density.vapour * by_t, density.vapour * by_p, density.vapour * by_e + one),
+    )
+
+
+def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
     """Group refractivity that each gas adds per unit of its partial pressure over Z T, in K/Pa.
 
     wavelength_um   vacuum wavelength, 0.30 to 1.69 um
@@ -91,13 +121,10 @@ def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Coefficients:
     >>> round(float(group_coefficients(0.780).dry) * 1e7, 5)
     7.96973
     """
-    s = 1.0 / np.asarray(wavelength_um, float) ** 2
-    dry = sum(k * (a + s) / (a - s) ** 2 for k, a in DRY_TERMS)
-    vapour = sum((2 * i + 1) * w * s**i for i, w in enumerate(VAPOUR_TERMS))
-    return _per_unit_density(dry, vapour, co2_ppm)
+    return MODEL.coefficients(wavelength_um, co2_ppm, "group")
 
 
-def phase_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Coefficients:
+def phase_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
     """Phase refractivity that each gas adds per unit of its partial pressure over Z T, in K/Pa.
 
     wavelength_um   vacuum wavelength, 0.30 to 1.69 um
@@ -108,127 +135,25 @@ def phase_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Coefficients:
     >>> round(float(phase_coefficients(0.780).dry) * 1e7, 5)
     7.82231
     """
-    s = 1.0 / np.asarray(wavelength_um, float) ** 2
-    dry = sum(k / (a - s) for k, a in DRY_TERMS)
-    vapour = sum(w * s**i for i, w in enumerate(VAPOUR_TERMS))
-    return _per_unit_density(dry, vapour, co2_ppm)
-
-
-def group_refractivity(temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, co2_ppm=450.0):
-    """Group index of air minus one.
-
-    temperature_c      air temperature, -40 to 100 °C
-    pressure_hpa       total pressure, 100 to 1400 hPa
-    humidity_percent   relative humidity over liquid water, 0 to 100 %
-    wavelength_um      vacuum wavelength, 0.30 to 1.69 um
-    co2_ppm            carbon dioxide, 0 to 2000 ppm
-
-    Source: [CIDDOR99] with [CIDDOR96] eq. 5 and its own saturation formula (today's [IAPWS97] changes the index of
-    saturated air by less than 1e-10 up to 30 °C). Good to 5e-8.
-
-    >>> round(float(group_refractivity(20.0, 1013.25, 50.0)) * 1e8, 3)
-    27515.137
-    """
-    coefficients = group_coefficients(wavelength_um, co2_ppm)
-    return _refractivity(temperature_c, pressure_hpa, humidity_percent, coefficients)
-
-
-def phase_refractivity(temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, co2_ppm=450.0):
-    """Phase index of air minus one.
-
-    temperature_c      air temperature, -40 to 100 °C
-    pressure_hpa       total pressure, 100 to 1400 hPa
-    humidity_percent   relative humidity over liquid water, 0 to 100 %
-    wavelength_um      vacuum wavelength, 0.30 to 1.69 um
-    co2_ppm            carbon dioxide, 0 to 2000 ppm
-
-    Source: [CIDDOR96] eq. 5. Good to 5e-8.
-
-    >>> round(float(phase_refractivity(20.0, 800.0, 75.0, wavelength_um=0.633)) * 1e8, 1)
-    21394.0
-    """
-    coefficients = phase_coefficients(wavelength_um, co2_ppm)
-    return _refractivity(temperature_c, pressure_hpa, humidity_percent, coefficients)
-
-
-def group_partials(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, co2_ppm=CO2_STANDARD_PPM
-) -> Partials:
-    """Derivatives of the group index by temperature, total pressure and vapour pressure, each with the others held.
-
-    temperature_c         air temperature, -40 to 100 °C
-    pressure_hpa          total pressure, 100 to 1400 hPa
-    vapour_pressure_hpa   partial pressure of water vapour, 0 to the total pressure
-    wavelength_um         vacuum wavelength, 0.30 to 1.69 um
-    co2_ppm               carbon dioxide, 0 to 2000 ppm
-
-    Source: [CIDDOR96] eq. 5 differentiated. Exact derivatives of the formula.
-
-    >>> round(float(group_partials(20.0, 1013.25, 11.7429).vapour_pressure_hpa) * 1e8, 2)
-    -3.51
-    """
-    p, e = np.asarray(pressure_hpa, float), np.asarray(vapour_pressure_hpa, float)
-    kelvin, x = np.asarray(temperature_c, float) + ZERO_CELSIUS_K, e / p
-    dry, vapour = group_coefficients(wavelength_um, co2_ppm)
-    z = compressibility(temperature_c, p, x)
-    n = _mixed(temperature_c, p, e, (dry, vapour))
-    # n = (dry (p - e) + vapour e) / (Z T); the vapour's fraction x = e/p moves Z
-    per_pa = dry / (z.z * kelvin) - n / z.z * (z.per_pa - z.per_fraction * x / (p * PA_PER_HPA))
-    vapour_per_pa = (vapour - dry) / (z.z * kelvin) - n / z.z * z.per_fraction / (p * PA_PER_HPA)
-    return Partials(-n * (1.0 / kelvin + z.per_k / z.z), PA_PER_HPA * per_pa, PA_PER_HPA * vapour_per_pa)
-
-
-def group_sensitivity(temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, co2_ppm=450.0):
-    """Derivatives of the group index by temperature, pressure and relative humidity, the last held in the others.
-
-    temperature_c      air temperature, -40 to 100 °C
-    pressure_hpa       total pressure, 100 to 1400 hPa
-    humidity_percent   relative humidity over liquid water, 0 to 100 %
-    wavelength_um      vacuum wavelength, 0.30 to 1.69 um
-    co2_ppm            carbon dioxide, 0 to 2000 ppm
-
-    Source: [CIDDOR96] eq. 5 differentiated, vapour by its appendix A. Exact derivatives of the formula.
-
-    >>> [round(float(slope) * 1e6, 5) for slope in group_sensitivity(20.0, 1013.25, 50.0)]
-    [-0.96694, 0.27206, -0.00825]
-    """
-    e = vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, "ciddor")
-    partials = group_partials(temperature_c, pressure_hpa, e, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
-    return partials.with_humidity_held(saturation(temperature_c, pressure_hpa, "ciddor"), humidity_percent)
-
-
-def _per_unit_density(dry, vapour, co2_ppm) -> Coefficients:
-    """Standard refractivities over standard p/(Z T): gas constant and molar masses cancel, carbon dioxide's too."""
-    dry = 1e-8 * dry * (1.0 + CO2_SLOPE * (np.asarray(co2_ppm, float) - CO2_STANDARD_PPM))
-    return Coefficients(
-        dry * _standard_zt(*STANDARD_DRY), 1e-8 * VAPOUR_FACTOR * vapour * _standard_zt(*STANDARD_VAPOUR)
-    )
+    return MODEL.coefficients(wavelength_um, co2_ppm, "phase")
 
 
 def _standard_zt(temperature_c, pressure_pa, vapour_fraction):
     z = compressibility(temperature_c, pressure_pa / PA_PER_HPA, vapour_fraction).z
-    return z * (temperature_c + ZERO_CELSIUS_K) / pressure_pa
+    return float(z * (temperature_c + ZERO_CELSIUS_K) / pressure_pa)
 
 
-def _refractivity(temperature_c, pressure_hpa, humidity_percent, coefficients):
-    e = vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, "ciddor")
-    return _mixed(temperature_c, np.asarray(pressure_hpa, float), e, coefficients)
-
-
-def _mixed(temperature_c, p, e, coefficients):
-    """[CIDDOR96] eq. 5: refractivities in proportion to density; the Lorentz-Lorenz sum differs by up to 3e-9."""
-    dry, vapour = coefficients
-    kelvin = np.asarray(temperature_c, float) + ZERO_CELSIUS_K
-    z = compressibility(temperature_c, p, e / p).z
-    return PA_PER_HPA * (dry * (p - e) + vapour * e) / (z * kelvin)
-
-
+# Refractivities add in proportion to density ([CIDDOR96] eq. 5); the Lorentz-Lorenz sum differs by up to 3e-9 and does
+# not reproduce the tables. Today's [IAPWS97] saturation changes the index of saturated air by less than 1e-10 to 30 °C.
 MODEL = Model(
     name="ciddor_hill1999",
     source="[CIDDOR99], [CIDDOR96]",
-    group_refractivity=group_refractivity,
-    phase_refractivity=phase_refractivity,
-    group_sensitivity=group_sensitivity,
+    dispersion=Gases(
+        Dispersion(poles=DRY_TERMS, scale=1e-8 * _standard_zt(*STANDARD_DRY)),
+        Dispersion(powers=VAPOUR_TERMS, scale=1e-8 * VAPOUR_FACTOR * _standard_zt(*STANDARD_VAPOUR)),
+    ),
+    densities=densities,
+    density_slopes=density_slopes,
     vapour_formula="ciddor",
     standard_uncertainty=5e-8,  # the upper end of the 2e-8 to 5e-8 that the author states
     limits={
@@ -238,4 +163,6 @@ MODEL = Model(
         "wavelength_um": Limit("wavelength", "um", 0.30, 1.69, "[CIDDOR96]", places=2),
         "co2_ppm": Limit("carbon dioxide", "ppm", 0.0, 2000.0, "[CIDDOR96]"),
     },
+    co2_ppm=CO2_STANDARD_PPM,
+    co2_slope=CO2_SLOPE,
 )

@@ -1,38 +1,55 @@
-"""What a model of the index of air is: three formulas, the limits within which they hold, and how good they are."""
+"""What a model of the index of air is: how each gas disperses light, how dense it is, and within which limits.
+
+Every model here has the form n - 1 = dry(wavelength) D_dry(weather) + vapour(wavelength) D_vapour(weather). A model's
+file gives the two dispersion formulas and the two densities with their slopes; this file makes of them the phase
+index, the group index n + sigma dn/dsigma, and all derivatives, for every model alike.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from catseye.errors import ValidityError
 
+Kind = Literal["group", "phase"]
+
 
 class Sensitivity(NamedTuple):
-    """Derivatives of the group index with relative humidity held.
+    """Derivatives of an index; relative humidity held, but for that by the vapour pressure.
 
-    temperature_c      per °C
-    pressure_hpa       per hPa
-    humidity_percent   per % of relative humidity
+    temperature_c         per °C
+    pressure_hpa          per hPa
+    humidity_percent      per % of relative humidity
+    vapour_pressure_hpa   per hPa of vapour pressure, temperature and total pressure held
+    co2_ppm               per ppm of carbon dioxide; zero in a model whose carbon dioxide is fixed
+    wavelength_um         per um of vacuum wavelength
     """
 
     temperature_c: Any
     pressure_hpa: Any
     humidity_percent: Any
+    vapour_pressure_hpa: Any
+    co2_ppm: Any
+    wavelength_um: Any
 
 
 class Partials(NamedTuple):
-    """Derivatives of the group index with vapour pressure held: what a dew-point or wet-bulb instrument needs.
+    """Derivatives of an index with vapour pressure held: what a dew-point or wet-bulb instrument needs.
 
     temperature_c         per °C
     pressure_hpa          per hPa of total pressure
     vapour_pressure_hpa   per hPa of vapour pressure
+    co2_ppm               per ppm of carbon dioxide; zero in a model whose carbon dioxide is fixed
+    wavelength_um         per um of vacuum wavelength
     """
 
     temperature_c: Any
     pressure_hpa: Any
     vapour_pressure_hpa: Any
+    co2_ppm: Any
+    wavelength_um: Any
 
     def with_humidity_held(self, saturation, humidity_percent) -> Sensitivity:
         """The chain rule from vapour pressure to relative humidity, by a `humidity.Saturation` and its slopes."""
@@ -41,7 +58,75 @@ class Partials(NamedTuple):
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
             self.pressure_hpa + self.vapour_pressure_hpa * fraction * saturation.per_hpa,
             self.vapour_pressure_hpa * saturation.pressure_hpa / 100.0,
+            self.vapour_pressure_hpa,
+            self.co2_ppm,
+            self.wavelength_um,
         )
+
+
+class Gases(NamedTuple):
+    """One quantity of each gas.
+
+    dry      of dry air
+    vapour   of water vapour
+    """
+
+    dry: Any
+    vapour: Any
+
+
+class DensitySlopes(NamedTuple):
+    """Derivatives of a gas's density factor, in its unit.
+
+    temperature_c         per °C
+    pressure_hpa          per hPa of total pressure, vapour pressure held
+    vapour_pressure_hpa   per hPa of vapour pressure, total pressure held
+    """
+
+    temperature_c: Any
+    pressure_hpa: Any
+    vapour_pressure_hpa: Any
+
+
+@dataclass(frozen=True)
+class Dispersion:
+    """Phase refractivity per unit of density as a function of s = 1/wavelength²: poles k/(a - s) and powers of s.
+
+    poles    pairs (k, a), um^-2
+    powers   coefficients of 1, s, s², ...
+    scale    factor on all of them
+    """
+
+    poles: tuple[tuple[float, float], ...] = ()
+    powers: tuple[float, ...] = ()
+    scale: float = 1.0
+
+    def phase(self, wavelength_um):
+        """Phase refractivity per unit of density, at a vacuum wavelength in um."""
+        s = np.asarray(wavelength_um, float) ** -2.0
+        return self.scale * (sum(k / (a - s) for k, a in self.poles) + sum(c * s**i for i, c in enumerate(self.powers)))
+
+    def group(self, wavelength_um):
+        """Group refractivity per unit of density: f + 2 s df/ds, which is n + sigma dn/dsigma of each term."""
+        s = np.asarray(wavelength_um, float) ** -2.0
+        poles = sum(k * (a + s) / (a - s) ** 2 for k, a in self.poles)
+        return self.scale * (poles + sum((2 * i + 1) * c * s**i for i, c in enumerate(self.powers)))
+
+    def phase_per_um(self, wavelength_um):
+        """Derivative of the phase refractivity by the wavelength: ds = -2 s/wavelength dwavelength."""
+        wavelength = np.asarray(wavelength_um, float)
+        s = wavelength**-2.0
+        per_s = sum(k / (a - s) ** 2 for k, a in self.poles)
+        per_s = per_s + sum(i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
+        return -2.0 * self.scale * s / wavelength * per_s
+
+    def group_per_um(self, wavelength_um):
+        """Derivative of the group refractivity by the wavelength."""
+        wavelength = np.asarray(wavelength_um, float)
+        s = wavelength**-2.0
+        per_s = sum(k * (3.0 * a + s) / (a - s) ** 3 for k, a in self.poles)
+        per_s = per_s + sum((2 * i + 1) * i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
+        return -2.0 * self.scale * s / wavelength * per_s
 
 
 @dataclass(frozen=True)
@@ -64,46 +149,86 @@ class Limit:
     places: int = 0
 
     def check(self, value) -> None:
-        """Raise ValidityError naming the first value that is outside or not a number."""
+        """Raise ValidityError naming the first value that is outside or not a number, with the mask of all of them."""
         values = np.asarray(value, float)
-        bad = np.flatnonzero(~((values >= self.lower) & (values <= self.upper)))
-        if bad.size == 0:
+        outside = ~((values >= self.lower) & (values <= self.upper))
+        if not np.any(outside):
             return
-        first = float(values.flat[bad[0]])
-        where = f" (element {bad[0]} of {values.size})" if values.ndim else ""
+        at = int(np.flatnonzero(outside)[0])
+        first = float(values.flat[at])
+        count = int(np.count_nonzero(outside))
+        others = f", and {count - 1} more" if count > 1 else ""
+        where = f" (element {at} of {values.size}{others})" if values.ndim else ""
         span = f"{self.lower:.{self.places}f}{'-' if self.lower >= 0 else ' to '}{self.upper:.{self.places}f}"
+        mask = outside if values.ndim else None
         if np.isnan(first):
-            raise ValidityError(f"{self.quantity} is not a number{where}; give a value in {span} {self.unit}")
+            raise ValidityError(f"{self.quantity} is not a number{where}; give a value in {span} {self.unit}", mask)
         raise ValidityError(
-            f"{self.quantity} {first:g} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds"
+            f"{self.quantity} {first:g} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
+            mask,
         )
 
 
 @dataclass(frozen=True)
 class Model:
-    """One model of the index of air; each function takes (temperature_c, pressure_hpa, humidity_percent, *,
-    wavelength_um, co2_ppm).
+    """One model of the index of air.
 
     name                   as users write it
     source                 the bibliography's keys
-    group_refractivity     function giving n_g - 1
-    phase_refractivity     function giving n - 1
-    group_sensitivity      function giving a Sensitivity
+    dispersion             of each gas
+    densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
+    density_slopes         function of the same giving each factor's DensitySlopes
     vapour_formula         the saturation formula it goes with, a name in `humidity.FORMULAS`
     standard_uncertainty   of the formula itself in the group index, perfect weather given
     limits                 argument's name -> Limit
+    co2_ppm                carbon dioxide for which `dispersion` holds
+    co2_slope              share by which each further ppm raises the dry air's refractivity; 0: no such term
     """
 
     name: str
     source: str
-    group_refractivity: Callable[..., Any]
-    phase_refractivity: Callable[..., Any]
-    group_sensitivity: Callable[..., Sensitivity]
+    dispersion: Gases
+    densities: Callable[..., Gases]
+    density_slopes: Callable[..., Gases]
     vapour_formula: str
     standard_uncertainty: float
     limits: dict[str, Limit]
+    co2_ppm: float
+    co2_slope: float = 0.0
 
     def check(self, **arguments) -> None:
         """Raise ValidityError for the first argument outside its limit."""
         for argument, value in arguments.items():
             self.limits[argument].check(value)
+
+    def coefficients(self, wavelength_um, co2_ppm, kind: Kind = "group") -> Gases:
+        """Refractivity that each gas adds per unit of its density factor."""
+        dry, vapour = (getattr(gas, kind)(wavelength_um) for gas in self.dispersion)
+        return Gases(dry * self._carbon_dioxide(co2_ppm), vapour)
+
+    def refractivity(
+        self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um, co2_ppm, kind: Kind = "group"
+    ):
+        """Index of air minus one, nothing checked."""
+        dry, vapour = self.coefficients(wavelength_um, co2_ppm, kind)
+        density = self.densities(temperature_c, pressure_hpa, vapour_pressure_hpa)
+        return dry * density.dry + vapour * density.vapour
+
+    def partials(
+        self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um, co2_ppm, kind: Kind = "group"
+    ) -> Partials:
+        """Derivatives of the index with vapour pressure held, nothing checked; exact for the formula."""
+        weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
+        dry, vapour = self.coefficients(wavelength_um, co2_ppm, kind)
+        per_um = Gases(*(getattr(gas, f"{kind}_per_um")(wavelength_um) for gas in self.dispersion))
+        density, slopes = self.densities(*weather), self.density_slopes(*weather)
+        carbon_dioxide = self._carbon_dioxide(co2_ppm)
+        by_weather = (dry * a + vapour * b for a, b in zip(slopes.dry, slopes.vapour, strict=True))
+        return Partials(
+            *by_weather,
+            co2_ppm=self.co2_slope / carbon_dioxide * dry * density.dry,
+            wavelength_um=per_um.dry * carbon_dioxide * density.dry + per_um.vapour * density.vapour,
+        )
+
+    def _carbon_dioxide(self, co2_ppm):
+        return 1.0 + self.co2_slope * (np.asarray(co2_ppm, float) - self.co2_ppm)

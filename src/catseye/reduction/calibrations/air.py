@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, air, phase_refractivity
+from catseye.atmosphere.air import air
 from catseye.constants import PPM, SPEED_OF_LIGHT
 from catseye.records.readings import Readings, Sheet
 from catseye.records.record import Within
@@ -17,7 +17,6 @@ WEATHER = {
     "humidity_percent": Within(0, 100),
 }
 SENSORS = ("temperature_c", "pressure_hpa", "humidity_percent")
-STEPS = (0.5, 0.5, 0.5)  # °C, hPa, %: the phase index is smooth, central differences are good to 1e-5 of a slope
 Spread = Annotated[float, Within(0, 100)]
 
 
@@ -34,7 +33,7 @@ class AirSheet(Sheet):
     modulation_hz: Annotated[float, Within(1e7, 1e11)]
     u_modulation_ppm: Annotated[float, Within(0, 1000)]
     wavelength_um: Annotated[float, Within(0.3, 1.7)] = 0.780
-    air_model: Literal["ciddor_hill1999", "rueger1990"] = "ciddor_hill1999"
+    air_model: Literal["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"] = "ciddor_hill1999"
     temperature_c: Annotated[float, WEATHER["temperature_c"]] | None = None
     pressure_hpa: Annotated[float, WEATHER["pressure_hpa"]] | None = None
     humidity_percent: Annotated[float, WEATHER["humidity_percent"]] | None = None
@@ -66,27 +65,17 @@ def group_air(readings: Readings) -> Air:
         model=sheet.air_model,
         modulation_hz=sheet.modulation_hz,
     )
-    return Air(np.asarray(state.group_index), np.array([*state.sensitivity]), state.standard_uncertainty)
+    return Air(
+        np.asarray(state.group_index), np.array([*state.sensitivity[: len(SENSORS)]]), state.standard_uncertainty
+    )
 
 
 def phase_air(readings: Readings, wavelength_um: float) -> Air:
     """Phase index of an interferometer's light in the same air."""
     sheet = readings.sheet
-    model = MODELS[sheet.air_model]
-    weather = [readings.get(name) for name in SENSORS]
-
-    def refractivity(at: list[np.ndarray]) -> np.ndarray:
-        return np.asarray(phase_refractivity(*at, wavelength_um=wavelength_um, model=sheet.air_model))
-
-    slopes = []
-    for k, (name, step) in enumerate(zip(SENSORS, STEPS, strict=True)):
-        # A reading may stand at either end of where the formula holds: there its difference is one-sided.
-        limit = model.limits[name]
-        low = np.maximum(weather[k] - step, limit.lower)
-        high = np.minimum(weather[k] + step, limit.upper)
-        below, above = [[*weather[:k], at, *weather[k + 1 :]] for at in (low, high)]
-        slopes.append((refractivity(above) - refractivity(below)) / (high - low))
-    return Air(1.0 + refractivity(weather), np.array(slopes), model.standard_uncertainty)
+    state = air(*(readings.get(name) for name in SENSORS), wavelength_um=wavelength_um, model=sheet.air_model)
+    slopes = np.array([*state.phase_sensitivity[: len(SENSORS)]])
+    return Air(np.asarray(state.phase_index), slopes, state.standard_uncertainty)
 
 
 def half_wavelength(readings: Readings, state: Air) -> np.ndarray:
