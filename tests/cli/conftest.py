@@ -3,7 +3,7 @@
 import pytest
 import typer
 
-from catseye.cli import baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
+from catseye.cli import air, baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
 from catseye.cli.commands import app
 from catseye.cli.terminal import attempt
 

@@ -79,11 +79,12 @@ def test_nothing_written_names_a_place_on_this_machine(written, reduction):
     assert not [path.name for path in written.iterdir() if place in path.read_text(encoding="utf-8")]
 
 
-def test_the_weathers_uncertainty_adds_to_the_formulas():
+def test_the_air_is_told_with_its_state_and_both_uncertainties():
     from catseye.atmosphere.air import air
 
     state = air(20.0, 933.0, 50.0)
-    alone = air_object(state, 0.78, (0.0, 0.0, 0.0))["standard_uncertainty"]
-    both = air_object(state, 0.78, (0.3, 0.0, 0.0))["standard_uncertainty"]
-    assert alone == pytest.approx(state.standard_uncertainty, rel=1e-15)
-    assert both == pytest.approx(math.hypot(alone, 0.3 * 0.8921e-6), rel=1e-3)  # the slope as printed, four digits
+    told = air_object(state, 0.78, state.combined_uncertainty(0.3))
+    assert (told["temperature_c"], told["pressure_hpa"], told["humidity_percent"]) == (20.0, 933.0, 50.0)
+    assert told["formula_uncertainty"] == state.standard_uncertainty
+    # the slope as printed, four digits
+    assert told["standard_uncertainty"] == pytest.approx(math.hypot(5e-8, 0.3 * 0.8921e-6), rel=1e-3)

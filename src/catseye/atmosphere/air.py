@@ -31,6 +31,8 @@ MODULATION = Limit("modulation frequency", "Hz", 1e6, 1e12, "the notion of a gro
 class Air:
     """Everything about one state of air, or an array of them, that a ranger needs.
 
+    temperature_c          air temperature, °C
+    pressure_hpa           total pressure, hPa
     group_index            n_g
     phase_index            n
     group_refractivity     n_g - 1, with all its digits
@@ -46,6 +48,8 @@ class Air:
     model                  the model's name
     """
 
+    temperature_c: Any
+    pressure_hpa: Any
     group_index: Any
     phase_index: Any
     group_refractivity: Any
@@ -211,30 +215,61 @@ def air(
     >>> round(float(air(20.0, 933.0, 50.0, model="rueger1990").group_wavelength), 9)
     0.199811037
     """
-    weather = (temperature_c, pressure_hpa, humidity_percent)
     chosen = _known(model)
-    _check(chosen, *weather, wavelength_um, co2_ppm)
+    _check(chosen, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm)
+    vapour = humidity.vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, chosen.vapour_formula)
+    weather = (temperature_c, pressure_hpa, vapour, humidity_percent)
+    return _air(chosen, *weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm, modulation_hz=modulation_hz)
+
+
+def air_of_vapour(
+    temperature_c,
+    pressure_hpa,
+    vapour_pressure_hpa,
+    *,
+    wavelength_um=0.780,
+    model="ciddor_hill1999",
+    co2_ppm=450.0,
+    modulation_hz=1500e6,
+) -> Air:
+    """The same from the partial pressure of the vapour, however that was found: dew point, wet bulb.
+
+    vapour_pressure_hpa   partial pressure of water vapour, hPa, 0 to saturation
+    others                as of `air`
+
+    Raises ValidityError with the mask of the offending places.
+
+    >>> round(float(air_of_vapour(20.0, 933.0, 11.7323, model="rueger1990").humidity_percent), 3)
+    50.0
+    """
+    chosen = _known(model)
+    _check_vapour(chosen, temperature_c, pressure_hpa, vapour_pressure_hpa, wavelength_um, co2_ppm)
+    saturated = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula).pressure_hpa
+    relative = 100.0 * np.asarray(vapour_pressure_hpa, float) / saturated
+    weather = (temperature_c, pressure_hpa, vapour_pressure_hpa, relative)
+    return _air(chosen, *weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm, modulation_hz=modulation_hz)
+
+
+def _air(chosen: Model, temperature_c, pressure_hpa, vapour, relative, *, wavelength_um, co2_ppm, modulation_hz) -> Air:
     MODULATION.check(modulation_hz)
-    vapour = humidity.vapour_pressure_hpa(*weather, chosen.vapour_formula)
     state = (temperature_c, pressure_hpa, vapour)
     saturation = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula)
-    index, slopes = {}, {}
-    kinds: tuple[Kind, Kind] = ("group", "phase")
-    for kind in kinds:
-        light = {"wavelength_um": wavelength_um, "co2_ppm": co2_ppm, "kind": kind}
-        index[kind] = chosen.refractivity(*state, **light)
-        slopes[kind] = chosen.partials(*state, **light).with_humidity_held(saturation, humidity_percent)
+    light = {"wavelength_um": wavelength_um, "co2_ppm": co2_ppm}
+    group = chosen.refractivity(*state, **light)
+    phase = chosen.refractivity(*state, **light, kind="phase")
     return Air(
-        group_index=1.0 + index["group"],
-        phase_index=1.0 + index["phase"],
-        group_refractivity=index["group"],
-        phase_refractivity=index["phase"],
+        temperature_c=temperature_c,
+        pressure_hpa=pressure_hpa,
+        group_index=1.0 + group,
+        phase_index=1.0 + phase,
+        group_refractivity=group,
+        phase_refractivity=phase,
         vapour_pressure_hpa=vapour,
-        humidity_percent=humidity_percent,
+        humidity_percent=relative,
         dew_point_c=humidity.dew_point_c(vapour, pressure_hpa, chosen.vapour_formula),
-        group_wavelength=SPEED_OF_LIGHT / ((1.0 + index["group"]) * np.asarray(modulation_hz, float)),
-        sensitivity=slopes["group"],
-        phase_sensitivity=slopes["phase"],
+        group_wavelength=SPEED_OF_LIGHT / ((1.0 + group) * np.asarray(modulation_hz, float)),
+        sensitivity=chosen.partials(*state, **light).with_humidity_held(saturation, relative),
+        phase_sensitivity=chosen.partials(*state, **light, kind="phase").with_humidity_held(saturation, relative),
         standard_uncertainty=chosen.standard_uncertainty,
         co2_ppm=co2_ppm if chosen.co2_slope else chosen.co2_ppm,
         model=chosen.name,
@@ -253,9 +288,10 @@ def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
             values, inside = _kernel(model)(*flat, *chosen.coefficients(wavelength_um, co2_ppm, kind))
             if inside:
                 return values.reshape(shape)
-    _check(chosen, *weather, wavelength_um, co2_ppm)
-    vapour = humidity.vapour_pressure_hpa(*weather, chosen.vapour_formula)
-    state = (weather[0], weather[1], vapour)
+    temperature_c, pressure_hpa, humidity_percent = weather
+    _check(chosen, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm)
+    vapour = humidity.vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, chosen.vapour_formula)
+    state = (temperature_c, pressure_hpa, vapour)
     return chosen.refractivity(*state, wavelength_um=wavelength_um, co2_ppm=co2_ppm, kind=kind)
 
 

@@ -223,9 +223,11 @@ class Model:
         per_um = Gases(*(getattr(gas, f"{kind}_per_um")(wavelength_um) for gas in self.dispersion))
         density, slopes = self.densities(*weather), self.density_slopes(*weather)
         carbon_dioxide = self._carbon_dioxide(co2_ppm)
-        by_weather = (dry * a + vapour * b for a, b in zip(slopes.dry, slopes.vapour, strict=True))
+        by_t, by_p, by_e = (dry * a + vapour * b for a, b in zip(slopes.dry, slopes.vapour, strict=True))
         return Partials(
-            *by_weather,
+            temperature_c=by_t,
+            pressure_hpa=by_p,
+            vapour_pressure_hpa=by_e,
             co2_ppm=self.co2_slope / carbon_dioxide * dry * density.dry,
             wavelength_um=per_um.dry * carbon_dioxide * density.dry + per_um.vapour * density.vapour,
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, Quiet, _known_model, _uncertainty, app
+from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
 from catseye.cli.networks import Out, _level
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.errors import InputError
@@ -53,7 +53,7 @@ def _u(name: str, what: str):
 
 
 def _modest(value: float) -> float:
-    if _uncertainty(value) > LARGEST:
+    if uncertainty(value) > LARGEST:
         raise typer.BadParameter(f"{value} is no uncertainty of a distance meter (expected at most {LARGEST:g}).")
     return value
 
@@ -83,7 +83,7 @@ def baseline(
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Carrier in vacuum, µm.")] = 0.658,
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 420.0,
     model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=_known_model, help="Formula for the index of air.")
+        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
     ] = "ciddor_hill1999",
     corrected: Annotated[
         bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")

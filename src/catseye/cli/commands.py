@@ -13,7 +13,8 @@ from catseye.reduction.settings import Settings
 if TYPE_CHECKING:
     from catseye.reduction.epoch import Reduction
 
-MODELS = "ciddor_hill1999|rueger1990"  # as in catseye.atmosphere.air, whose import --help spares itself
+# as in catseye.atmosphere.air, whose import --help spares itself
+MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 
 app = typer.Typer(
     name="catseye",
@@ -27,7 +28,7 @@ app = typer.Typer(
 
 def main() -> None:
     """The command line of this process; leaves with SystemExit."""
-    from catseye.cli import baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
+    from catseye.cli import air, baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
 
     typer.main.get_command(app)(prog_name="catseye")
 
@@ -38,7 +39,8 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-def _known_model(name: str) -> str:
+def known_model(name: str) -> str:
+    """The name of a model of the index of air."""
     from catseye.atmosphere.air import MODELS as known
 
     if name not in known:
@@ -46,14 +48,15 @@ def _known_model(name: str) -> str:
     return name
 
 
-def _uncertainty(value: float) -> float:
+def uncertainty(value: float) -> float:
+    """A standard uncertainty: 0 or more."""
     if not (math.isfinite(value) and value >= 0.0):
         raise typer.BadParameter(f"{value} is not a standard uncertainty (expected 0 or more).")
     return value
 
 
 AirModel = Annotated[
-    str, typer.Option("--air-model", metavar=MODELS, callback=_known_model, help="Formula for the index of air.")
+    str, typer.Option("--air-model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
@@ -117,56 +120,6 @@ def demo(
     elif not quiet:
         _tell(reduction)
         say(f"\nReport: {directory / 'report.html'}")
-
-
-@app.command(epilog="\b\nExample: catseye air --temperature-c 20 --pressure-hpa 933 --humidity-percent 50")
-def air(
-    temperature_c: Annotated[float, typer.Option("--temperature-c", help="Temperature, °C.")],
-    pressure_hpa: Annotated[float, typer.Option("--pressure-hpa", help="Total pressure, hPa.")],
-    humidity_percent: Annotated[
-        float, typer.Option("--humidity-percent", help="Relative humidity over liquid water, %.")
-    ],
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
-    model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=_known_model, help="Formula for the index of air.")
-    ] = "ciddor_hill1999",
-    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 450.0,
-    u_temperature_c: Annotated[
-        float, typer.Option("--u-temperature-c", callback=_uncertainty, help="Its standard uncertainty, °C.")
-    ] = 0.0,
-    u_pressure_hpa: Annotated[
-        float, typer.Option("--u-pressure-hpa", callback=_uncertainty, help="Its standard uncertainty, hPa.")
-    ] = 0.0,
-    u_humidity_percent: Annotated[
-        float, typer.Option("--u-humidity-percent", callback=_uncertainty, help="Its standard uncertainty, %.")
-    ] = 0.0,
-    json: Json = False,
-) -> None:
-    """Index of air, its sensitivities and its uncertainty."""
-    from catseye.atmosphere.air import air as air_of
-    from catseye.gateways.objects import air_object, json_line
-
-    state = air_of(
-        temperature_c, pressure_hpa, humidity_percent, wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm
-    )
-    found = air_object(state, wavelength_um, (u_temperature_c, u_pressure_hpa, u_humidity_percent))
-    if json:
-        say(json_line(found))
-        return
-    slope = found["sensitivity"]
-    dew_point = f"{found['dew_point_c']:.2f} °C" if math.isfinite(found["dew_point_c"]) else "none"
-    for name, value in (
-        ("group index", f"{found['group_index']:.9f}"),
-        ("phase index", f"{found['phase_index']:.9f}"),
-        ("uncertainty", f"{found['standard_uncertainty']:.2g} (of the group index, 1σ)"),
-        ("per °C", f"{slope['temperature_c'] * 1e6:+.4f} ppm"),
-        ("per hPa", f"{slope['pressure_hpa'] * 1e6:+.4f} ppm"),
-        ("per %", f"{slope['humidity_percent'] * 1e6:+.4f} ppm of relative humidity"),
-        ("vapour", f"{found['vapour_pressure_hpa']:.3f} hPa, dew point {dew_point}"),
-        ("modulation", f"{found['group_wavelength']:.9f} m a wavelength at 1500 MHz"),
-        ("formula", f"{found['model']}, {wavelength_um:g} µm"),
-    ):
-        say(f"{name:<14}{value}")
 
 
 def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "Reduction":

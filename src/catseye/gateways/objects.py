@@ -62,21 +62,27 @@ def json_page(value: dict[str, Any]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def air_object(air: "Air", wavelength_um: float, u: tuple[float, float, float]) -> dict[str, Any]:
-    """The index of air as `catseye air --json` gives it.
+def air_object(air: "Air", wavelength_um: float, u: Any) -> dict[str, Any]:
+    """The air as `catseye air --json` gives it.
 
-    u   standard uncertainties of temperature (°C), pressure (hPa) and relative humidity (%); zeros leave the formula's
+    u   standard uncertainty of the group index, formula and instruments
     """
     return {
         "model": air.model,
         "wavelength_um": wavelength_um,
+        "temperature_c": air.temperature_c,
+        "pressure_hpa": air.pressure_hpa,
+        "humidity_percent": air.humidity_percent,
+        "co2_ppm": air.co2_ppm,
         "group_index": air.group_index,
         "phase_index": air.phase_index,
         "vapour_pressure_hpa": air.vapour_pressure_hpa,
         "dew_point_c": air.dew_point_c,
         "group_wavelength": air.group_wavelength,
         "sensitivity": air.sensitivity._asdict(),
-        "standard_uncertainty": air.combined_uncertainty(*u),
+        "phase_sensitivity": air.phase_sensitivity._asdict(),
+        "standard_uncertainty": u,
+        "formula_uncertainty": air.standard_uncertainty,
     }
 
 

@@ -1,0 +1,173 @@
+"""The command of the air."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from catseye.cli.commands import MODELS, Json, app, known_model, uncertainty
+from catseye.cli.terminal import say, wrapped
+from catseye.constants import DEGREE
+
+if TYPE_CHECKING:
+    from catseye.reduction.air_routes import Moisture
+
+
+U = {"callback": uncertainty}
+Temperature = Annotated[float, typer.Option("--temperature-c", help="Air temperature, °C.")]
+Model = Annotated[
+    str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
+]
+CarbonDioxide = Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm; only ciddor_hill1999 has it.")]
+
+
+@app.command(
+    epilog="\b\nExample: catseye air --temperature-c 20 --pressure-hpa 933 --humidity-percent 50\n"
+    "Example: catseye air --temperature-c 20 --wet-bulb-c 14 --barometer-mmhg 700 --mercury-c 20 "
+    "--latitude-deg 38.45 --elevation-m 797.3 --model rueger1990"
+)
+def air(
+    temperature_c: Temperature,
+    pressure_hpa: Annotated[float | None, typer.Option("--pressure-hpa", help="Total pressure, hPa.")] = None,
+    humidity_percent: Annotated[
+        float | None, typer.Option("--humidity-percent", help="Relative humidity over liquid water, %; or:")
+    ] = None,
+    dew_point_c: Annotated[float | None, typer.Option("--dew-point-c", help="dew point of a mirror, °C;")] = None,
+    frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="its frost point, °C;")] = None,
+    wet_bulb_c: Annotated[float | None, typer.Option("--wet-bulb-c", help="wet bulb of a psychrometer, °C;")] = None,
+    ice_bulb_c: Annotated[float | None, typer.Option("--ice-bulb-c", help="the same, the bulb frozen, °C;")] = None,
+    vapour_pressure_hpa: Annotated[
+        float | None, typer.Option("--vapour-pressure-hpa", help="partial pressure of the vapour, hPa.")
+    ] = None,
+    barometer_mmhg: Annotated[
+        float | None, typer.Option("--barometer-mmhg", help="Mercury as read, mm, instead of --pressure-hpa;")
+    ] = None,
+    mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="temperature of the mercury, °C;")] = None,
+    gravity: Annotated[float | None, typer.Option("--gravity", help="gravity there, m/s²; or by")] = None,
+    latitude_deg: Annotated[float | None, typer.Option("--latitude-deg", help="latitude, degrees, and")] = None,
+    elevation_m: Annotated[float | None, typer.Option("--elevation-m", help="elevation above the sea, m.")] = None,
+    above_barometer_m: Annotated[
+        float, typer.Option("--above-barometer-m", help="Height of this air above the barometer, m.")
+    ] = 0.0,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
+    model: Model = "ciddor_hill1999",
+    co2_ppm: CarbonDioxide = 450.0,
+    u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
+    u_pressure_hpa: Annotated[float, typer.Option(help="Of the pressure, hPa.", **U)] = 0.0,
+    u_humidity_percent: Annotated[float, typer.Option(help="Of the relative humidity, %.", **U)] = 0.0,
+    u_dew_point_c: Annotated[float, typer.Option(help="Of the dew or frost point, °C.", **U)] = 0.0,
+    u_wet_bulb_c: Annotated[float, typer.Option(help="Of the wet bulb, water or ice, °C.", **U)] = 0.0,
+    u_vapour_pressure_hpa: Annotated[float, typer.Option(help="Of the vapour pressure, hPa.", **U)] = 0.0,
+    u_co2_ppm: Annotated[float, typer.Option(help="Of the carbon dioxide, ppm.", **U)] = 0.0,
+    json: Json = False,
+) -> None:
+    """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
+    from catseye.gateways.objects import air_object, json_line
+    from catseye.reduction.air_routes import air_by, station_pressure_hpa
+
+    u_of = {
+        "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
+        "u-dew-point-c": (u_dew_point_c, ("dew_point_c", "frost_point_c")),
+        "u-wet-bulb-c": (u_wet_bulb_c, ("wet_bulb_c", "ice_bulb_c")),
+        "u-vapour-pressure-hpa": (u_vapour_pressure_hpa, ("vapour_pressure_hpa",)),
+    }
+    given = {
+        "humidity_percent": humidity_percent,
+        "dew_point_c": dew_point_c,
+        "frost_point_c": frost_point_c,
+        "wet_bulb_c": wet_bulb_c,
+        "ice_bulb_c": ice_bulb_c,
+        "vapour_pressure_hpa": vapour_pressure_hpa,
+    }
+    moisture = _moisture(given, u_of)
+    _one_pressure(pressure_hpa, barometer_mmhg, mercury_c, gravity, latitude_deg, elevation_m)
+    if pressure_hpa is None:
+        latitude = None if latitude_deg is None else latitude_deg * DEGREE
+        where = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
+        pressure_hpa = float(station_pressure_hpa(barometer_mmhg, mercury_c, **where))
+    state, u = air_by(
+        temperature_c,
+        pressure_hpa,
+        moisture,
+        above_barometer=above_barometer_m,
+        u_temperature_c=u_temperature_c,
+        u_pressure_hpa=u_pressure_hpa,
+        u_co2_ppm=u_co2_ppm,
+        wavelength_um=wavelength_um,
+        model=model,
+        co2_ppm=co2_ppm,
+    )
+    found = air_object(state, wavelength_um, u)
+    if json:
+        say(json_line(found))
+        return
+    for name, value in _rows(found):
+        say(wrapped(name, value))
+
+
+def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple[str, ...]]]) -> "Moisture":
+    """The one way in which the humidity was given, with its uncertainty."""
+    from catseye.reduction.air_routes import HYGROMETERS as kinds
+    from catseye.reduction.air_routes import Moisture
+
+    said = [kind for kind in kinds if given[kind] is not None]
+    if len(said) != 1:
+        ways = ", ".join(f"--{kind.replace('_', '-')}" for kind in kinds)
+        raise typer.BadParameter(f"give one of {ways}{', not several' if said else ''}.", param_hint="humidity")
+    kind = said[0]
+    for option, (u, kinds_of) in u_of.items():
+        if u > 0.0 and kind not in kinds_of:
+            raise typer.BadParameter(f"does not belong to --{kind.replace('_', '-')}.", param_hint=f"'--{option}'")
+    u = next(u for u, kinds_of in u_of.values() if kind in kinds_of)
+    return Moisture(kind, given[kind], u)
+
+
+def _one_pressure(
+    pressure: float | None,
+    mercury: float | None,
+    mercury_c: float | None,
+    gravity: float | None,
+    latitude: float | None,
+    elevation: float | None,
+) -> None:
+    """A pressure, or a mercury barometer with all that turns it into one."""
+    if (pressure is None) == (mercury is None):
+        raise typer.BadParameter("give --pressure-hpa or --barometer-mmhg, not both.", param_hint="pressure")
+    rest = (mercury_c, gravity, latitude, elevation)
+    if mercury is None:
+        if any(value is not None for value in rest):
+            raise typer.BadParameter(
+                "--mercury-c, --gravity, --latitude-deg and --elevation-m belong to --barometer-mmhg.",
+                param_hint="'--pressure-hpa'",
+            )
+        return
+    place = latitude is not None and elevation is not None
+    if mercury_c is None or (gravity is None) != place or (gravity is not None and (latitude or elevation)):
+        raise typer.BadParameter(
+            "needs --mercury-c, and --gravity or both --latitude-deg and --elevation-m.",
+            param_hint="'--barometer-mmhg'",
+        )
+
+
+def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+    slope = found["sensitivity"]
+    dew_point = f"{found['dew_point_c']:.2f} °C" if math.isfinite(found["dew_point_c"]) else "none"
+    carbon = (
+        f"{slope['co2_ppm'] * 1e8:+.4f} ppm per 100 ppm of carbon dioxide"
+        if slope["co2_ppm"]
+        else f"the formula's air has {found['co2_ppm']:.0f} ppm of carbon dioxide"
+    )
+    return [
+        ("group index", f"{found['group_index']:.9f}"),
+        ("phase index", f"{found['phase_index']:.9f}"),
+        ("uncertainty", f"{found['standard_uncertainty']:.2g} (of the group index, 1σ)"),
+        ("per °C", f"{slope['temperature_c'] * 1e6:+.4f} ppm"),
+        ("per hPa", f"{slope['pressure_hpa'] * 1e6:+.4f} ppm"),
+        ("per %", f"{slope['humidity_percent'] * 1e6:+.4f} ppm of relative humidity"),
+        ("per nm", f"{slope['wavelength_um'] * 1e3:+.4f} ppm of wavelength"),
+        ("CO2", carbon),
+        ("pressure", f"{found['pressure_hpa']:.3f} hPa"),
+        ("vapour", f"{found['vapour_pressure_hpa']:.3f} hPa, {found['humidity_percent']:.2f} %, dew point {dew_point}"),
+        ("modulation", f"{found['group_wavelength']:.9f} m a wavelength at 1500 MHz"),
+        ("formula", f"{found['model']}, {found['wavelength_um']:g} µm"),
+    ]

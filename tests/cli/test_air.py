@@ -1,0 +1,117 @@
+"""`catseye air`: every way in, and one line for what cannot be."""
+
+import json
+
+import pytest
+
+MERCURY = ("air", "--temperature-c", 20, "--humidity-percent", 50, "--barometer-mmhg", 700, "--mercury-c", 20)
+WEATHER = ("air", "--temperature-c", 20, "--pressure-hpa", 933)
+
+
+def asked(catseye, *arguments):
+    status, out, err = catseye("air", *arguments, "--json")
+    assert (status, err) == (0, "")
+    return json.loads(out)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--humidity-percent", 50), ("--dew-point-c", 9.2670999), ("--vapour-pressure-hpa", 11.7323187)],
+)
+def test_each_way_to_the_vapour_gives_the_notes_index(catseye, option, value):
+    found = asked(catseye, *WEATHER[1:], option, value, "--model", "rueger1990")
+    assert found["group_index"] == pytest.approx(1.000253246815, abs=1e-12)
+    assert found["group_wavelength"] == pytest.approx(0.199811037, abs=1e-9)
+    assert found["humidity_percent"] == pytest.approx(50.0, abs=1e-5)
+
+
+def test_wet_bulb_and_mercury(catseye):
+    place = ("--mercury-c", 20, "--latitude-deg", 38.45, "--elevation-m", 797.3)
+    found = asked(catseye, "--temperature-c", 20, "--wet-bulb-c", 14, "--barometer-mmhg", 700, *place)
+    assert found["pressure_hpa"] == pytest.approx(929.382, abs=1e-3)
+    assert found["vapour_pressure_hpa"] == pytest.approx(12.350, abs=1e-3)
+    measured = ("--mercury-c", 20, "--gravity", 9.79784)
+    again = asked(catseye, "--temperature-c", 20, "--wet-bulb-c", 14, "--barometer-mmhg", 700, *measured)
+    assert again["pressure_hpa"] == pytest.approx(929.382, abs=1e-3)
+
+
+def test_frost_and_ice_are_asked_for_by_name(catseye):
+    cold = ("--temperature-c", -5, "--pressure-hpa", 933)
+    frost = asked(catseye, *cold, "--frost-point-c", -5)["vapour_pressure_hpa"]
+    dew = asked(catseye, *cold, "--dew-point-c", -5)["vapour_pressure_hpa"]
+    assert frost / dew == pytest.approx(0.952, abs=0.002)  # ice holds 5 % less at -5 °C
+    assert asked(catseye, *cold, "--ice-bulb-c", -5)["vapour_pressure_hpa"] == pytest.approx(frost, rel=1e-9)
+
+
+def test_zero_degrees_and_zero_humidity_are_weather(catseye):
+    found = asked(catseye, "--temperature-c", 0, "--pressure-hpa", 1013.25, "--humidity-percent", 0)
+    assert found["vapour_pressure_hpa"] == 0.0
+    assert found["dew_point_c"] is None
+
+
+@pytest.mark.parametrize("model", ["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"])
+def test_every_model_of_the_contract(catseye, model):
+    found = asked(catseye, *WEATHER[1:], "--humidity-percent", 50, "--model", model, "--co2-ppm", 450)
+    assert found["model"] == model
+    assert found["group_index"] == pytest.approx(1.0002533, abs=1.5e-7)
+    assert set(found["sensitivity"]) >= {"temperature_c", "pressure_hpa", "humidity_percent"}
+    assert found["co2_ppm"] == {"ciddor_hill1999": 450.0, "iag1999_closed": 375.0}.get(model, 300.0)
+
+
+def test_uncertainties_of_the_instruments_add(catseye):
+    alone = asked(catseye, *WEATHER[1:], "--humidity-percent", 50)
+    both = asked(catseye, *WEATHER[1:], "--humidity-percent", 50, "--u-temperature-c", 0.3, "--u-co2-ppm", 100)
+    assert alone["standard_uncertainty"] == alone["formula_uncertainty"] == 5e-8
+    expected = (0.05**2 + (0.3 * 0.8921) ** 2 + 0.01338**2) ** 0.5
+    assert both["standard_uncertainty"] * 1e6 == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_text_says_what_the_object_says(catseye):
+    status, out, err = catseye(*WEATHER, "--humidity-percent", 50, "--model", "rueger1990")
+    assert (status, err) == (0, "")
+    assert "group index   1.000253247" in out
+    assert "per hPa       +0.2720 ppm" in out
+    assert "300 ppm of carbon dioxide" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((*WEATHER, "--humidity-percent", 120), "relative humidity 120 % is outside 0-100 %"),
+        ((*WEATHER, "--humidity-percent", "nan"), "relative humidity is not a number"),
+        ((*WEATHER[:4], 101325, "--humidity-percent", 50), "pressure 101325 hPa is outside 100-1400 hPa"),
+        (("air", "--temperature-c", -300, *WEATHER[3:], "--humidity-percent", 50), "temperature -300 C is outside"),
+        ((*WEATHER, "--humidity-percent", 50, "--wavelength-um", 10.6), "wavelength 10.6 um is outside"),
+        ((*WEATHER, "--humidity-percent", 50, "--co2-ppm", -1), "carbon dioxide -1 ppm is outside"),
+        ((*WEATHER, "--dew-point-c", 25), "over saturation"),
+        ((*WEATHER, "--wet-bulb-c", 25), "above the dry bulb"),
+        ((*WEATHER, "--frost-point-c", 5), "temperature of ice 5 °C is outside"),
+        ((*WEATHER, "--vapour-pressure-hpa", -1), "vapour pressure -1 hPa"),
+        ((*MERCURY, "--gravity", 979.784), "gravity 979.784 m/s² is outside"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_status_1(catseye, arguments, said):
+    status, out, err = catseye(*arguments)
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert said in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        WEATHER,
+        (*WEATHER, "--humidity-percent", 50, "--dew-point-c", 9),
+        (*WEATHER, "--humidity-percent", 50, "--barometer-mmhg", 700),
+        ("air", "--temperature-c", 20, "--humidity-percent", 50),
+        ("air", "--temperature-c", 20, "--humidity-percent", 50, "--barometer-mmhg", 700),
+        (*MERCURY, "--latitude-deg", 38),
+        (*WEATHER, "--humidity-percent", 50, "--gravity", 9.8),
+        (*WEATHER, "--humidity-percent", 50, "--u-dew-point-c", 0.2),
+        (*WEATHER, "--humidity-percent", 50, "--u-temperature-c", -1),
+        (*WEATHER, "--humidity-percent", 50, "--model", "edlen"),
+    ],
+)
+def test_what_was_asked_wrongly_is_status_2(catseye, arguments):
+    status, out, _ = catseye(*arguments)
+    assert (status, out) == (2, "")
