@@ -116,17 +116,17 @@ class Dispersion:
         """Derivative of the phase refractivity by the wavelength: ds = -2 s/wavelength dwavelength."""
         wavelength = np.asarray(wavelength_um, float)
         s = wavelength**-2.0
-        per_s = sum(k / (a - s) ** 2 for k, a in self.poles)
-        per_s = per_s + sum(i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
-        return -2.0 * self.scale * s / wavelength * per_s
+        poles = sum(k / (a - s) ** 2 for k, a in self.poles)
+        powers = sum(i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
+        return -2.0 * self.scale * s / wavelength * (poles + powers)
 
     def group_per_um(self, wavelength_um):
         """Derivative of the group refractivity by the wavelength."""
         wavelength = np.asarray(wavelength_um, float)
         s = wavelength**-2.0
-        per_s = sum(k * (3.0 * a + s) / (a - s) ** 3 for k, a in self.poles)
-        per_s = per_s + sum((2 * i + 1) * i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
-        return -2.0 * self.scale * s / wavelength * per_s
+        poles = sum(k * (3.0 * a + s) / (a - s) ** 3 for k, a in self.poles)
+        powers = sum((2 * i + 1) * i * c * s ** (i - 1) for i, c in enumerate(self.powers) if i)
+        return -2.0 * self.scale * s / wavelength * (poles + powers)
 
 
 @dataclass(frozen=True)
