@@ -22,7 +22,7 @@ MODELS: dict[str, Model] = {
     "barrell_sears1963": barrell_sears1963.MODEL,
 }
 KERNELS = {"ciddor_hill1999", "rueger1990"}  # those with a compiled form beside the plain one, `NAME_kernel.py`
-LARGE = 10**12  # TEMP until the kernels are in
+LARGE = 20_000  # states from which on the compiled form is worth loading
 
 MODULATION = Limit("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
 
@@ -284,7 +284,8 @@ def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         if np.prod(shape, dtype=int) >= LARGE:
             chosen.check(wavelength_um=wavelength_um, co2_ppm=co2_ppm)
-            flat = [np.ascontiguousarray(np.broadcast_to(array, shape)).ravel() for array in arrays]
+            # one value for all states stays one: the kernel knows
+            flat = [a.ravel() if a.size == 1 else np.broadcast_to(a, shape).ravel() for a in arrays]
             values, inside = _kernel(model)(*flat, *chosen.coefficients(wavelength_um, co2_ppm, kind))
             if inside:
                 return values.reshape(shape)
