@@ -28,7 +28,9 @@ SOURCES: dict[str, Source] = {
         locator="National Radio Astronomy Observatory, 29 April 2004",
         used="chapters 1 to 8: eqs. 1.1-1.53, 2.1-2.47, 3.1-3.7, 4.1-4.14, 5.1-5.19",
         errata=(
+            "1.11 names the local station pressure p_t, p_l is meant; there is no 1.17",
             "1.12 prints p_r where 1.18 uses the temperature-corrected p_t",
+            "1.22 prints 929.37 mb, truncated twice: 929.38",
             "1.31 prints + phi/2pi, 5.18 requires minus; 1.32-1.34 and 1.36-1.38 carry the wrong sign with it",
             "1.34 prints 6283 rad (c taken as 3e8 m/s); 1.32 gives 6287.535 rad",
             "2.14 and 5.4 print arctan(b/a): the quadrant matters",
@@ -39,6 +41,9 @@ SOURCES: dict[str, Source] = {
             "2.44 omits the plus signs between X_r and its offset",
             "3.1 says the coordinates are unique: three ranges give two points, mirror images in the stations' plane",
             "2.5 (example) says the y origin is the tooling ball of ZY2: z is meant",
+            "figure 1.1 (REFRACT.EQ) sets the wet bulb tp = t after the psychrometer's equations, which then see "
+            "saturated air",
+            "4.3 prints gamma_w = 1.004 for water vapour, about 1.33 is right: humid air 0.5 m/s faster at 20 °C, 50 %",
             "5.1.3 says the detected signal is mixed with 1500.000 MHz; 5.1.1, + IF, is right",
             "5.2: clipping on top shifts a single edge, not the average of both edges that the Clark-Hess meter takes",
             "5.9 prints -2pi/lambda/2; -2pi/(lambda/2) is meant",
@@ -79,7 +84,8 @@ SOURCES: dict[str, Source] = {
     "RUEGER90": Source(
         title="J. M. Rüeger, Electronic Distance Measurement: An Introduction, third edition, Springer, 1990",
         locator="doi:10.1007/978-3-642-97196-9",
-        used="eqs. 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them; velocity corrections",
+        used="eqs. 5.23, 5.24, 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them; velocity "
+        "corrections; the resolutions of 1960 and 1963 with BARRELL39's formula",
     ),
     "OWENS67": Source(
         title="J. C. Owens, Optical refractive index of air: dependence on pressure, temperature and composition, 1967",
@@ -109,7 +115,7 @@ SOURCES: dict[str, Source] = {
     "IAG99": Source(
         title="International Association of Geodesy, resolution 3 of the XXII General Assembly, Birmingham, 1999",
         locator="IUGG XXII General Assembly, July 1999, IAG resolution 3",
-        used="the choice of CIDDOR96 with CIDDOR99 for work better than 1 ppm",
+        used="the choice of CIDDOR96 with CIDDOR99 for work better than 1 ppm; the closed formula for other work",
     ),
     "IAPWS97": Source(
         title="IAPWS, Revised release on the industrial formulation 1997 for water and steam, 2012",
@@ -119,7 +125,7 @@ SOURCES: dict[str, Source] = {
     "MURPHY05": Source(
         title="D. M. Murphy and T. Koop, Review of the vapour pressures of ice and supercooled water, 2005",
         locator="doi:10.1256/qj.04.94",
-        used="eq. 10: vapour pressure of supercooled water, as a yardstick below 0 °C",
+        used="eqs. 7 and 10: vapour pressure of ice and of supercooled water, as yardsticks below 0 °C",
     ),
     "BAARDA68": Source(
         title="W. Baarda, A testing procedure for use in geodetic networks, 1968",
@@ -461,5 +467,50 @@ SOURCES: dict[str, Source] = {
         title="ISO 2533:1975, Standard Atmosphere",
         locator="International Organization for Standardization, Geneva, 1975",
         used="section 2: pressure by height in the troposphere",
+    ),
+    "BARRELL39": Source(
+        title="H. Barrell and J. E. Sears, The refraction and dispersion of air for the visible spectrum, 1939",
+        locator="doi:10.1098/rsta.1939.0004",
+        used="coefficients 287.604, 1.6288, 0.0136 and 5.5e-8 a mm Hg of vapour, as RUEGER90 quotes the resolutions",
+    ),
+    "IAPWS11": Source(
+        title="IAPWS, Revised release on the pressure along the melting and sublimation curves of ordinary water, 2011",
+        locator="IAPWS R14-08(2011); doi:10.1063/1.3657937",
+        used="eq. 6: sublimation pressure; its check value at 230 K",
+    ),
+    "GREENSPAN76": Source(
+        title="L. Greenspan, Functional equations for the enhancement factors for CO2-free moist air, 1976",
+        locator="doi:10.6028/jres.080A.007",
+        used="enhancement of saturation over ice, -100 to 0 °C",
+    ),
+    "WMO18": Source(
+        title="WMO, Guide to instruments and methods of observation, WMO-No. 8, 2018",
+        locator="WMO-No. 8, volume I, annex 4.B",
+        used="psychrometer and saturation formulas, as a yardstick",
+    ),
+    "BERDAHL84": Source(
+        title="P. Berdahl and M. Martin, Emissivity of clear skies, Solar Energy 32, 1984",
+        locator="doi:10.1016/0038-092X(84)90144-0",
+        used="emissivity of a clear sky by dew point, hour and pressure",
+    ),
+    "WATMUFF77": Source(
+        title="J. H. Watmuff, W. W. S. Charters and D. Proctor, Solar and wind induced external coefficients, 1977",
+        locator="Revue Internationale d'Héliotechnique (COMPLES) 2, page 56",
+        used="heat transfer 2.8 + 3.0 wind, to 7 m/s",
+    ),
+    "SMITHSON51": Source(
+        title="R. J. List, Smithsonian Meteorological Tables, sixth revised edition, 1951",
+        locator="Smithsonian Miscellaneous Collections 114, publication 4014",
+        used="gravity by latitude, table 167 (elevation), mercury and brass, as PARKER04 quotes them",
+    ),
+    "MORITZ80": Source(
+        title="H. Moritz, Geodetic reference system 1980",
+        locator="doi:10.1007/s001900050278",
+        used="Somigliana's formula, its constants, gravity at equator and pole",
+    ),
+    "ICAO93": Source(
+        title="ICAO, Manual of the ICAO standard atmosphere, third edition, 1993",
+        locator="ICAO Doc 7488/3",
+        used="pressure in a layer with a straight lapse; its table as test values",
     ),
 }

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import mp
 
 from catseye.atmosphere import humidity
 from catseye.errors import ValidityError
@@ -77,3 +80,163 @@ def test_zero_celsius_and_zero_humidity_are_legal(formula):
 def test_an_unknown_formula_is_refused_by_name():
     with pytest.raises(ValidityError, match="'magnus' is unknown; choose one of buck, ciddor, iapws"):
         humidity.saturation(20.0, 933.0, "magnus")
+
+
+def murphy_koop_ice_hpa(temperature_c):
+    """[MURPHY05] eq. 7, ice above 110 K, typed here as an outside yardstick."""
+    k = temperature_c + 273.15
+    return np.exp(9.550426 - 5723.265 / k + 3.53068 * np.log(k) - 0.00728332 * k) / 100.0
+
+
+@pytest.mark.parametrize(("temperature_c", "within"), [(0.0, 1e-6), (-20.0, 1.5e-4), (-40.0, 2.5e-4), (-80.0, 6.5e-4)])
+def test_sublimation_is_as_good_as_its_docstring_says(temperature_c, within):
+    ratio = humidity.sublimation_pressure_hpa(temperature_c) / murphy_koop_ice_hpa(temperature_c)
+    assert float(ratio) == pytest.approx(1.0, abs=within)
+
+
+def test_ice_and_water_meet_at_the_triple_point_of_the_releases():
+    ice, water = humidity.sublimation_pressure_hpa(0.01), humidity.iapws_saturation_pressure_hpa(0.01)
+    assert float(ice) == pytest.approx(6.11657, abs=1e-9)
+    assert float(water / ice) == pytest.approx(1.0, abs=1e-5)  # IF97 gives 611.657 Pa to its last digit
+
+
+# enhancement over ice of the IAPWS virial coefficients B and C of moist air (package iapws 1.5.5 on PyPI), worked out
+# once outside this project: hPa, °C, factor
+VIRIAL = [
+    (700.0, -0.01, 1.003052), (700.0, -20.0, 1.003249), (700.0, -40.0, 1.003879),
+    (933.0, -0.01, 1.003904), (933.0, -20.0, 1.004283), (933.0, -40.0, 1.005163),
+    (1013.25, -0.01, 1.004198), (1013.25, -20.0, 1.004639), (1013.25, -40.0, 1.005606),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("pressure_hpa", "temperature_c", "expected"), VIRIAL)
+def test_the_enhancement_over_ice_is_as_good_as_its_docstring_says(pressure_hpa, temperature_c, expected):
+    moist = humidity.ice_saturation(temperature_c, pressure_hpa, "iapws").pressure_hpa
+    factor = moist / humidity.sublimation_pressure_hpa(temperature_c)
+    below = expected - float(factor)
+    assert 1.5e-4 < below < 6.5e-4  # Greenspan's is the lower one throughout
+    assert below == pytest.approx(2e-4 - 1e-5 * temperature_c, abs=1e-4)
+
+
+def test_both_formulas_over_ice_agree_as_the_docstring_says():
+    t = np.linspace(-40.0, 0.0, 41)
+    for p in (500.0, 933.0, 1100.0):
+        ratio = humidity.ice_saturation(t, p, "buck").pressure_hpa / humidity.ice_saturation(t, p, "iapws").pressure_hpa
+        assert np.all(np.abs(ratio - 1.0) < 1e-3)
+    cold = [humidity.ice_saturation(-80.0, 933.0, f).pressure_hpa for f in ("buck", "iapws")]
+    assert float(cold[0] / cold[1]) == pytest.approx(0.989, abs=2e-3)
+
+
+def high_precision(formula, over_ice):
+    """Saturation in hPa as a function of two mpf: the printed formulas again, typed from the sources."""
+
+    def buck(t, p):
+        if over_ice:
+            return (
+                mp.mpf("6.1115")
+                * (mp.mpf("1.0003") + mp.mpf("4.18e-6") * p)
+                * mp.exp(mp.mpf("22.452") * t / (mp.mpf("272.55") + t))
+            )
+        return (
+            mp.mpf("6.1121")
+            * (mp.mpf("1.0007") + mp.mpf("3.46e-6") * p)
+            * mp.exp(mp.mpf("17.502") * t / (mp.mpf("240.97") + t))
+        )
+
+    def ciddor(t, p):
+        k = t + mp.mpf("273.15")
+        pure = mp.exp(mp.mpf("1.2378847e-5") * k**2 - mp.mpf("1.9121316e-2") * k + mp.mpf("33.93711047")
+                      - mp.mpf("6.3431645e3") / k) / 100  # fmt: skip
+        return (mp.mpf("1.00062") + mp.mpf("3.14e-6") * p + mp.mpf("5.6e-7") * t**2) * pure
+
+    def iapws(t, p):
+        theta = (t + mp.mpf("273.15")) / mp.mpf("273.16")
+        terms = (("-0.212144006e2", "0.333333333e-2"), ("0.273203819e2", "0.120666667e1"),
+                 ("-0.610598130e1", "0.170333333e1"))  # fmt: skip
+        e = mp.mpf("6.11657") * mp.exp(sum(mp.mpf(a) * theta ** mp.mpf(b) for a, b in terms) / theta)
+        alpha = mp.mpf("3.64449e-4") + t * (
+            mp.mpf("2.93631e-5") + t * (mp.mpf("4.88635e-7") + t * mp.mpf("4.36543e-9"))
+        )
+        beta = mp.exp(
+            mp.mpf("-10.7271") + t * (mp.mpf("7.61989e-2") + t * (mp.mpf("-1.74771e-4") + t * mp.mpf("2.46721e-6")))
+        )
+        return e * mp.exp(alpha * (1 - e / p) + beta * (p / e - 1))
+
+    return {"buck": buck, "ciddor": ciddor, "iapws": iapws}[formula]
+
+
+@pytest.mark.parametrize(("formula", "over_ice"), [("buck", False), ("ciddor", False), ("buck", True), ("iapws", True)])
+@pytest.mark.parametrize(("temperature_c", "pressure_hpa"), [(-35.0, 600.0), (-10.0, 933.0), (-0.5, 1080.0)])
+def test_values_and_slopes_are_those_of_the_formula_in_high_precision(formula, over_ice, temperature_c, pressure_hpa):
+    at = (humidity.ice_saturation if over_ice else humidity.saturation)(temperature_c, pressure_hpa, formula)
+    exact = high_precision(formula, over_ice)
+    with mp.workdps(40):
+        t, p = mp.mpf(temperature_c), mp.mpf(pressure_hpa)
+        expected = [exact(t, p), mp.diff(lambda x: exact(x, p), t), mp.diff(lambda x: exact(t, x), p)]
+    # 1e-12: exponents near 20 lose four digits of sixteen
+    np.testing.assert_allclose([float(v) for v in at], [float(v) for v in expected], rtol=1e-12)
+
+
+temperatures = st.floats(-40.0, 50.0)
+pressures = st.floats(500.0, 1100.0)
+
+
+@given(temperatures, pressures, st.floats(0.1, 100.0), st.sampled_from(FORMULAS))
+def test_a_dew_point_gives_back_its_vapour_pressure_and_relative_humidity_its_own(t, p, h, formula):
+    e = humidity.vapour_pressure_hpa(t, p, h, formula)
+    dew = humidity.dew_point_c(e, p, formula)
+    assert float(dew) <= t + 1e-9
+    back = humidity.vapour_pressure_of_dew_point_hpa(dew, p, formula)
+    assert float(back) == pytest.approx(float(e), rel=1e-10)  # 1e-9 °C is 1e-10 of the pressure
+    assert float(humidity.relative_humidity_percent(e, t, p, formula)) == pytest.approx(h, rel=1e-12)
+
+
+@given(st.floats(-95.0, 0.0), pressures, st.sampled_from(["buck", "iapws"]))
+def test_a_frost_point_gives_back_its_vapour_pressure_and_lies_above_the_dew_point(frost, p, formula):
+    e = humidity.vapour_pressure_of_frost_point_hpa(frost, p, formula)
+    assert float(humidity.frost_point_c(e, p, formula)) == pytest.approx(frost, abs=1e-8)
+    # at 0 °C Buck's two fits cross by 0.02 %, 0.002 °C
+    assert float(humidity.dew_point_c(e, p, "buck")) < frost + 0.01 or formula == "iapws"
+    assert float(humidity.relative_humidity_percent(e, frost, p, formula, over_ice=True)) == pytest.approx(100.0)
+
+
+def test_relative_humidity_over_ice_is_the_higher_number_for_the_same_vapour():
+    e = 2.0
+    over_water = humidity.relative_humidity_percent(e, -10.0, 933.0)
+    over_ice = humidity.relative_humidity_percent(e, -10.0, 933.0, over_ice=True)
+    assert float(over_ice / over_water) == pytest.approx(
+        2.8627 / 2.5970, rel=1e-3
+    )  # Smithsonian tables, pure water, ice
+    assert float(humidity.vapour_pressure_hpa(-10.0, 933.0, over_ice, over_ice=True)) == pytest.approx(e, rel=1e-14)
+
+
+@pytest.mark.parametrize("formula", ["buck", "iapws"])
+def test_moist_or_perfectly_dry_air_has_no_frost_point_and_says_nan_without_a_warning(formula):
+    got = humidity.frost_point_c(np.array([0.0, 1e-3, 3.0, 6.2, 20.0]), 933.0, formula)
+    np.testing.assert_array_equal(np.isnan(got), [True, False, False, True, True])
+
+
+@pytest.mark.parametrize(
+    ("call", "text", "mask"),
+    [
+        (lambda: humidity.ice_saturation([-1.0, 0.5], 933.0), "temperature of ice 0.5 °C", [False, True]),
+        (lambda: humidity.ice_saturation(-1.0, 101325.0), "pressure 101325 hPa is outside 100-1400 hPa", None),
+        (lambda: humidity.ice_saturation(-1.0, 933.0, "ciddor"), "unknown over ice; choose one of buck, iapws", None),
+        (lambda: humidity.frost_point_c(1.0, 933.0, "ciddor"), "unknown over ice", None),
+        (lambda: humidity.dew_point_c(1.0, 933.0, "magnus"), "'magnus' is unknown; choose", None),
+        (lambda: humidity.vapour_pressure_of_dew_point_hpa(-300.0, 933.0), "dew point -300 °C", None),
+        (lambda: humidity.vapour_pressure_of_dew_point_hpa(np.nan, 933.0), "dew point is not a number", None),
+        (lambda: humidity.vapour_pressure_of_frost_point_hpa([1.0, -1.0], 933.0), "frost point 1 °C", [True, False]),
+        (lambda: humidity.relative_humidity_percent(-0.1, 20.0, 933.0), "vapour pressure -0.1 hPa", None),
+        (lambda: humidity.relative_humidity_percent(1.0, 20.0, 933.0, over_ice=True), "temperature of ice 20", None),
+    ],
+)
+def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text, mask):
+    with pytest.raises(ValidityError, match=text) as refused:
+        call()
+    assert mask == (None if refused.value.mask is None else refused.value.mask.tolist())
+
+
+def test_zero_celsius_is_a_legal_dew_and_frost_point():
+    assert float(humidity.vapour_pressure_of_dew_point_hpa(0.0, 933.0)) == pytest.approx(6.136, abs=1e-3)
+    assert float(humidity.vapour_pressure_of_frost_point_hpa(0.0, 933.0)) == pytest.approx(6.137, abs=1e-3)

@@ -49,6 +49,20 @@ def test_zero_degrees_and_zero_humidity_are_weather(catseye):
     assert found["dew_point_c"] is None
 
 
+def test_a_cold_retroreflector_is_warned_of(catseye):
+    cool = ("--temperature-c", 10, "--pressure-hpa", 933, "--humidity-percent", 75)
+    found = asked(catseye, *cool, "--surface-c", 5, "--u-surface-c", 0.5)["condensation"]
+    assert (found["deposit"], found["threat"]) == ("dew", "dew")
+    assert found["margin_k"] == pytest.approx(5.0 - 5.78, abs=0.02)  # dew point of 75 % at 10 °C: 5.8 °C
+    assert 0.9 < found["probability"] < 0.98
+    assert "condensation" not in asked(catseye, *cool)
+    status, out, _ = catseye("air", *cool, "--surface-c", 5)
+    assert status == 0
+    assert "surface       dew: 0.8 K below the dew point" in out
+    dry = asked(catseye, "--temperature-c", 0, "--pressure-hpa", 933, "--humidity-percent", 0, "--surface-c", 0)
+    assert dry["condensation"]["margin_k"] is None
+
+
 @pytest.mark.parametrize("model", ["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"])
 def test_every_model_of_the_contract(catseye, model):
     found = asked(catseye, *WEATHER[1:], "--humidity-percent", 50, "--model", model, "--co2-ppm", 450)

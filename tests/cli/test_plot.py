@@ -73,3 +73,18 @@ def test_what_cannot_be_drawn_says_so(catseye, tmp_path, monkeypatch, arguments,
     assert (done, said) == (status, "")
     assert complaint in " ".join(problem.replace("│", " ").split())
     assert not list(tmp_path.iterdir())
+
+
+def test_the_airs_figure_says_its_index_and_what_makes_it_uncertain(catseye, tmp_path):
+    out = tmp_path / "air.svg"
+    state = ["--temperature-c", 20, "--pressure-hpa", 933, "--humidity-percent", 50, "--model", "rueger1990"]
+    status, said, complaint = catseye("plot", "air", *state, "--u-temperature-c", 0.3, "--out", out, "--json")
+    assert (status, complaint) == (0, "")
+    found = json.loads(said, parse_constant=pytest.fail)
+    assert found["group_refractivity_ppm"] == pytest.approx(253.246815, abs=1e-6)
+    assert found["u_of_temperature_ppm"] == pytest.approx(0.3 * 0.895887, rel=1e-5)
+    assert ET.fromstring(out.read_text(encoding="utf-8")).tag.endswith("svg")
+    status, said, complaint = catseye("plot", "air", "--temperature-c", 120, "--out", tmp_path / "none.svg")
+    assert (status, said) == (1, "")
+    assert "temperature 120 C is outside" in complaint
+    assert not (tmp_path / "none.svg").exists()

@@ -59,11 +59,15 @@ def air(
     u_wet_bulb_c: Annotated[float, typer.Option(help="Of the wet bulb, water or ice, °C.", **U)] = 0.0,
     u_vapour_pressure_hpa: Annotated[float, typer.Option(help="Of the vapour pressure, hPa.", **U)] = 0.0,
     u_co2_ppm: Annotated[float, typer.Option(help="Of the carbon dioxide, ppm.", **U)] = 0.0,
+    surface_c: Annotated[
+        float | None, typer.Option("--surface-c", help="A retroreflector's temperature, °C: will it dew or frost over?")
+    ] = None,
+    u_surface_c: Annotated[float, typer.Option(help="Of the surface's temperature, °C.", **U)] = 0.0,
     json: Json = False,
 ) -> None:
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
     from catseye.gateways.objects import air_object, json_line
-    from catseye.reduction.air_routes import air_by, station_pressure_hpa
+    from catseye.reduction.air_routes import air_by, station_pressure_hpa, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -98,11 +102,16 @@ def air(
         co2_ppm=co2_ppm,
     )
     found = air_object(state, wavelength_um, u)
+    if surface_c is not None:
+        surface = surface_of(state, surface_c, u_surface_c, u_temperature_c)
+        found["condensation"] = surface._asdict()
     if json:
         say(json_line(found))
         return
     for name, value in _rows(found):
         say(wrapped(name, value))
+    if surface_c is not None:
+        say(wrapped("surface", surface.lines()[0]))
 
 
 def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple[str, ...]]]) -> "Moisture":

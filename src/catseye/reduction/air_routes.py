@@ -10,6 +10,7 @@ import numpy as np
 
 from catseye.atmosphere import barometer, hygrometer
 from catseye.atmosphere.air import MODELS, Air, air, air_of_vapour, group_partials
+from catseye.atmosphere.condensation import Condensation, condensation
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
@@ -98,6 +99,30 @@ def air_by(
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
     formula = np.hypot(found.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
     return found, vapour.index_uncertainty(partials, moisture.u, **u, u_model=formula)
+
+
+def surface_of(state: Air, surface_c, u_surface_c=0.0, u_temperature_c=0.0) -> Condensation:
+    """Whether a surface in this air will dew or frost over.
+
+    state             the air
+    surface_c         temperature of the surface, °C
+    u_surface_c       its standard uncertainty, °C
+    u_temperature_c   that of the air's temperature, °C
+
+    >>> found, _ = air_by(10.0, 933.0, Moisture("humidity_percent", 75.0))
+    >>> str(surface_of(found, 5.0).deposit)
+    'dew'
+    """
+    # to rounding and the formulas' 0.2 % air may be a little more than saturated; the surface's answer is the same
+    humidity = np.minimum(state.humidity_percent, 100.0)
+    return condensation(
+        surface_c,
+        state.temperature_c,
+        state.pressure_hpa,
+        humidity,
+        u_surface_c=u_surface_c,
+        u_temperature_c=u_temperature_c,
+    )
 
 
 def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrometer.Reading:

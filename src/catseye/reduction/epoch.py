@@ -6,6 +6,7 @@ from threadpoolctl import threadpool_limits
 
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.reduction.coordinates import Coordinates, adjust_coordinates
+from catseye.reduction.dew import dew_risk
 from catseye.reduction.places import sheet_notes
 from catseye.reduction.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases, walk_notes
 from catseye.reduction.settings import Settings
@@ -61,6 +62,7 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
         *sheet_notes(campaign),
         *_weak_rangers(campaign, phases),
         *walk_notes(campaign, phases, wrong),
+        *dew_risk(campaign, surface_minus_air_c=settings.surface_minus_air_c).notes,
         *([missing] if missing else []),
     ]
     return Reduction(
