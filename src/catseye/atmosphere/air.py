@@ -22,7 +22,7 @@ MODELS: dict[str, Model] = {
     "barrell_sears1963": barrell_sears1963.MODEL,
 }
 KERNELS = {"ciddor_hill1999", "rueger1990"}  # those with a compiled form beside the plain one, `NAME_kernel.py`
-LARGE = 20_000  # states from which on the compiled form is worth loading
+LARGE = 200_000  # states from which on the compiled form is worth loading: 0.7 s, once
 
 MODULATION = Limit("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
 

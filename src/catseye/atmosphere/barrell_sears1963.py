@@ -24,7 +24,7 @@ MODEL = Model(
     densities=densities,
     density_slopes=density_slopes,
     vapour_formula="buck",
-    # 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %; 3.1e-7 at most
+    # 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers; 3.1e-7 at most
     standard_uncertainty=1e-7,
     limits=limits("[RUEGER90]"),
     co2_ppm=300.0,

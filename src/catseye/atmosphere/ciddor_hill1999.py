@@ -143,7 +143,7 @@ def _standard_zt(temperature_c, pressure_pa, vapour_fraction):
     return float(z * (temperature_c + ZERO_CELSIUS_K) / pressure_pa)
 
 
-# Refractivities add in proportion to density ([CIDDOR96] eq. 5); the Lorentz-Lorenz sum differs by up to 3e-9 and does
+# Refractivities add in proportion to density ([CIDDOR96] eq. 5); the Lorentz-Lorenz sum differs by up to 4e-9 and does
 # not reproduce the tables. Today's [IAPWS97] saturation changes the index of saturated air by less than 1e-10 to 30 °C.
 MODEL = Model(
     name="ciddor_hill1999",

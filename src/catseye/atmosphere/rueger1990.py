@@ -1,6 +1,6 @@
 """The notes' air: Rüeger's 1990 book, with Owens' density factors. The model of record for reproducing the notes.
 
-It lies up to 0.1 ppm below `ciddor_hill1999` in ordinary weather and 0.3 ppm when hot and saturated
+It lies up to 0.1 ppm below `ciddor_hill1999` in ordinary weather, 0.3 ppm when hot and saturated, 0.5 ppm at 45 °C
 (`tests/atmosphere/test_models_agree.py` measures it): for new work take that one.
 """
 

@@ -1,0 +1,250 @@
+"""Figure of the index of air as SVG text: against each variable, its uncertainty, and every other model beside it.
+
+The index moves by tens of ppm where its uncertainty is a tenth. So each variable has two panels: above the index;
+below, enlarged, what the other models differ from the chosen one, over its uncertainty as bands.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.atmosphere.air import MODELS, Air, air
+from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.atmosphere.model import Limit, Model
+from catseye.constants import PPM
+from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+
+WIDTH, HEIGHT = 9.4, 10.4  # inches
+POINTS = 121
+NAMES = {  # for readers; a model without one goes by its own
+    "ciddor_hill1999": "Ciddor, Hill 1999",
+    "rueger1990": "Rüeger 1990 (the notes)",
+    "iag1999_closed": "IAG 1999, closed formula",
+    "barrell_sears1963": "Barrell, Sears 1963",
+}
+COLOURS = {name: SERIES[i % len(SERIES)] for i, name in enumerate(MODELS)}
+DISTANCE = 100.0  # m, over which the bars say micrometres
+UNCERTAINTIES = {
+    "u_temperature_c": Limit("u of temperature", "C", 0.0, 100.0, "the notion of a small standard uncertainty", 1),
+    "u_pressure_hpa": Limit("u of pressure", "hPa", 0.0, 1000.0, "the notion of a small standard uncertainty", 1),
+    "u_humidity_percent": Limit("u of humidity", "%", 0.0, 100.0, "the notion of a small standard uncertainty", 1),
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of the figure.
+
+    key      the argument that it is
+    label    of the axis
+    around   half the width drawn about the given state; None for `ends`
+    ends     drawn whatever the state; the given value is always within
+    """
+
+    key: str
+    label: str
+    around: float | None
+    ends: tuple[float, float] = (0.0, 0.0)
+
+    def values(self, given: float, model: Model) -> NDArray[np.float64]:
+        """What is drawn of it, within the model's limits."""
+        low, high = self.ends if self.around is None else (given - self.around, given + self.around)
+        limit = model.limits[self.key]
+        return np.linspace(max(min(low, given), limit.lower), min(max(high, given), limit.upper), POINTS)
+
+
+VARIABLES = (
+    Variable("temperature_c", "temperature (°C)", 15.0),
+    Variable("pressure_hpa", "pressure (hPa)", 50.0),
+    Variable("humidity_percent", "relative humidity (%)", None, (0.0, 100.0)),
+    Variable("wavelength_um", "wavelength (µm)", None, (0.4, 1.6)),
+    Variable("co2_ppm", "carbon dioxide (ppm)", None, (300.0, 1000.0)),
+)
+
+
+def air_plot(
+    temperature_c: float,
+    pressure_hpa: float,
+    humidity_percent: float,
+    *,
+    wavelength_um: float = 0.780,
+    model: str = "ciddor_hill1999",
+    co2_ppm: float = 450.0,
+    u_temperature_c: float = 0.0,
+    u_pressure_hpa: float = 0.0,
+    u_humidity_percent: float = 0.0,
+) -> tuple[str, dict[str, Any]]:
+    """The group index about one state of air as SVG text, and what it says in numbers.
+
+    temperature_c, pressure_hpa, humidity_percent   the state: °C, hPa, % over liquid water
+    wavelength_um   vacuum wavelength, um
+    model           a name in MODELS
+    co2_ppm         carbon dioxide, ppm, where a model has it
+    u_temperature_c, u_pressure_hpa, u_humidity_percent   standard uncertainties of the state, from 0; uncorrelated
+
+    Source: the models'; uncertainty by the law of propagation, [JCGM100] eq. 10. Other models are drawn only where they
+    hold, and named in `not_drawn` where they hold nowhere in the figure.
+
+    Raises ValidityError for values outside the chosen model's limits, and for uncertainties that are none.
+    """
+    u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa, "u_humidity_percent": u_humidity_percent}
+    for key, value in u.items():
+        UNCERTAINTIES[key].check(value)
+    state = {
+        "temperature_c": float(temperature_c),
+        "pressure_hpa": float(pressure_hpa),
+        "humidity_percent": float(humidity_percent),
+        "wavelength_um": float(wavelength_um),
+        "co2_ppm": float(co2_ppm),
+    }
+    here = air(**state, model=model)
+    parts = _parts(here, u)
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+        panels = figure.subplots(4, 3, height_ratios=(1.0, 0.9, 1.0, 0.9))
+        pairs = [(panels[row, column], panels[row + 1, column]) for row in (0, 2) for column in range(3)]
+        drawn: set[str] = set()
+        for variable, (above, below) in zip(VARIABLES, pairs, strict=False):
+            drawn |= _draw(above, below, variable, state, model, u)
+        _draw_parts(figure, pairs[-1], parts)
+        pairs[0][0].set_ylabel("group refractivity (ppm)")
+        pairs[3][0].set_ylabel("group refractivity (ppm)")
+        pairs[0][1].set_ylabel("others less this (ppm)")
+        pairs[3][1].set_ylabel("others less this (ppm)")
+        not_drawn = sorted(set(MODELS) - drawn - {model})
+        figure.suptitle(_title(state, here, not_drawn), x=0.01, ha="left", fontweight="bold", fontsize=10.5)
+        figure.legend(*_key(pairs), loc="outside lower left", ncols=3)
+        text = svg(figure)
+    return text, _told(state, here, parts, not_drawn)
+
+
+def _parts(here: Air, u: dict[str, float]) -> dict[str, float]:
+    """Standard uncertainty of the index, ppm, by where it comes from."""
+    slope = here.sensitivity
+    return {
+        "formula": float(here.standard_uncertainty) / PPM,
+        "temperature": abs(float(slope.temperature_c)) * u["u_temperature_c"] / PPM,
+        "pressure": abs(float(slope.pressure_hpa)) * u["u_pressure_hpa"] / PPM,
+        "humidity": abs(float(slope.humidity_percent)) * u["u_humidity_percent"] / PPM,
+        "together": float(here.combined_uncertainty(**u)) / PPM,
+    }
+
+
+def _draw(above, below, variable: Variable, state: dict[str, float], model: str, u: dict[str, float]) -> set[str]:
+    """One variable: index above, other models' differences and the uncertainty below; names of the others drawn."""
+    x = variable.values(state[variable.key], MODELS[model])
+    x = x[_inside(MODELS[model], state | {variable.key: x}, x.shape)]
+    swept = air(**(state | {variable.key: x}), model=model)
+    index = np.broadcast_to(swept.group_refractivity / PPM, x.shape)
+    whole = np.broadcast_to(swept.combined_uncertainty(**u) / PPM, x.shape)
+    formula = np.full(x.shape, swept.standard_uncertainty / PPM)
+    own = COLOURS[model]
+    above.fill_between(x, index - whole, index + whole, color=own, alpha=0.25, lw=0)
+    above.plot(x, index, color=own, lw=1.4)
+    for ax in (above, below):
+        ax.axvline(state[variable.key], color=FAINT, lw=0.8, ls=":")
+        ax.set_xlim(x[0], x[-1])
+        ax.ticklabel_format(useOffset=False)
+    above.tick_params(labelbottom=False)
+    above.set_title(_slope(variable, state, model), fontweight="normal", fontsize=8.5)
+    if np.any(whole > formula):
+        below.fill_between(x, -whole, whole, color=own, alpha=0.16, lw=0, label="u with the inputs'")
+    below.fill_between(x, -formula, formula, color=own, alpha=0.28, lw=0, label="u of the formula")
+    below.axhline(0.0, color=own, lw=1.4, label=_name(model))
+    found = set()
+    for name in MODELS:
+        if name == model:
+            continue
+        inside = _inside(MODELS[name], state | {variable.key: x}, x.shape)
+        if np.any(inside):
+            other = np.full(x.shape, np.nan)
+            there = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
+            other[inside] = air(**there, model=name).group_refractivity / PPM
+            below.plot(x, other - index, color=COLOURS[name], lw=1.2, label=_name(name))
+            found.add(name)
+    below.set_xlabel(variable.label)
+    return found
+
+
+def _name(model: str) -> str:
+    return NAMES.get(model, model)
+
+
+def _slope(variable: Variable, state: dict[str, float], model: str) -> str:
+    if variable.key == "co2_ppm" and not MODELS[model].co2_slope:
+        return f"fixed at {MODELS[model].co2_ppm:.0f} ppm in this model"
+    unit = variable.label.split("(")[1].rstrip(")")
+    slope = float(getattr(air(**state, model=model).sensitivity, variable.key)) / PPM
+    if variable.key == "co2_ppm":  # a single ppm moves nothing that a reader could compare
+        slope, unit = 100.0 * slope, f"100 {unit}"
+    return f"{slope:+.4f} ppm per {unit} here".replace("-", "−")
+
+
+def _inside(model: Model, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Where a model holds: within its limits, and with room for the vapour."""
+    inside = np.ones(shape, bool)
+    for key, value in values.items():
+        inside &= (model.limits[key].lower <= value) & (value <= model.limits[key].upper)
+    t, p, h = (values[key] for key in ("temperature_c", "pressure_hpa", "humidity_percent"))
+    return inside & (vapour_pressure_hpa(t, p, h, model.vapour_formula) <= p)
+
+
+def _draw_parts(figure: Figure, pair, parts: dict[str, float]) -> None:
+    """What makes the uncertainty at the state, as bars over both panels' place."""
+    grid = pair[0].get_gridspec()
+    for ax in pair:
+        ax.remove()
+    ax = figure.add_subplot(grid[2:, 2])
+    names, values = list(parts), list(parts.values())
+    at = np.arange(len(names))
+    ax.barh(at, values, 0.6, color=[*(FAINT,) * (len(names) - 1), INK])
+    ax.set_yticks(at, names)
+    ax.invert_yaxis()
+    ax.grid(visible=False, axis="y")
+    ax.set_xlim(0.0, 1.55 * max(values))
+    for row, value in zip(at, values, strict=True):
+        ax.annotate(
+            f"{value:.3f} ppm\n{value * PPM * DISTANCE * 1e6:.1f} µm", (value, row), xytext=(4, 0),
+            textcoords="offset points", va="center", fontsize=8,
+        )  # fmt: skip
+    ax.set_title(f"u at this state; µm in {DISTANCE:.0f} m")
+    ax.set_xlabel("standard uncertainty (ppm)")
+
+
+def _key(pairs) -> tuple[list, list]:
+    """Handles and labels of all that is drawn below, once each."""
+    found: dict[str, Any] = {}
+    for _, below in pairs[:-1]:
+        for handle, label in zip(*below.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    return list(found.values()), list(found)
+
+
+def _title(state: dict[str, float], here: Air, not_drawn: list[str]) -> str:
+    text = (
+        f"{_name(here.model)} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
+        f"{state['humidity_percent']:g} %, {state['wavelength_um']:g} µm: group refractivity "
+        f"{float(here.group_refractivity) / PPM:.3f} ppm"
+    )
+    names = "; ".join(_name(name) for name in not_drawn)
+    return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
+
+
+def _told(state: dict[str, float], here: Air, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
+    differences = {}
+    for name, model in MODELS.items():
+        if name != here.model and bool(_inside(model, state, ()).all()):
+            other = float(air(**state, model=name).group_refractivity)
+            differences[name] = (other - float(here.group_refractivity)) / PPM
+    return {
+        "model": here.model,
+        "group_refractivity_ppm": float(here.group_refractivity) / PPM,
+        "u_group_refractivity_ppm": parts["together"],
+        **{f"u_of_{name}_ppm": value for name, value in parts.items() if name != "together"},
+        "other_less_this_ppm": differences,
+        "not_drawn": not_drawn,
+    }
