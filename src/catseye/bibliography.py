@@ -28,6 +28,7 @@ SOURCES: dict[str, Source] = {
         locator="National Radio Astronomy Observatory, 29 April 2004",
         used="chapters 1 to 8: eqs. 1.1-1.53, 2.1-2.47, 3.1-3.7, 4.1-4.14, 5.1-5.19",
         errata=(
+            "1.2 prints 384 615.3 GHz for 780 nm (c taken as 3e8 m/s); 384 349.3 GHz, the sidebands likewise",
             "1.11 names the local station pressure p_t, p_l is meant; there is no 1.17",
             "1.12 prints p_r where 1.18 uses the temperature-corrected p_t",
             "1.22 prints 929.37 mb, truncated twice: 929.38",
@@ -512,5 +513,10 @@ SOURCES: dict[str, Source] = {
         title="ICAO, Manual of the ICAO standard atmosphere, third edition, 1993",
         locator="ICAO Doc 7488/3",
         used="pressure in a layer with a straight lapse; its table as test values",
+    ),
+    "RASMUSSEN06": Source(
+        title="C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006",
+        locator="ISBN 026218253X",
+        used="eqs. 2.23, 2.24 (mean and covariance given observations), 4.17 (Matern covariance with 3/2)",
     ),
 }

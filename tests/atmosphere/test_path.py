@@ -61,3 +61,14 @@ def test_stations_may_differ_from_path_to_path():
         lambda z: path.interpolate_height(z, 0.0, lower[:, None], 100.0, upper[:, None]), np.zeros(3), 50.0
     )
     np.testing.assert_allclose(got, lower + 0.25 * (upper - lower), rtol=1e-14)
+
+
+def test_the_covariance_of_means_is_the_integral_of_a_walks_covariance():
+    # covariance min(z, z'): the means over 0 to 1 and 1 to 2 have the variances 1/3 and 4/3, and 1/2 between them
+    got = path.covariance_over_height(np.minimum, [0.0, 1.0], [1.0, 2.0], nodes=80)
+    np.testing.assert_allclose(got, [[1 / 3, 1 / 2], [1 / 2, 4 / 3]], atol=1e-4)  # the corner of min, 80 nodes
+
+
+def test_the_covariance_of_a_mean_that_only_shifts_is_that_shifts():
+    got = path.covariance_over_height(lambda z, other: 0.09 + 0.0 * z * other, [0.0, -3.0, 7.0], [9.0, 50.0, 7.0])
+    np.testing.assert_allclose(got, 0.09, rtol=1e-14)

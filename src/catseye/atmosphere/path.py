@@ -93,7 +93,41 @@ def mean_over_height(refractivity_of_height, z_a, z_b, *, nodes=5):
     >>> round(float(mean_over_height(lambda z: 250e-6 - 25e-9 * z, 0.0, 100.0)) * 1e6, 6)
     248.75
     """
+    heights, share = nodes_along(z_a, z_b, nodes)
+    return np.sum(share * refractivity_of_height(heights), axis=-1)
+
+
+def covariance_over_height(covariance_of_heights, z_a, z_b, *, nodes=5):
+    """Covariance between the means along m straight lines, from the covariance between heights.
+
+    covariance_of_heights   function of two arrays of heights in m, which it broadcasts, giving a covariance
+    z_a                     (m,) m, height of one end of each
+    z_b                     (m,) m, height of the other
+    nodes                   Gauss-Legendre nodes in each, 1 to 100
+
+    Source: covariance of two integrals is the double integral of the covariance; the quadrature of `mean_over_height`,
+    whose mean it belongs to. `profile.Profile.covariance` does the same with the covariance in closed form.
+
+    >>> covariance_over_height(lambda z, other: 0.01 * z * other, [0.0, 0.0], [10.0, 20.0]).round(12)
+    array([[0.25, 0.5 ],
+           [0.5 , 1.  ]])
+    """
+    heights, share = nodes_along(np.atleast_1d(z_a), np.atleast_1d(z_b), nodes)
+    between = covariance_of_heights(heights[:, None, :, None], heights[None, :, None, :])
+    return np.einsum("k,abkl,l->ab", share, between, share)
+
+
+def nodes_along(z_a, z_b, nodes):
+    """Heights of the Gauss-Legendre nodes between z_a and z_b (...), m: (..., nodes); and their shares (nodes,).
+
+    z_a, z_b   heights of the ends, m
+    nodes      1 to 100
+
+    Source: Gauss-Legendre quadrature; the shares' sum is one.
+
+    >>> [part.round(4).tolist() for part in nodes_along(0.0, 10.0, 2)]
+    [[2.1132, 7.8868], [0.5, 0.5]]
+    """
     x, weight = np.polynomial.legendre.leggauss(nodes)
     z_a, z_b = np.asarray(z_a, float)[..., None], np.asarray(z_b, float)[..., None]
-    heights = 0.5 * (z_a + z_b) + 0.5 * (z_b - z_a) * x
-    return np.sum(0.5 * weight * refractivity_of_height(heights), axis=-1)
+    return 0.5 * (z_a + z_b) + 0.5 * (z_b - z_a) * x, 0.5 * weight
