@@ -519,4 +519,24 @@ SOURCES: dict[str, Source] = {
         locator="ISBN 026218253X",
         used="eqs. 2.23, 2.24 (mean and covariance given observations), 4.17 (Matern covariance with 3/2)",
     ),
+    "KAY93": Source(
+        title="S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall, 1993",
+        locator="ISBN 978-0-13-345711-7",
+        used="section 3.11: Cramer-Rao bound of a delay, and its mean square bandwidth",
+    ),
+    "KNAPP76": Source(
+        title="C. H. Knapp and G. C. Carter, The generalized correlation method for estimation of time delay, 1976",
+        locator="doi:10.1109/TASSP.1976.1162830",
+        used="weights of the cross-spectrum, the phase transform among them, and the variance with any weight",
+    ),
+    "WELCH67": Source(
+        title="P. D. Welch, The use of fast Fourier transform for the estimation of power spectra, 1967",
+        locator="doi:10.1109/TAU.1967.1161901",
+        used="the mean of windowed periodograms that overlap",
+    ),
+    "RICE44": Source(
+        title="S. O. Rice, Mathematical analysis of random noise, Bell System Technical Journal 23 and 24, 1944-45",
+        locator="doi:10.1002/j.1538-7305.1944.tb00874.x",
+        used="section 3.6: how often noise passes a level",
+    ),
 }

@@ -3,9 +3,10 @@
 import pytest
 import typer
 
-from catseye.cli import air, baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
-from catseye.cli.commands import app
+from catseye.cli.commands import app, join_commands
 from catseye.cli.terminal import attempt
+
+join_commands()
 
 
 @pytest.fixture

@@ -14,19 +14,10 @@ from typer.testing import CliRunner
 
 from catseye import __version__
 from catseye.atmosphere.air import MODELS
-from catseye.cli import (  # noqa: F401  all join the app
-    baseline,
-    calibrate,
-    certificate,
-    commands,
-    explain,
-    link,
-    networks,
-    plot,
-    point,
-)
-from catseye.cli.commands import app
+from catseye.cli import commands
+from catseye.cli.commands import app, join_commands
 
+join_commands()
 ROOT = Path(__file__).parents[2]
 NIGHT = ROOT / "examples" / "night-01"
 WEATHER = ["--temperature-c", "20", "--pressure-hpa", "933", "--humidity-percent", "50"]

@@ -1,6 +1,7 @@
 """The commands. What they need is imported when they run, so that `--help` answers at once."""
 
 import math
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 # as in catseye.atmosphere.air, whose import --help spares itself
 MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 
+ROOMS = (
+    *("air", "sound", "refractometer", "acoustic", "networks", "explain", "calibrate", "certificate"),
+    *("baseline", "link", "point", "plot"),
+)
+
 app = typer.Typer(
     name="catseye",
     rich_markup_mode=None,
@@ -26,10 +32,15 @@ app = typer.Typer(
 )
 
 
+def join_commands() -> None:
+    """Import the modules whose commands join the app."""
+    for name in ROOMS:
+        import_module(f"catseye.cli.{name}")
+
+
 def main() -> None:
     """The command line of this process; leaves with SystemExit."""
-    from catseye.cli import air, baseline, calibrate, certificate, explain, link, networks, plot, point  # noqa: F401  their commands join the app
-
+    join_commands()
     typer.main.get_command(app)(prog_name="catseye")
 
 

@@ -21,6 +21,7 @@ FORMATS = (
     "catseye-plan-1",
     "catseye-baseline-1",
     "catseye-calibration-1",
+    "catseye-acoustic-1",
 )
 
 

@@ -1,0 +1,80 @@
+"""Figures of acoustic paths as SVG text: what was heard, where it was found, and the temperature in time."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+
+if TYPE_CHECKING:
+    from catseye.reduction.acoustic_recording import AcousticPath, Trace
+
+HEARD = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
+
+
+def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
+    """Every figure of one path by its name, as SVG text."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {}
+        if path.shots.traces:
+            drawn["recording"] = svg(_recording(path.shots.traces))
+            drawn["correlation"] = svg(_correlation(path.shots.traces))
+        if path.used.any():
+            drawn["temperature"] = svg(_in_time(path))
+        return drawn
+
+
+def _recording(traces: Sequence["Trace"]) -> Figure:
+    figure = Figure(figsize=(9.4, 1.7 * len(traces) + 0.5), layout="constrained")
+    for ax, trace, colour in zip(figure.subplots(len(traces), 1, squeeze=False)[:, 0], traces, SERIES, strict=False):
+        ax.plot(trace.time * 1e3, trace.samples, color=colour, lw=0.6)
+        if np.isfinite(trace.arrival):
+            ax.axvline(trace.arrival * 1e3, color=BAD, lw=1.0)
+        ax.set_title(f"{trace.channel}, {HEARD[trace.channel]} ({trace.file})")
+        ax.margins(x=0.0)
+    figure.supxlabel("from the file's first sample (ms); the red line is the arrival found", fontsize=9.0)
+    return figure
+
+
+def _correlation(traces: Sequence["Trace"]) -> Figure:
+    figure = Figure(figsize=(9.4, 1.9 * len(traces) + 0.5), layout="constrained")
+    panels = figure.subplots(len(traces), 2, squeeze=False, gridspec_kw={"width_ratios": (2.2, 1.0)})
+    for (wide, near), trace, colour in zip(panels, traces, SERIES, strict=False):
+        middle = trace.arrival if np.isfinite(trace.arrival) else trace.lag[np.argmax(trace.correlation)]
+        step = trace.lag[1] - trace.lag[0]
+        close = np.abs(trace.lag - middle) <= 8.0 * step
+        wide.plot(trace.lag * 1e3, trace.correlation, color=colour, lw=0.7)
+        near.plot((trace.lag[close] - middle) * 1e6, trace.correlation[close], "o-", color=colour, ms=3, lw=0.8)
+        for ax, at in ((wide, middle * 1e3), (near, 0.0)):
+            if np.isfinite(trace.arrival):
+                ax.axvline(at, color=BAD, lw=0.9)
+            ax.axhline(0.0, color=FAINT, lw=0.6)
+        wide.set_title(f"{trace.channel}, {HEARD[trace.channel]}")
+        wide.margins(x=0.0)
+    panels[-1, 0].set_xlabel("delay from the file's first sample (ms)")
+    panels[-1, 1].set_xlabel("from the arrival found (µs)")
+    return figure
+
+
+def _in_time(path: "AcousticPath") -> Figure:
+    used, found, sheet = path.used, path.found, path.sheet
+    minutes = (path.shots.mjd[used] - path.shots.mjd[0]) * 1440.0
+    t, u, noise = found.temperature_c[used], found.u_temperature_c[used], found.parts_c["time"][used]
+    both = path.shots.time_ba is not None
+    figure = Figure(figsize=(9.4, 5.2 if both else 3.2), layout="constrained")
+    panels = figure.subplots(2 if both else 1, 1, sharex=True, squeeze=False)[:, 0]
+    panels[0].fill_between(minutes, t - u, t + u, color="#dfe9f3", lw=0, label="standard uncertainty, common part too")
+    panels[0].errorbar(minutes, t, noise, fmt="o", color=SERIES[0], ms=4, elinewidth=1.0, label="by sound, bar: noise")
+    station = path.shots.weather[0][used]
+    panels[0].plot(minutes, station, color=SERIES[1], lw=1.1, ls="--", label="thermometer of the sheet")
+    panels[0].set_ylabel("mean temperature of the path (°C)")
+    panels[0].legend(loc="best")
+    if both:
+        panels[1].errorbar(minutes, found.wind[used], found.u_wind[used], fmt="o", color=SERIES[2], ms=4, elinewidth=1)
+        panels[1].axhline(0.0, color=FAINT, lw=0.7)
+        panels[1].set_ylabel(f"wind, {sheet.ranger} to {sheet.target} (m/s)")
+    panels[-1].set_xlabel(f"minutes from MJD {path.shots.mjd[0]:.5f} UTC")
+    return figure
