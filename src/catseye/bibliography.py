@@ -517,7 +517,8 @@ SOURCES: dict[str, Source] = {
     "RASMUSSEN06": Source(
         title="C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press, 2006",
         locator="ISBN 026218253X",
-        used="eqs. 2.23, 2.24 (mean and covariance given observations), 4.17 (Matern covariance with 3/2)",
+        used="eqs. 2.23, 2.24 (mean and covariance given observations), 4.17 (Matern covariance with 3/2), "
+        "5.12 (an observation from the others); unknown means",
     ),
     "KAY93": Source(
         title="S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall, 1993",
@@ -538,5 +539,55 @@ SOURCES: dict[str, Source] = {
         title="S. O. Rice, Mathematical analysis of random noise, Bell System Technical Journal 23 and 24, 1944-45",
         locator="doi:10.1002/j.1538-7305.1944.tb00874.x",
         used="section 3.6: how often noise passes a level",
+    ),
+    "CRAMER93": Source(
+        title="O. Cramer, The variation of the specific heat ratio and the speed of sound in air, 1993",
+        locator="doi:10.1121/1.405827",
+        used="eq. 15 and table III: speed of sound, 0 to 30 °C",
+    ),
+    "LEMMON00": Source(
+        title="E. W. Lemmon et al., Thermodynamic properties of air and mixtures of nitrogen, argon, and oxygen, 2000",
+        locator="doi:10.1063/1.1285884",
+        used="ideal-gas heat capacity and second virial coefficient of dry air",
+    ),
+    "WAGNER02": Source(
+        title="W. Wagner and A. Pruss, The IAPWS formulation 1995 for ordinary water substance, 2002",
+        locator="doi:10.1063/1.1461829",
+        used="table 6.1: ideal-gas heat capacity of water; molar mass",
+    ),
+    "HARVEY07": Source(
+        title="A. H. Harvey and P. H. Huang, First-principles calculation of the air-water second virial coefficient, 2007",
+        locator="doi:10.1007/s10765-007-0197-8",
+        used="second virial coefficient of air with water",
+    ),
+    "HARVEY04": Source(
+        title="A. H. Harvey and E. W. Lemmon, Correlation for the second virial coefficient of water, 2004",
+        locator="doi:10.1063/1.1587731",
+        used="second virial coefficient of water",
+    ),
+    "PICARD08": Source(
+        title="A. Picard et al., Revised formula for the density of moist air (CIPM-2007), 2008",
+        locator="doi:10.1088/0026-1394/45/2/004",
+        used="composition and molar mass of dry air",
+    ),
+    "IAPWS10": Source(
+        title="IAPWS, Guideline on an equation of state for humid air in contact with seawater and ice, 2010",
+        locator="IAPWS G8-10",
+        used="check of moist air's virial coefficients",
+    ),
+    "ISO93": Source(
+        title="ISO 9613-1, Attenuation of sound during propagation outdoors: absorption by the atmosphere, 1993",
+        locator="ISO 9613-1:1993",
+        used="relaxation frequencies of oxygen and nitrogen",
+    ),
+    "PIERCE19": Source(
+        title="A. D. Pierce, Acoustics, third edition, Springer, 2019",
+        locator="doi:10.1007/978-3-030-11214-1",
+        used="relaxation and dispersion; circular rays",
+    ),
+    "TARANTOLA05": Source(
+        title="A. Tarantola, Inverse Problem Theory, SIAM, 2005",
+        locator="doi:10.1137/1.9780898717921",
+        used="least squares with Gaussian priors",
     ),
 }

@@ -1,0 +1,106 @@
+"""The speed of sound as a plain object for JSON and as rows for people, the other models beside the one asked for."""
+
+from typing import Any
+
+from catseye.atmosphere import sound_parker2004
+from catseye.atmosphere.sound import MODELS, Sound, sound
+from catseye.atmosphere.sound_dispersion import dispersion
+from catseye.errors import ValidityError
+
+FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give
+
+
+def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: float, u: float) -> dict[str, Any]:
+    """Sound as `catseye sound --json` gives it.
+
+    weather   temperature °C, pressure hPa, relative humidity %
+    u         standard uncertainty of the speed, formula and inputs, m/s
+    """
+    slopes = state.sensitivity._asdict()
+    if not MODELS[state.model].has_co2:
+        del slopes["co2_ppm"]
+    t, p, h = weather
+    return {
+        "model": state.model,
+        "temperature_c": t,
+        "pressure_hpa": p,
+        "humidity_percent": h,
+        "co2_ppm": co2_ppm if MODELS[state.model].has_co2 else None,
+        "speed": state.speed,
+        "dry_speed": state.dry_speed,
+        "vapour_pressure_hpa": state.vapour_pressure_hpa,
+        "sensitivity": slopes,
+        "travel_time_per_m": state.travel_time_per_m,
+        "travel_time_per_m_per_c": state.time_sensitivity.temperature_c,
+        "standard_uncertainty": u,
+        "formula_uncertainty": state.standard_uncertainty,
+        "models": {name: _speed_by(name, weather, co2_ppm) for name in MODELS},
+        "notes_gamma_w": gamma_water_cost(state, weather),
+        "dispersion": [_dispersed(state, weather, frequency) for frequency in FREQUENCIES_HZ],
+    }
+
+
+def gamma_water_cost(state: Sound, weather: tuple[float, float, float]) -> dict[str, Any]:
+    """What the ratio of specific heats that the notes print for water costs, at this weather."""
+    t, p, _ = weather
+    printed = sound_parker2004.speed(t, p, state.vapour_pressure_hpa)
+    right = sound_parker2004.speed(t, p, state.vapour_pressure_hpa, gamma_water=sound_parker2004.GAMMA_VAPOUR)
+    per_c = sound_parker2004.partials(t, p, state.vapour_pressure_hpa).temperature_c
+    return {
+        "printed": sound_parker2004.GAMMA_WATER,
+        "right": sound_parker2004.GAMMA_VAPOUR,
+        "slow_by": right - printed,
+        "temperature_read_high_by_c": (right - printed) / per_c,
+    }
+
+
+def sound_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+    """The object's lines for a terminal, each (title, text)."""
+    slope, cost, low = found["sensitivity"], found["notes_gamma_w"], found["dispersion"][0]
+    carbon = (
+        f"{slope['co2_ppm'] * 100.0:+.5f} m/s per 100 ppm of carbon dioxide"
+        if "co2_ppm" in slope
+        else "the formula's air has its own carbon dioxide"
+    )
+    others = "; ".join(
+        f"{name} {item['speed']:.3f} ± {item['standard_uncertainty']:.2g} m/s"
+        if item["speed"] is not None
+        else f"{name}: {item['reason']}"
+        for name, item in found["models"].items()
+    )
+    return [
+        ("speed", f"{found['speed']:.3f} m/s at zero frequency, dry air {found['dry_speed']:.3f} m/s"),
+        ("uncertainty", f"{found['standard_uncertainty']:.2g} m/s (1σ)"),
+        ("per °C", f"{slope['temperature_c']:+.6f} m/s"),
+        ("per hPa", f"{slope['pressure_hpa']:+.6f} m/s"),
+        ("per %", f"{slope['humidity_percent']:+.6f} m/s of relative humidity"),
+        ("per hPa (e)", f"{slope['vapour_pressure_hpa']:+.6f} m/s"),
+        ("CO2", carbon),
+        ("time", f"{found['travel_time_per_m'] * 1e3:.6f} ms/m, {found['travel_time_per_m_per_c'] * 1e6:+.4f} µs/m/°C"),
+        ("vapour", f"{found['vapour_pressure_hpa']:.3f} hPa"),
+        ("formula", found["model"]),
+        ("formulas", others),
+        (
+            "notes",
+            f"γ_w = {cost['printed']} (4.3) is printed for {cost['right']:.2f}: slow by {cost['slow_by']:.3f} m/s, "
+            f"{cost['temperature_read_high_by_c']:.2f} °C too warm in thermometry",
+        ),
+        ("dispersion", f"at {low['frequency_hz']:g} Hz faster by {low['phase_excess']:.3f} m/s"),
+    ]
+
+
+def _speed_by(name: str, weather: tuple[float, float, float], co2_ppm: float) -> dict[str, Any]:
+    try:
+        state = sound(*weather, model=name, co2_ppm=co2_ppm)
+    except ValidityError as problem:
+        return {"speed": None, "standard_uncertainty": None, "reason": str(problem)}
+    return {"speed": state.speed, "standard_uncertainty": state.standard_uncertainty}
+
+
+def _dispersed(state: Sound, weather: tuple[float, float, float], frequency: float) -> dict[str, float]:
+    share = dispersion(weather[0], weather[1], state.vapour_pressure_hpa, frequency)
+    return {
+        "frequency_hz": frequency,
+        "phase_excess": float(share.phase * state.speed),
+        "group_excess": float(share.group * state.speed),
+    }
