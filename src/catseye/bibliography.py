@@ -546,7 +546,7 @@ SOURCES: dict[str, Source] = {
         used="eq. 15 and table III: speed of sound, 0 to 30 °C",
     ),
     "LEMMON00": Source(
-        title="E. W. Lemmon et al., Thermodynamic properties of air and mixtures of nitrogen, argon, and oxygen, 2000",
+        title="E. W. Lemmon et al., Thermodynamic properties of air and mixtures of its gases, 2000",
         locator="doi:10.1063/1.1285884",
         used="ideal-gas heat capacity and second virial coefficient of dry air",
     ),
@@ -556,7 +556,7 @@ SOURCES: dict[str, Source] = {
         used="table 6.1: ideal-gas heat capacity of water; molar mass",
     ),
     "HARVEY07": Source(
-        title="A. H. Harvey and P. H. Huang, First-principles calculation of the air-water second virial coefficient, 2007",
+        title="A. H. Harvey and P. H. Huang, First-principles calculation of the air-water second virial coefficient",
         locator="doi:10.1007/s10765-007-0197-8",
         used="second virial coefficient of air with water",
     ),

@@ -16,7 +16,7 @@ class Settings:
     u_thermometer_c         °C, offset of a station thermometer that was not compared with a standard
     u_profile_c             °C, bend: how much warmer than on their line it is half-way between the stations' heights
     u_gradient_c_per_m      °C/m, where there is one station height only and no gradient was measured
-    surface_minus_air_c     °C, of retroreflectors: notes warn of dew and frost; some kelvin below zero under a clear sky
+    surface_minus_air_c     °C, of retroreflectors, for warnings of dew and frost; below zero under a clear sky
     u_normal                rad, each direction, of the normal of a single prism
     u_plate_normal          rad, each direction, of the plate and the axis of a triplet
     u_surface               m, along the normal, of a dish prism off the best paraboloid: some tenths of a millimetre;
