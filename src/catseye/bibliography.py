@@ -590,4 +590,9 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1137/1.9780898717921",
         used="least squares with Gaussian priors",
     ),
+    "GEYER92": Source(
+        title="C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992",
+        locator="doi:10.1214/ss/1177011137",
+        used="section 3.3: initial positive sequence estimator of the variance of a mean of correlated values",
+    ),
 }

@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.air import group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
+from catseye.records.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.weather import Weather
 from catseye.reduction.air import AirField
 from catseye.reduction.settings import Settings
@@ -185,3 +187,61 @@ def test_fog_and_dry_air_are_humidities_too(night_01, humidity, expected):
     assert np.all(np.abs(field.smoothed(times)[:, :, 2] - expected) < 1e-9)
     ends = np.zeros((500, 3)), np.tile([50.0, 0.0, 30.0], (500, 1))
     assert np.all(np.isfinite(field.along(times, *ends, np.zeros(3)).refractivity))
+
+
+def lined(campaign, rows):
+    """Its field, with path temperatures (mjd, ranger, target, °C, u), and the field of shots ZY101 - T, ZY102 - T."""
+    keys = ("mjd_utc", "ranger", "target", "temperature_c", "u_temperature_c")
+    table = path_temperature_columns([PathTemperature(**dict(zip(keys, row, strict=True))) for row in rows])
+    return AirField.of(dataclasses.replace(campaign, path_temperatures=table), Settings())
+
+
+ENDS = [frozenset(("ZY101", "T")), frozenset(("ZY102", "T"))]
+
+
+def test_sound_takes_the_thermometers_place_on_its_own_line_and_leaves_the_vapour(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 3600.0], lambda s, i: 10.0 + i)
+    field = lined(campaign, [(start + 0.01, "T", "ZY101", 16.0, 0.2)])  # a line is the same from either end
+    times = at(start, 864.0, 864.0)
+    level = np.zeros((2, 3))
+    far = level + np.array([100.0, 0.0, 0.0])
+    found = field.on_lines(times, ENDS).along(times, level, far, np.zeros(4))
+    plain = field.along(times, level, far, np.zeros(4))
+    assert found.refractivity[1] == plain.refractivity[1]
+    pressure = 900.0 + 0.11 * 25.0
+    vapour = float(vapour_pressure_hpa(10.0, pressure, 50.0))
+    expected = group_refractivity_of_vapour(16.0, pressure, vapour, wavelength_um=0.78, model="rueger1990")
+    assert found.refractivity[0] == pytest.approx(float(expected), abs=1e-13)
+    assert found.refractivity[0] < plain.refractivity[0] - 5e-6  # 6 °C warmer
+    assert field.names == ("S0", "S1", "bend", "T - ZY101")
+    assert field.stations == ("S0", "S1")
+    assert field.sigmas[-1] == pytest.approx(0.2)
+
+
+def test_sound_counts_near_in_time_only_and_is_a_line_between_its_rows(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 9000.0], lambda s, i: 10.0)
+    rows = [(start + s / SECONDS_PER_DAY, "ZY101", "T", t, 0.2) for s, t in ((2000.0, 12.0), (2400.0, 14.0))]
+    field = lined(campaign, rows)
+    times = at(start, 1300.0, 1500.0, 2100.0, 2900.0, 3100.0)
+    bound = field.on_lines(times, [ENDS[0]] * 5)
+    assert bound.sounded.tolist() == [-1, 0, 0, 0, -1]
+    np.testing.assert_allclose(field.lines[0].at(times)[0][1:4], [12.0, 12.5, 14.0], atol=1e-4)
+
+
+def test_slopes_of_a_sounded_line_are_derivatives_and_every_row_feels_its_own_u(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 9000.0], lambda s, i: 10.0 + i)
+    rows = [(start + s / SECONDS_PER_DAY, "ZY101", "T", 13.0, u) for s, u in ((1000.0, 0.1), (3000.0, 0.3))]
+    times = at(start, 1000.0, 3000.0)
+    field = lined(campaign, rows).on_lines(times, [ENDS[0]] * 2)
+    a, b = paths(2)
+    base = np.array([0.2, -0.1, 0.05, 0.1])
+    found = field.along(times, a, b, base)
+    for q in range(4):
+        step = np.zeros(4)
+        step[q] = 1e-2
+        up, down = (field.along(times, a, b, base + sign * step).refractivity for sign in (1, -1))
+        # 2e-3: of the vapour's curve over a degree, as above
+        np.testing.assert_allclose(found.slopes[:, q], (up - down) / 2e-2, rtol=2e-3, atol=1e-13)
+    assert np.all(found.slopes[:, 3] > 0.0)  # sound that reads too warm hides a higher index
+    assert found.slopes[1, 3] / found.slopes[0, 3] == pytest.approx(3.0, rel=0.02)
+    assert field.sigmas[3] == pytest.approx(np.sqrt((0.01 + 0.09) / 2))

@@ -22,6 +22,7 @@ FORMATS = (
     "catseye-baseline-1",
     "catseye-calibration-1",
     "catseye-acoustic-1",
+    "catseye-refractometer-1",
 )
 
 

@@ -1,6 +1,7 @@
 """A campaign: a directory of records, weather, shots and samples, read whole or refused in one line."""
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +12,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.records.mirror import Mirror
 from catseye.records.monument import Monument
+from catseye.records.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
 from catseye.records.reading import Folder
 from catseye.records.refusal import refusal, shown
 from catseye.records.shot import Shot, Shots, in_row, read_buffers, refuse_shots, shot_columns
@@ -24,11 +26,16 @@ T = TypeVar("T")
 REFERENCE = "ZRG"  # as a target: the ranger's internal cube
 LONGEST_CAMPAIGN = 1.0  # days from its start to any shot
 WEATHER_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a shot may lie outside the weather
+SOUND_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a path temperature may lie outside the shots
+PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """Everything that a campaign's directory holds; `hashes` are the SHA-256 of its files by relative path."""
+    """Everything that a campaign's directory holds; `hashes` are the SHA-256 of its files by relative path.
+
+    `path_temperatures` is None where no line's temperature was measured by sound.
+    """
 
     directory: Path
     site: Site
@@ -42,6 +49,7 @@ class Campaign:
     shots: Shots
     frames: np.memmap
     hashes: dict[str, str]
+    path_temperatures: PathTemperatureTable | None = None
 
     @property
     def rangers(self) -> tuple[str, ...]:
@@ -75,6 +83,8 @@ def read_campaign(directory: Path | str) -> Campaign:
     samples = folder.table("weather.csv", WeatherSample)
     shots = folder.table("shots.csv", Shot)
     buffers = read_buffers(folder)
+    sounded = os.path.lexists(folder.directory / PATH_TEMPERATURES)
+    lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
 
     campaign = Campaign(
         directory=folder.directory,
@@ -89,6 +99,7 @@ def read_campaign(directory: Path | str) -> Campaign:
         shots=shot_columns(shots),
         frames=buffers,
         hashes=dict(sorted(folder.hashes.items())),
+        path_temperatures=path_temperature_columns(lines) if lines else None,
     )
     refuse_double_names(campaign, [target.name for target in targets])
     refuse_mirrors(campaign)
@@ -97,6 +108,7 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_shots("shots.csv", shots, buffers)
     refuse_strangers(campaign, shots)
     refuse_times(campaign, shots)
+    refuse_path_temperatures(campaign, lines)
     return campaign
 
 
@@ -164,7 +176,9 @@ def refuse_strangers(campaign: Campaign, shots: Iterable[Shot]) -> None:
         refuse_stranger("shots.csv", row, shot, known, rangers)
 
 
-def refuse_stranger(file: str, row: int, line: Shot | Benchmark, known: set[str], rangers: set[str]) -> None:
+def refuse_stranger(
+    file: str, row: int, line: Shot | Benchmark | PathTemperature, known: set[str], rangers: set[str]
+) -> None:
     """A row's ranger and target are known, and two."""
     if line.ranger not in rangers:
         raise in_row(file, row, f"ranger = {shown(line.ranger)} is not in monuments/ or feedarm.toml")
@@ -202,3 +216,22 @@ def refuse_times(campaign: Campaign, shots: Iterable[Shot]) -> None:
         if not first - WEATHER_MARGIN <= shot.mjd_utc <= last + WEATHER_MARGIN:
             span = f"weather.csv covers {first!r} to {last!r}"
             raise in_row("shots.csv", row, f"mjd_utc = {shot.mjd_utc!r} has no weather ({span}; expected within 1 h)")
+
+
+def refuse_path_temperatures(campaign: Campaign, lines: Sequence[PathTemperature]) -> None:
+    """Every line has two known ends, was sounded during the shots, and once at a time."""
+    if not lines:
+        return
+    known, rangers = set(campaign.target_names) - {REFERENCE}, set(campaign.rangers)
+    first, last = float(campaign.shots.mjd_utc.min()), float(campaign.shots.mjd_utc.max())
+    seen: dict[tuple[frozenset[str], float], int] = {}
+    for row, line in enumerate(lines, start=1):
+        refuse_stranger(PATH_TEMPERATURES, row, line, known, rangers)
+        if not first - SOUND_MARGIN <= line.mjd_utc <= last + SOUND_MARGIN:
+            span = f"the shots cover {first!r} to {last!r}; expected within 1 h"
+            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r} is outside the campaign ({span})")
+        key = (frozenset((line.ranger, line.target)), line.mjd_utc)
+        if key in seen:
+            same = f"{line.ranger} - {line.target} has a temperature at that time in row {seen[key]}"
+            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r}: {same} (expected one)")
+        seen[key] = row

@@ -1,7 +1,7 @@
 """From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,7 +14,17 @@ from catseye.records.campaign import Campaign
 from catseye.reduction.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.dish import dish_advice
 from catseye.reduction.head import head_unknowns
-from catseye.reduction.network import AIR, APPROXIMATE, FIXED_POINT, HEADS, THERMOMETERS, ZEROS, Network, build_network
+from catseye.reduction.network import (
+    AIR,
+    APPROXIMATE,
+    FIXED_POINT,
+    HEADS,
+    SOUND,
+    THERMOMETERS,
+    ZEROS,
+    Network,
+    build_network,
+)
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
 from catseye.reduction.settings import Settings
@@ -92,6 +102,7 @@ class Coordinates:
     heads        how far each effect of a head is off its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
     leakage      ranger: what is left of its leakage, V (real, imaginary)
     air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
+    sound        line: what it is found to read too warm, °C, and u; for lines of path_temperatures.csv
     refractivity_ppm   mean group refractivity over the used paths
     variance_factor, degrees_of_freedom   of everything but the typed positions
     fits         of all groups, for reports
@@ -117,6 +128,7 @@ class Coordinates:
     fits: tuple[Fit, ...]
     notes: tuple[str, ...]
     unresolved: dict[int, str]
+    sound: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def index(self, name: str) -> int:
         """Row of a point."""
@@ -163,10 +175,11 @@ def adjust_coordinates(
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", turn, PASSES)
-        shots = [shot_group(network, name, x) for name in network.rangers]
+        shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
         groups: list[Observations] = [group for group, _ in shots] + network.priors
         removable = [
-            np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
+            np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS, SOUND))
+            for i, g in enumerate(groups)
         ]
         before = x
         if turn < TESTED:
@@ -218,7 +231,9 @@ def _coordinates(
     def estimate(column: int) -> tuple[float, float]:
         return float(solution.x[column]), float(np.sqrt(solution.covariance[column, column]))
 
-    air = {n: estimate(layout.at[AIR] + i) for i, n in enumerate(network.field.names)}
+    every = {n: estimate(layout.at[AIR] + i) for i, n in enumerate(network.field.names)}
+    sound = {line.name: every[line.name] for line in network.field.lines}
+    air = {n: value for n, value in every.items() if n not in sound}
     leakage_at = {n: layout.columns(f"leakage {n}", 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
     return Coordinates(
@@ -243,8 +258,15 @@ def _coordinates(
         degrees_of_freedom=degrees,
         status=solution.status,
         fits=solution.fits,
-        notes=(*_notes(network, solution, air, count), *_losses(ranges), *resolved.notes, *_thin_notes(ranges)),
+        notes=(
+            *_notes(network, solution, air, count),
+            *_sound_notes(network, solution, ranges, sound),
+            *_losses(ranges),
+            *resolved.notes,
+            *_thin_notes(ranges),
+        ),
         unresolved=resolved.rejected,
+        sound=sound,
     )
 
 
@@ -345,7 +367,7 @@ def _notes(
     notes = []
     for fit in solution.fits:
         if fit.name == THERMOMETERS:
-            for name, active in zip(network.field.names, fit.active, strict=False):
+            for name, active in zip(network.field.stations, fit.active, strict=True):
                 value, u = air[name]
                 if not active:
                     notes.append(f"{name}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
@@ -364,7 +386,7 @@ def _notes(
                 f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
                 f"{network.settings.critical}); check the sheet's value and u"
             )
-    steepest = network.field.steepest(np.array([air[n][0] for n in network.field.names[:-1]]))
+    steepest = network.field.steepest(np.array([air[n][0] for n in network.field.stations]))
     if abs(steepest) > STEEP:
         notes.append(
             f"the stations' thermometers differ by {steepest:+.3f} °C a metre of height: a strong inversion, "
@@ -384,3 +406,16 @@ def _notes(
         for n, d in wrong.items()
     ]
     return notes
+
+
+def _sound_notes(
+    network: Network, solution: Solution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
+) -> list[str]:
+    """What each sounded line did to the index of its shots, and whether the ranges believe it."""
+    w = next((f.standardised for f in solution.fits if f.name == SOUND), np.zeros(0))
+    mjd = network.campaign.shots.mjd_utc[ranges.shot]
+    pairs = [frozenset(pair) for pair in zip(ranges.ranger, ranges.target, strict=True)]
+    return [
+        line.note(mjd[[pair == line.ends for pair in pairs]], sound[line.name], w_line, network.settings.critical)
+        for line, w_line in zip(network.field.lines, w, strict=True)
+    ]

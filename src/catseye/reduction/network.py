@@ -1,7 +1,7 @@
 """The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's s
 AIR = "the air"  # no point can have this name: it has a blank
 APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
+SOUND = "path temperatures"
 ZEROS = "ranger zeros"
 HEADS = "head effects"
 
@@ -66,6 +67,14 @@ class Network:
             name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
         ]
 
+    def seen_from(self, ranger: str) -> "Network":
+        """The network whose air knows the lines of one ranger's usable shots, in their order."""
+        if not self.field.lines:
+            return self
+        shots, rows = self.campaign.shots, self.electronics[ranger].shots
+        ends = [frozenset((ranger, shots.target[k])) for k in rows]
+        return replace(self, field=self.field.on_lines(shots.mjd_utc[rows], ends))
+
 
 def build_network(
     campaign: Campaign, phases: Phases, electronics: dict[str, Electronics], settings: Settings
@@ -73,8 +82,8 @@ def build_network(
     """The unknowns and priors of a campaign.
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
-    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets,
-    two tilts of every prism face, and the rest of every glass constant.
+    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
+    (thermometers, profile, sounded lines), two tilts of every prism face, and the rest of every glass constant.
     """
     places = places_of(campaign)
     fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
@@ -120,13 +129,14 @@ def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: Arra
 def _priors(
     campaign: Campaign, settings: Settings, seen: dict[str, Place], layout: Layout, air: AirField
 ) -> list[Observations]:
-    count = len(air.names)
-    at = layout.columns(AIR, count)
+    count = len(air.stations)
+    at = layout.columns(AIR, len(air.names))
     priors = [
         *_survey(campaign, seen, layout),
         *_heads(campaign, layout),
-        _independent(THERMOMETERS, at[:-1], np.zeros(count - 1), air.sigmas[:-1]),
-        _independent("air profile", at[-1:], [0.0], air.sigmas[-1:]),
+        _independent(THERMOMETERS, at[:count], np.zeros(count), air.sigmas[:count]),
+        _independent("air profile", at[count : count + 1], [0.0], air.sigmas[count : count + 1]),
+        *_sound(air, at[count + 1 :]),
         *_directions(campaign, settings, layout),
         *_glass(seen, layout),
     ]
@@ -145,6 +155,13 @@ def _priors(
             length = benchmark.certified_distance_mm * MILLIMETRE
             priors.append(_length("benchmarks", length, u, layout, benchmark.ranger, benchmark.target))
     return priors
+
+
+def _sound(air: AirField, columns: np.ndarray) -> list[Observations]:
+    """How much too warm the sound of each line may read: a parameter a line, as its length errs in all rows alike."""
+    if not air.lines:
+        return []
+    return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
 
 
 def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[Observations]:

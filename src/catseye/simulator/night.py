@@ -1,14 +1,23 @@
 """A whole synthetic night: the campaign as the files would tell it, and the truth that they do not."""
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from catseye.constants import PPM, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.simulator import sheets
-from catseye.simulator.air import NIGHT, Air, Conditions, WeatherReading, weather_readings
+from catseye.simulator.air import (
+    NIGHT,
+    Air,
+    Conditions,
+    WeatherReading,
+    group_refractivity_ppm,
+    weather_readings,
+)
 from catseye.simulator.faults import Faults, Planted, Streams
 from catseye.simulator.head import Return, returns_of_ranger, sampled_frames
 from catseye.simulator.posture import posture
@@ -35,6 +44,50 @@ from catseye.simulator.world import (
 START_MJD_UTC = 52889.125
 
 
+SOUNDING_INTERVAL_S = 120.0
+
+
+@dataclass(frozen=True)
+class WarmLine(Air):
+    """Air that is warmer by a plume on the way to some points than smooth air at these heights.
+
+    plumes   (point (3,) m, °C that the mean of the straight line is warmer: twice that half-way, none at the ends)
+    """
+
+    plumes: tuple[tuple[np.ndarray, float], ...] = ()
+
+    def path_index(self, start, end, seconds):
+        """As of `Air`; towards a plume's point by the midpoint rule over 500 parts."""
+        index = super().path_index(start, end, seconds)
+        for point, warmer in self.plumes:
+            share = (np.arange(500) + 0.5) / 500
+            plume = warmer * (1.0 - np.cos(TWO_PI * share))
+            for i in np.flatnonzero(np.all(np.asarray(end) == point, axis=-1)):
+                z = start[2] + (end[i, 2] - start[2]) * share
+                t = self.temperature_c(z, seconds[i]) + plume
+                weather = self.pressure_hpa(z, seconds[i]), self.humidity_percent(seconds[i])
+                # the plume warms, it does not wet: the same vapour is a lower relative humidity
+                drier = saturation_hpa(self.temperature_c(z, seconds[i])) / saturation_hpa(t)
+                index[i] = 1.0 + PPM * group_refractivity_ppm(t, weather[0], weather[1] * drier).mean()
+        return index
+
+
+def saturation_hpa(temperature_c):
+    """Magnus' form, good to 0.5 %: only ratios are taken of it."""
+    return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
+
+
+@dataclass(frozen=True)
+class Sounding:
+    """One line of path_temperatures.csv."""
+
+    seconds: float
+    ranger: str
+    target: str
+    temperature_c: float
+    u_temperature_c: float
+
+
 @dataclass(frozen=True)
 class Night:
     """A campaign: what its files hold (`write` makes them), and the `truth`."""
@@ -54,6 +107,7 @@ class Night:
     shots: list[PlannedShot]  # by time; row i of frames is shot i + 1
     frames: np.ndarray  # int16, (shots, 8192)
     truth: Truth
+    sounded: tuple[Sounding, ...] = ()  # rows of path_temperatures.csv; no file without
 
     def write(self, directory: str | Path) -> Path:
         """Write the campaign into a new or empty directory; either all of it or nothing."""
@@ -81,6 +135,8 @@ def simulate_night(
     conditions: Conditions = NIGHT,
     schedule: Schedule | None = None,
     planted: Planted | None = None,
+    warm_lines: Mapping[tuple[str, str], float] | None = None,
+    u_sound_c: float | None = None,
 ) -> Night:
     """A night in the manner of night-01, from one seed.
 
@@ -88,6 +144,9 @@ def simulate_night(
     elevation_deg   5 to 90
     dish_prisms     0 to 999
     triplets        0 to 99
+    warm_lines      (ranger, target) -> °C by which the mean of that line is warmer than smooth air
+    u_sound_c       °C: these lines are sounded, each with an offset of its own drawn from it, and noise of a fifth;
+                    None: no sound
     """
     if not 5.0 <= elevation_deg <= 90.0:
         raise ValidityError(f"elevation {elevation_deg} deg is outside 5-90 deg, where the telescope moves")
@@ -115,13 +174,21 @@ def simulate_night(
     }
     plan = plan_shots(rule, lists, streams)
     air = Air(conditions, planted.gain("stratification"))
+    warm = dict(warm_lines or {})
+    for ranger, target in warm:
+        if ranger not in heads or target not in points:
+            raise InputError(f"a warm line {ranger} - {target}: the night has no such ends")
+    seen = {
+        r: WarmLine(air.conditions, air.stratification, tuple((points[t], w) for (a, t), w in warm.items() if a == r))
+        for r in heads
+    }
     returns = {
         r: returns_of_ranger(
             heads[r],
             plan[r],
             points=points,
             targets=targets,
-            air=air,
+            air=seen[r] if seen[r].plumes else air,
             faults=faults,
             planted=planted,
             streams=streams,
@@ -158,7 +225,31 @@ def simulate_night(
         shots=[r.shot for r in ordered],
         frames=frames,
         truth=truth,
+        sounded=soundings(air, warm, points, u_sound_c, streams, ordered[-1].shot.seconds),
     )
+
+
+def soundings(
+    air: Air,
+    warm: Mapping[tuple[str, str], float],
+    points: Mapping[str, np.ndarray],
+    u_sound_c: float | None,
+    streams: Streams,
+    until_s: float,
+) -> tuple[Sounding, ...]:
+    """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
+    if u_sound_c is None:
+        return ()
+    found = []
+    for (ranger, target), warmer in warm.items():
+        rng = streams(f"sound/{ranger}/{target}")
+        offset = u_sound_c * rng.normal()
+        z = np.linspace(points[ranger][2], points[target][2], 2001)
+        for seconds in np.arange(0.0, until_s + SOUNDING_INTERVAL_S, SOUNDING_INTERVAL_S):
+            mean = float(np.mean(air.temperature_c(z, seconds))) + warmer
+            read = mean + offset + 0.2 * u_sound_c * rng.normal()
+            found.append(Sounding(float(seconds), ranger, target, read, u_sound_c))
+    return tuple(sorted(found, key=lambda row: row.seconds))
 
 
 def benchmark_targets(marks: list[Benchmark], streams: Streams, planted: Planted) -> list[Target]:

@@ -215,6 +215,21 @@ def write_campaign(night: "Night", directory: Path) -> None:
             for w in night.weather
         ),
     )
+    if night.sounded:
+        write_table(
+            directory / "path_temperatures.csv",
+            "mjd_utc,ranger,target,temperature_c,u_temperature_c",
+            (
+                (
+                    f"{start + s.seconds / SECONDS_PER_DAY:.8f}",
+                    s.ranger,
+                    s.target,
+                    f"{s.temperature_c:.3f}",
+                    f"{s.u_temperature_c:.3f}",
+                )
+                for s in night.sounded
+            ),
+        )
     write_table(
         directory / "shots.csv",
         "shot,mjd_utc,ranger,target,cycles,samples_per_cycle,frame",

@@ -1,0 +1,538 @@
+"""Calibration of a refractometer path: n_g(t0, h0, p0) with phase(t0, h0, p0) from a night of both, then n_g(t).
+
+Every thermometer's index plus what the phase says of its change is one observation,
+    n_weather + dphi / K = n0 + delta dphi / K + b(t) / K + (what the sensors read too much) + formula + noise,
+K = 4 pi f L / c, dphi the phase since the reference phase, delta the relative error of the length L, b a drift of the
+phase. Offsets of sensors, the formula, delta and b are parameters with priors: they do not average out. Readings whose
+test statistic is beyond 3.5 are left out. The scatter that is found, and how it hangs together in time, makes the
+uncertainty where it is larger than what the sheet claims.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.atmosphere.air import MODELS, group_refractivity
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.errors import EstimationError
+from catseye.reduction.refractometer import AbsoluteIndex, absolute_group_index, phase_slope
+from catseye.reduction.refractometer_night import (
+    LASTING,
+    FollowedPhase,
+    PathReadings,
+    PathWeather,
+    ReadingStatus,
+    follow_phase,
+    path_weather,
+)
+from catseye.signal.cycles import CycleStatus
+
+CRITICAL = 3.5  # |w| beyond which a value is left out: one good value in 2000
+ROUNDS = 30  # cap of rounds of leaving out and taking back
+MOST_KNOTS = 48  # of the drift
+FEWEST_PLACES = 3  # thermometers that tell how much the air differs between them
+AGREES = 3.0  # standard uncertainties within which slopes agree
+UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one
+LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it tells nothing
+STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrated")
+
+
+@dataclass(frozen=True)
+class SlopeTest:
+    """The slope of phase against index, fitted freely, over the theoretical one.
+
+    ratio       1 when the phase follows the weather as -(4 pi f/c) L says
+    u           of the scatter
+    agrees      within three u, the length's own included; None where the index hardly changed
+    """
+
+    ratio: float
+    u: float
+    agrees: bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class PathCalibration:
+    """A calibrated path and the index of its air; rows as in the readings.
+
+    index_0, u_index_0   group refractivity at phase_0 and its standard uncertainty, at the time mjd_0
+    phase_0        rad, of the first section: the mean of its readings
+    temperature_0_c, pressure_0_hpa, humidity_0_percent   mean weather of the fit
+    names, x, covariance   of all parameters (ppm, °C, hPa, %, rad): see `names`
+    budget         cause -> its part of u_index_0
+    refractivity, u_refractivity   (m,) n_g - 1 by the phase; nan where the phase is not followed or not calibrated
+    temperature_c, u_temperature_c (m,) mean along the path that gives this index at the pressure and humidity read
+    residual       (m,) weather minus path, of the mean of the thermometers
+    standardised   (m,) test statistic of the reading
+    status         (m) a word of STATUS
+    slope          test of the theoretical slope
+    thermometer_scatter   found over claimed, 1 at least
+    places         how much further apart the thermometers are than their offsets' u, 1 at least: u counts so much more
+    air_noise      found scatter of the weather's index against the path's beyond what the sheet claims
+    correlation    readings that hang together: factor on the variance of means, 1 for white noise
+    variance_factor, degrees_of_freedom   of the values used
+    absolute       the index by phase and length alone at phase_0
+    path_length, u_path_length   m, that the weather's index asks for; nan where the whole cycles are not sure
+    notes          what a person should know
+    """
+
+    readings: PathReadings
+    weather: PathWeather
+    followed: FollowedPhase
+    index_0: float
+    u_index_0: float
+    phase_0: float
+    mjd_0: float
+    temperature_0_c: float
+    pressure_0_hpa: float
+    humidity_0_percent: float
+    names: tuple[str, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    budget: dict[str, float]
+    refractivity: np.ndarray
+    u_refractivity: np.ndarray
+    temperature_c: np.ndarray
+    u_temperature_c: np.ndarray
+    residual: np.ndarray
+    standardised: np.ndarray
+    status: tuple[str, ...]
+    slope: SlopeTest
+    thermometer_scatter: float
+    places: float
+    air_noise: float
+    correlation: float
+    variance_factor: float
+    degrees_of_freedom: float
+    absolute: AbsoluteIndex
+    path_length: float
+    u_path_length: float
+    notes: tuple[str, ...]
+
+    def of(self, name: str) -> tuple[float, float]:
+        """A parameter and its standard uncertainty."""
+        i = self.names.index(name)
+        return float(self.x[i]), float(np.sqrt(self.covariance[i, i]))
+
+
+def calibrate_path(readings: PathReadings) -> PathCalibration:
+    """The index at a reference phase, its uncertainty, and from it the index of every phase of the night.
+
+    readings   as `read_path_readings` gives them
+
+    Raises EstimationError where no section has five readings with weather.
+
+    Source: [PARKER04] sections 1.6, 1.6.2, eqs. 1.35, 1.36 with the sign of 5.18; least squares with priors,
+    [FOERSTNER16] chapter 4; tests, [BAARDA68]. Tested against scatter: u holds with strays, drift and offsets.
+    """
+    weather = path_weather(readings)
+    followed = follow_phase(readings, weather)
+    fit = _Fit(readings, weather, followed)
+    fit.run()
+    return _told(fit)
+
+
+class _Fit:
+    """The normal equations of one night, and which values take part; ppm, °C, hPa, %, rad.
+
+    Columns: one index a calibrated section, thermometers, barometer, hygrometer, formula, length, knots of the drift.
+    """
+
+    def __init__(self, readings: PathReadings, weather: PathWeather, followed: FollowedPhase) -> None:
+        self.readings, self.weather, self.followed = readings, weather, followed
+        sheet = readings.sheet
+        self.per_radian = 1.0 / (-float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)) * PPM)
+        good = followed.status == ReadingStatus.FOLLOWED
+        fits = good & readings.has_weather
+        numbers = range(len(followed.sections))
+        self.calibrated = [s for s in numbers if np.sum(fits & (followed.section == s)) >= LASTING]
+        if not self.calibrated:
+            raise EstimationError(f"{readings.file}: no section of the phase has {LASTING} readings with weather")
+        self.rows = np.flatnonzero(fits & np.isin(followed.section, self.calibrated))
+        self.good = good & np.isin(followed.section, self.calibrated)
+        self.phase_0 = np.array([followed.phase[self.rows[followed.section[self.rows] == s]].mean()
+                                 for s in self.calibrated])  # fmt: skip
+        self.hours = readings.hours
+        self.knots = self._knots()
+        self.names, self.prior = self._parameters()
+        design = self.at(np.arange(len(readings)))
+        self.common = design[self.rows]
+        self.change = self.common[:, self.names.index("length")]
+        self.slopes = weather.slopes[self.rows] / PPM
+        self.there = np.isfinite(weather.index[self.rows])
+        self.mean = float(np.nanmean(weather.index[self.rows]))
+        y = (np.where(self.there, weather.index[self.rows], self.mean) - self.mean) / PPM
+        self.y = y + self.change[:, None]
+        noise = (sheet.noise_temperature_c, sheet.noise_pressure_hpa, sheet.noise_humidity_percent)
+        self.noise_t = np.maximum(np.abs(self.slopes[:, 0]) * noise[0], 1e-6)
+        self.u_phase = readings.u_phase[self.rows] * self.per_radian
+        self.noise_c = self.u_phase**2 + (self.slopes[:, 1] * noise[1]) ** 2 + (self.slopes[:, 2] * noise[2]) ** 2
+        self.value_in = self.there.copy()
+        self.reading_in = np.ones(len(self.rows), dtype=bool)
+        self.scatter, self.air, self.correlation, self.places = 1.0, 0.0, 1.0, 1.0
+
+    def _knots(self) -> np.ndarray:
+        """Hours at which the drift is a parameter, zero at the first reading; none where the sheet knows of none."""
+        span = float(self.hours[-1])
+        if self.readings.sheet.drift_mrad_per_root_hour == 0.0 or span == 0.0:
+            return np.zeros(0)
+        return np.linspace(0.0, span, int(min(max(np.ceil(span), 1), MOST_KNOTS)) + 1)[1:]
+
+    def _parameters(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Names, and the matrix of weights that is known beforehand."""
+        r, sheet = self.readings, self.readings.sheet
+        formula = MODELS[sheet.air_model].standard_uncertainty / PPM
+        u_length = sheet.u_path_length_mm * MILLIMETRE / sheet.path_length_m
+        u = [*r.u_temperature_c, sheet.u_pressure_hpa, sheet.u_humidity_percent, formula, u_length]
+        names = [f"index {s + 1}" for s in self.calibrated]
+        names += [*r.thermometers, "pressure_hpa", "humidity_percent", "formula", "length"]
+        first = len(self.calibrated)
+        prior = np.zeros((len(names) + len(self.knots),) * 2)
+        for k, value in enumerate(u, start=first):
+            prior[k, k] = 1.0 / max(value, 1e-9) ** 2
+        increments = np.eye(len(self.knots)) - np.eye(len(self.knots), k=-1)
+        if len(self.knots):
+            rate = sheet.drift_mrad_per_root_hour * 1e-3
+            steps = np.diff(self.knots, prepend=0.0)
+            prior[len(names) :, len(names) :] = increments.T @ (increments / (rate**2 * steps)[:, None])
+        return (*names, *(f"drift at {h:.2f} h" for h in self.knots)), prior
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        """How the parameters make the path's index less dphi/K at readings (ppm): section, length, drift."""
+        f = self.followed
+        design = np.zeros((len(rows), len(self.names)))
+        for k, s in enumerate(self.calibrated):
+            mine = f.section[rows] == s
+            design[mine, k] = 1.0
+            design[mine, self.names.index("length")] = (f.phase[rows[mine]] - self.phase_0[k]) * self.per_radian
+        if len(self.knots):
+            grid = np.concatenate([[0.0], self.knots])
+            first = len(self.names) - len(self.knots)
+            for k in range(len(self.knots)):
+                design[:, first + k] = self.per_radian * np.interp(self.hours[rows], grid, np.eye(len(grid))[k + 1])
+        return design
+
+    def weights(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, k) of each value's own noise, and (n,) g: the weight matrix of a reading is diag(d) - g d d'."""
+        d = np.where(self.value_in & self.reading_in[:, None], 1.0, 0.0) / (self.scatter * self.noise_t[:, None]) ** 2
+        return d, 1.0 / (1.0 / (self.noise_c + self.air**2) + d.sum(axis=1))
+
+    def design(self) -> np.ndarray:
+        """(n, k, q) of every value: the path's index, and what sensors and formula add to the weather's."""
+        k = self.y.shape[1]
+        full = np.repeat(self.common[:, None, :], k, axis=1)
+        first = len(self.calibrated)
+        full[:, np.arange(k), first + np.arange(k)] = self.slopes[:, :1]
+        full[:, :, first + k], full[:, :, first + k + 1] = self.slopes[:, 1:2], self.slopes[:, 2:3]
+        full[:, :, first + k + 2] = -1.0
+        return full
+
+    def solve(self) -> None:
+        full, (d, g) = self.design(), self.weights()
+        flat, root = full.reshape(-1, full.shape[2]), np.sqrt(d).ravel()
+        pooled = np.einsum("nk,nkq->nq", d, full)
+        held = np.einsum("nk,nk->n", d, self.y)
+        normal = (flat * root[:, None]).T @ (flat * root[:, None]) - (pooled * g[:, None]).T @ pooled
+        right = (flat * d.ravel()[:, None]).T @ self.y.ravel() - pooled.T @ (g * held)
+        self.data = normal / self.correlation
+        self.covariance = _inverse(self.data + self.prior)
+        self.x = self.covariance @ (right / self.correlation)
+        self.v = self.y - full @ self.x
+
+    def tests(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual (n,) of readings' means, w (n,) of readings and w (n, k) of single values, taken out or not."""
+        own = 1.0 / (self.scatter * self.noise_t[:, None]) ** 2 * self.there
+        d = own * self.value_in
+        d = np.where(d.sum(axis=1, keepdims=True) > 0.0, d, own)
+        total = d.sum(axis=1)
+        common = self.noise_c + self.air**2
+        mean = np.einsum("nk,nk->n", d, self.v) / total
+        w_reading = mean / np.sqrt(1.0 / total + common)
+        others = total[:, None] - d  # a value against the mean of the rest: both share the reading's common noise
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rest = (total[:, None] * mean[:, None] - d * self.v) / others
+            apart = np.where(self.there & (others > 0.0), self.v - rest, np.nan)
+            w_value = _about_medians(apart) / np.sqrt(1.0 / own + 1.0 / others)
+        alone = (others <= 0.0) | ~self.there
+        return mean, w_reading, np.where(alone, 0.0, w_value)
+
+    def run(self) -> None:
+        """Values out and back in until nothing changes; scatter and its correlation in time as they are found."""
+        self.x = np.zeros(len(self.names))
+        self.x[: len(self.calibrated)] = [
+            np.nanmedian(np.where(self.there, self.y, np.nan)[self.followed.section[self.rows] == s])
+            for s in self.calibrated
+        ]
+        self.v = self.y - self.design() @ self.x
+        for _ in range(ROUNDS):
+            self._spread()
+            _, w_reading, w_value = self.tests()
+            worst = np.abs(w_value) >= np.abs(w_value).max(axis=1, keepdims=True)  # of a reading one at a time
+            value_in = self.there & ~((np.abs(w_value) > CRITICAL) & (worst | ~self.value_in))
+            reading_in = np.abs(w_reading) <= CRITICAL
+            same = np.array_equal(value_in, self.value_in) and np.array_equal(reading_in, self.reading_in)
+            self.value_in, self.reading_in = value_in, reading_in
+            before = (self.scatter, self.air, self.correlation)
+            self.solve()
+            self._spread()
+            now = (self.scatter, self.air, self.correlation)
+            if same and np.allclose(before, now, rtol=1e-3, atol=1e-4):
+                break
+        self.solve()
+        self._places()
+
+    def _places(self) -> None:
+        """Thermometers that stand further apart than their offsets allow show as little of the path's mean as that."""
+        k, first = len(self.readings.thermometers), len(self.calibrated)
+        if k < FEWEST_PLACES:
+            return
+        mine = np.arange(first, first + k)
+        self.places = max(1.0, float(np.sqrt(self.x[mine] ** 2 @ np.diag(self.prior)[mine] / (k - 1))))
+        self.prior[mine, mine] /= self.places**2
+        self.solve()
+
+    def _spread(self) -> None:
+        """Noise of thermometers and of the air as the residuals show it, robustly, and its correlation in time."""
+        d = np.where(self.there, 1.0, 0.0)
+        count = d.sum(axis=1)
+        mean = (d * self.v).sum(axis=1) / count
+        several = count > 1
+        if several.any():
+            rest = _about_medians(np.where(self.there, self.v - mean[:, None], np.nan)[several])
+            spread = rest / (self.noise_t[several] * np.sqrt(1.0 - 1.0 / count[several]))[:, None]
+            self.scatter = max(1.0, _spread_of(spread[np.isfinite(spread)]))
+        own = (self.scatter * self.noise_t) ** 2 / count + self.noise_c
+        self.air = float(np.sqrt(max(_spread_of(mean) ** 2 - float(np.median(own)), 0.0)))
+        keep = self.reading_in
+        self.correlation = _correlation((mean / np.sqrt(own + self.air**2))[keep])
+
+
+def _inverse(normal: np.ndarray) -> np.ndarray:
+    """Inverse of a normal matrix whose units lie many powers of ten apart."""
+    size = np.sqrt(np.diag(normal))
+    return np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
+
+
+def _about_medians(apart: np.ndarray) -> np.ndarray:
+    """Values (n, k) of each thermometer beside the others, without its usual one: that is its offset or its place."""
+    usual = [np.nanmedian(one) if np.isfinite(one).any() else 0.0 for one in apart.T]
+    return apart - usual
+
+
+def _spread_of(values: np.ndarray) -> float:
+    """Robust standard deviation about zero."""
+    return float(1.4826 * np.median(np.abs(values))) if len(values) else 0.0
+
+
+def _correlation(values: np.ndarray) -> float:
+    """Factor on the variance of a mean: 1 + 2 sum of autocorrelations, up to where pairs of them stop being above 0.
+
+    Source: the initial positive sequence of [GEYER92].
+    """
+    n = len(values)
+    if n < 4 * LASTING:
+        return 1.0
+    centred = values - values.mean()
+    size = 1 << (2 * n - 1).bit_length()
+    power = np.abs(np.fft.rfft(centred, size)) ** 2
+    auto = np.fft.irfft(power, size)[: n // 2]
+    if auto[0] <= 0.0:
+        return 1.0
+    auto = auto / auto[0]
+    pairs = auto[: len(auto) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    stop = int(np.argmax(pairs <= 0.0)) if np.any(pairs <= 0.0) else len(pairs)
+    return float(max(1.0, 2.0 * pairs[:stop].sum() - 1.0))
+
+
+def _told(fit: _Fit) -> PathCalibration:
+    """The answer in SI, from the fit in ppm."""
+    readings, followed, sheet = fit.readings, fit.followed, fit.readings.sheet
+    mean, w_reading, _ = fit.tests()
+    keep = fit.reading_in & fit.value_in.any(axis=1)
+    when = float(readings.mjd_utc[fit.rows[keep]].mean()) if keep.any() else float(readings.mjd_utc[0])
+    row = int(fit.rows[keep][np.argmin(np.abs(readings.mjd_utc[fit.rows[keep]] - when))])
+    at = fit.at(np.array([row]))[0]
+    at[: len(fit.calibrated)], at[fit.names.index("length")] = 0.0, 0.0
+    at[0] = 1.0
+    phase_0 = float(fit.phase_0[0])
+    index_0 = fit.mean + float(at @ fit.x) * PPM
+    u_0 = float(np.sqrt(at @ fit.covariance @ at)) * PPM
+    every = np.arange(len(readings))
+    refractivity, u, gradient = _indices(fit, every)
+    temperature, u_temperature = _temperatures(fit, refractivity, gradient)
+    residual, standardised = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
+    residual[fit.rows], standardised[fit.rows] = mean * PPM, w_reading
+    absolute = absolute_group_index(
+        phase_0,
+        path_length=sheet.path_length_m,
+        u_path_length=sheet.u_path_length_mm * MILLIMETRE,
+        expected_index=1.0 + index_0,
+        u_expected_index=u_0,
+        u_phase=float(np.median(readings.u_phase)),
+        modulation_hz=sheet.modulation_hz,
+    )
+    length, u_length = np.nan, np.nan
+    if absolute.status == CycleStatus.SURE:
+        half = 0.5 * SPEED_OF_LIGHT / sheet.modulation_hz
+        length = float((absolute.cycles - np.mod(phase_0, TWO_PI) / TWO_PI) * half / (1.0 + index_0))
+        u_length = length * u_0
+    d, g = fit.weights()
+    pvv = float(np.sum(d * fit.v**2) - np.sum(g * np.sum(d * fit.v, axis=1) ** 2))
+    used = int(np.sum(fit.value_in & fit.reading_in[:, None]))
+    freedom = used - float(np.trace(fit.covariance @ fit.data) * fit.correlation) if used else 0.0
+    slope = _slope(fit)
+    return PathCalibration(
+        readings=readings,
+        weather=fit.weather,
+        followed=followed,
+        index_0=index_0,
+        u_index_0=u_0,
+        phase_0=phase_0,
+        mjd_0=when,
+        temperature_0_c=float(np.nanmean(readings.temperature_c[fit.rows[keep]])),
+        pressure_0_hpa=float(readings.pressure_hpa[fit.rows[keep]].mean()),
+        humidity_0_percent=float(readings.humidity_percent[fit.rows[keep]].mean()),
+        names=fit.names,
+        x=fit.x,
+        covariance=fit.covariance,
+        budget=_budget(fit, at),
+        refractivity=refractivity,
+        u_refractivity=u,
+        temperature_c=temperature,
+        u_temperature_c=u_temperature,
+        residual=residual,
+        standardised=standardised,
+        status=_statuses(fit),
+        slope=slope,
+        thermometer_scatter=fit.scatter,
+        places=fit.places,
+        air_noise=fit.air * PPM,
+        correlation=fit.correlation,
+        variance_factor=pvv / freedom if freedom > 0.0 else float("nan"),
+        degrees_of_freedom=freedom,
+        absolute=absolute,
+        path_length=length,
+        u_path_length=u_length,
+        notes=_notes(fit, slope, absolute, index_0, u_0),
+    )
+
+
+def _indices(fit: _Fit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Group refractivity (m,) by the phase, its u, and its derivatives (m, q), ppm, by the parameters."""
+    at = fit.at(rows)
+    change = at[:, fit.names.index("length")]
+    value = fit.mean + (at @ fit.x - change) * PPM
+    noise = fit.readings.u_phase[rows] * fit.per_radian
+    u = np.sqrt(np.einsum("mq,qr,mr->m", at, fit.covariance, at) + noise**2) * PPM
+    good = fit.good[rows]
+    return np.where(good, value, np.nan), np.where(good, u, np.nan), at
+
+
+def _temperatures(fit: _Fit, refractivity: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean temperature (m,) that gives the index at the pressure and humidity read, and its u; °C.
+
+    n_model(t, p, h as read) = n_path - formula + dn/dp offset + dn/dh offset. A barometer that reads too high moved the
+    calibration by as much as it moves this inversion: the two cancel, and the covariance of the parameters says so.
+    """
+    r, sheet = fit.readings, fit.readings.sheet
+    rows = np.flatnonzero(np.isfinite(refractivity) & r.has_weather)
+    limits = MODELS[sheet.air_model].limits["temperature_c"]
+    light = {"wavelength_um": sheet.wavelength_um, "co2_ppm": sheet.co2_ppm, "model": sheet.air_model}
+    weather = r.pressure_hpa[rows], r.humidity_percent[rows]
+    slopes = fit.weather.slopes[rows]
+    warm = np.nanmean(r.temperature_c[rows], axis=1)
+    first = len(fit.calibrated) + len(r.thermometers)
+    sensors = np.stack([slopes[:, 1] / PPM, slopes[:, 2] / PPM, -np.ones(len(rows))], axis=1)
+    wanted = refractivity[rows] + sensors @ fit.x[first : first + 3] * PPM
+    inside = np.ones(len(rows), dtype=bool)
+    for _ in range(4):  # Newton: a step of 10 °C leaves 0.4, then 5e-4, then nothing
+        warm = warm + (wanted - group_refractivity(warm, *weather, **light)) / slopes[:, 0]
+        inside &= (warm >= limits.lower) & (warm <= limits.upper)
+        warm = np.clip(warm, limits.lower, limits.upper)  # where the model ends: no number, see `inside`
+    by = gradient[rows].copy()
+    by[:, first : first + 3] += sensors
+    noise = (r.u_phase[rows] * fit.per_radian) ** 2
+    noise = noise + (slopes[:, 1] / PPM * sheet.noise_pressure_hpa) ** 2
+    noise = noise + (slopes[:, 2] / PPM * sheet.noise_humidity_percent) ** 2
+    u = np.sqrt(np.einsum("mq,qr,mr->m", by, fit.covariance, by) + noise) * PPM / np.abs(slopes[:, 0])
+    found = np.full((2, len(r)), np.nan)
+    found[:, rows] = np.where(inside, [warm, u], np.nan)
+    return found[0], found[1]
+
+
+def _statuses(fit: _Fit) -> tuple[str, ...]:
+    words = np.full(len(fit.readings), "uncalibrated", dtype=object)
+    words[fit.good] = "no weather"
+    words[fit.rows] = np.where(fit.reading_in & fit.value_in.any(axis=1), "good", "weather off")
+    words[fit.followed.status == ReadingStatus.STRAY] = "stray"
+    words[fit.followed.status == ReadingStatus.LEFT_OUT] = "left out"
+    return tuple(str(word) for word in words)
+
+
+def _budget(fit: _Fit, at: np.ndarray) -> dict[str, float]:
+    """What each independent cause gives of the uncertainty of at'x, index: scatter, and each prior."""
+    by = fit.covariance @ at
+    k = len(fit.readings.thermometers)
+    first = len(fit.calibrated)
+    causes = {
+        "scatter of the readings": np.zeros(0, dtype=int),
+        "thermometers": np.arange(first, first + k),
+        "barometer": np.array([first + k]),
+        "hygrometer": np.array([first + k + 1]),
+        "formula": np.array([first + k + 2]),
+        "path length": np.array([first + k + 3]),
+        "drift": np.arange(first + k + 4, len(fit.names)),
+    }
+    parts = {"scatter of the readings": float(np.sqrt(by @ fit.data @ by)) * PPM}
+    for cause, columns in causes.items():
+        if len(columns):
+            parts[cause] = float(np.sqrt(by[columns] @ fit.prior[np.ix_(columns, columns)] @ by[columns])) * PPM
+    return parts
+
+
+def _slope(known: _Fit) -> SlopeTest:
+    """The slope of a fit that knows nothing of the length; noise of the phase flattens it, which is put right."""
+    fit = _Fit(known.readings, known.weather, known.followed)
+    at = fit.names.index("length")
+    fit.prior[at, at] = (fit.prior[at, at] ** -0.5 + UNKNOWN_SLOPE) ** -2
+    fit.run()
+    d, g = fit.weights()
+    alone = d.sum(axis=1) - g * d.sum(axis=1) ** 2
+    variance = fit.covariance[at, at]
+    share = float(np.sum(alone * fit.u_phase**2) / fit.correlation * variance)
+    u = float(np.sqrt(variance))
+    if u >= LEAST_SLOPE or share > 0.5:
+        return SlopeTest(float("nan"), u, None)
+    ratio, u = float((1.0 - fit.x[at]) / (1.0 - share)), u / (1.0 - share)
+    u_length = fit.readings.sheet.u_path_length_mm * MILLIMETRE / fit.readings.sheet.path_length_m
+    return SlopeTest(ratio, u, bool(abs(ratio - 1.0) <= AGREES * np.hypot(u, u_length)))
+
+
+def _notes(fit: _Fit, slope: SlopeTest, absolute: AbsoluteIndex, index_0: float, u_0: float) -> tuple[str, ...]:
+    followed, readings, notes = fit.followed, fit.readings, list(fit.followed.bridged)
+    for number, s in enumerate(followed.sections[1:], start=2):
+        where = f"section {number} from {readings.where[s.first]}"
+        if s.reason == "jump":
+            notes.append(f"{where}: a jump of {s.text}")
+        else:
+            notes.append(f"{where}: {s.text}; its whole cycles are not tied to those before")
+    for number in range(len(followed.sections)):
+        if number not in fit.calibrated:
+            notes.append(f"section {number + 1} has fewer than {LASTING} readings with weather: not calibrated")
+    if slope.agrees is False:
+        notes.append(
+            f"phase and weather disagree: the slope is {slope.ratio:.3f} ± {slope.u:.3f} of the theoretical one; "
+            "below 1 the path's air changes less than the sensors'"
+        )
+    k, first = len(readings.thermometers), len(fit.calibrated)
+    for i, name in enumerate(readings.thermometers if k > 1 else ()):
+        off, known = float(fit.x[first + i]), float(readings.u_temperature_c[i])
+        if abs(off) > AGREES * known > 0.0:
+            notes.append(
+                f"{name} reads {off:+.2f} °C beside the others, {abs(off) / known:.0f} of its u: offset or place"
+            )
+    if absolute.status == CycleStatus.SURE:
+        apart, u = float(absolute.group_index) - 1.0 - index_0, float(np.hypot(absolute.u, u_0))
+        if abs(apart) > AGREES * u:
+            notes.append(f"path length and weather disagree by {apart / PPM:+.2f} ppm, {abs(apart) / u:.1f} of its u")
+    return tuple(notes)
