@@ -10,6 +10,7 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.propagation import agrees, numerical_sensitivity
 from catseye.records.campaign import REFERENCE
+from catseye.records.path_temperature import PathTemperatureTable
 from catseye.reduction.budget import Assumptions, explain_shot, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import _cycles, _places, budget_of, scatter_of
@@ -462,3 +463,31 @@ def test_what_the_sheet_does_not_say_is_named(night_01, reduced_night_01):
     said = sheet.model_copy(update={"u_cyclic_mm": 0.01, "u_amplitude_to_phase_rad": 0.001})
     told = dataclasses.replace(night_01, mirrors={**night_01.mirrors, sheet.zp: said})
     assert explain_shot(told, PRISM, draws=0).notes == ()
+
+
+def sounded(campaign, shot, temperature_c=13.0, u=0.2):
+    """The campaign with the temperature of one shot's line by sound."""
+    row = list(campaign.shots.shot).index(shot)
+    when = np.array([campaign.shots.mjd_utc[row]])
+    names = ((campaign.shots.ranger[row],), (campaign.shots.target[row],))
+    return dataclasses.replace(
+        campaign, path_temperatures=PathTemperatureTable(when, *names, np.array([temperature_c]), np.array([u]))
+    )
+
+
+@pytest.mark.parametrize("shot", [PRISM, HOLLOW])
+def test_where_sound_tells_the_temperature_its_uncertainty_takes_the_thermometers_place(night_01, sight, shot):
+    plain, scene = sight(night_01, shot), sight(sounded(night_01, shot), shot)
+    items = items_of(scene)
+    slopes = numerical_sensitivity(measurement(scene, items), [item.given for item in items])
+    for item, numerical in zip(items, slopes, strict=True):
+        off = abs(item.slope - numerical) * item.given.u
+        assert off < 2e-9, f"{item.key}: {item.slope} by hand, {numerical} by differences"
+    best = np.array([[item.given.value for item in items]])
+    assert measurement(scene, items)(best)[0] == pytest.approx(scene.range_, abs=1e-9)
+    # what sound reads too warm is taken off the range, 0.9 ppm a degree; thermometers are left with the vapour's part
+    assert slope_of(items, "sound") / scene.length == pytest.approx(-0.89e-6, abs=0.03e-6)
+    before = sum(slope_of(items_of(plain), item.key) for item in items if item.key.startswith("thermometer "))
+    after = sum(item.slope for item in items if item.key.startswith("thermometer "))
+    assert abs(after) < 0.06 * abs(before)
+    assert "sound" not in {item.key for item in items_of(plain)}

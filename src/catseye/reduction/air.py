@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, group_partials, group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.air import MODELS, group_refractivity
 from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import SECONDS_PER_DAY
@@ -164,6 +164,13 @@ class AirField:
         """Name of the profile's parameter: "bend" or "gradient"."""
         return self.names[len(self.heights)]
 
+    @property
+    def line_of_first(self) -> SoundedLine | None:
+        """The line whose sound gives the temperature of the first path of `on_lines`; None where thermometers do."""
+        if self.sounded is None or self.sounded[0] < 0:
+            return None
+        return self.lines[self.sounded[0]]
+
     def on_lines(self, mjd_utc: np.ndarray, ends: Sequence[frozenset[str]]) -> "AirField":
         """The same air for m paths in this order, each known by its two ends, so that sound can replace thermometers.
 
@@ -237,21 +244,24 @@ class AirField:
     def _by_sound(self, mjd_utc: np.ndarray, parameters: np.ndarray, warm: np.ndarray) -> Profile:
         """The same at the temperature `warm` (m,) °C all along the path, and then its derivative by that temperature.
 
-        The vapour pressure stays what the stations' thermometers and hygrometers say: warming air does not wet it.
+        The vapour pressure stays what the stations' thermometers and hygrometers say: warming air does not wet it. In
+        fog a line that sound finds colder would be a little more than saturated; the formulas are smooth there.
         """
         weather = self._weather(mjd_utc, parameters)
-        light = {"wavelength_um": self.wavelength_um, "model": self.model}
-        formula = MODELS[self.model].vapour_formula
+        chosen = MODELS[self.model]
+        chosen.check(temperature_c=warm)
+        light = {"wavelength_um": self.wavelength_um, "co2_ppm": chosen.co2_ppm}
 
         def profile(z: np.ndarray) -> np.ndarray:
             share, last, temperature, pressure, humidity = weather(z)
             vapour, above, below = (
-                vapour_pressure_hpa(temperature + step, pressure, humidity, formula) for step in (0.0, 0.5, -0.5)
+                vapour_pressure_hpa(temperature + step, pressure, humidity, chosen.vapour_formula)
+                for step in (0.0, 0.5, -0.5)
             )
             state = (np.broadcast_to(warm[:, None], z.shape), pressure, vapour)
-            partials = group_partials(*state, **light)
+            partials = chosen.partials(*state, **light)
             per_c = partials.vapour_pressure_hpa * (above - below)
-            index = group_refractivity_of_vapour(*state, **light)
+            index = chosen.refractivity(*state, **light)
             by_stations = -per_c * np.moveaxis(share, -1, 0)
             return np.concatenate([index[None], by_stations, (per_c * last)[None], partials.temperature_c[None]])
 

@@ -6,7 +6,8 @@ reference shots and the target's, and the interpolation is applied to it.
 
 import numpy as np
 
-from catseye.atmosphere.air import air, group_refractivity
+from catseye.atmosphere.air import MODELS, air, group_refractivity
+from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.propagation import Draw, Model, draw_inputs
@@ -108,11 +109,14 @@ def _index(scene: Scene, v: Columns) -> np.ndarray:
     middle = field.heights.mean()
     arms = field.heights - middle
     mean = true.mean(axis=1)
-    bent = field.names[-1] == "bend"
+    bent = field.profile == "bend"
     slope = true @ arms / np.sum(arms**2) if bent else v("profile")
     pressure, humidity = v("pressure"), v("humidity")
     legal = np.clip(humidity, 0.0, 100.0)  # beyond, the index goes on along its tangent
     light = {"wavelength_um": field.wavelength_um, "model": field.model}
+    line = field.line_of_first
+    warm, share = (0.0, 0.0) if line is None else line.at(scene.campaign.shots.mjd_utc[[scene.row]])
+    sound = warm - share * v("sound")
     best = air(float(read.mean()), v.best["pressure"], v.best["humidity"], **light).sensitivity.humidity_percent
 
     def profile(z: np.ndarray) -> np.ndarray:
@@ -120,9 +124,14 @@ def _index(scene: Scene, v: Columns) -> np.ndarray:
         if bent:
             low, high = field.heights.min(), field.heights.max()
             temperature = temperature + v("profile")[:, None] * 4.0 * (z - low) * (high - z) / (high - low) ** 2
-        return group_refractivity(
-            temperature, pressure_at(pressure[:, None], middle, z), np.broadcast_to(legal[:, None], z.shape), **light
-        )
+        at = pressure_at(pressure[:, None], middle, z)
+        if line is None:
+            return group_refractivity(temperature, at, np.broadcast_to(legal[:, None], z.shape), **light)
+        # sound gives the temperature, the stations' air the vapour
+        chosen = MODELS[field.model]
+        vapour = vapour_pressure_hpa(temperature, at, legal[:, None], chosen.vapour_formula)
+        state = (sound[:, None], at, vapour)
+        return chosen.refractivity(*state, wavelength_um=field.wavelength_um, co2_ppm=chosen.co2_ppm)
 
     ends = (np.full(len(v.x), scene.a[2]), np.full(len(v.x), scene.b[2]))
     mean_refractivity = mean_over_height(profile, *ends, nodes=NODES)

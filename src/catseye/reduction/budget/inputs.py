@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.air import MODELS, air
+from catseye.atmosphere.humidity import saturation
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.propagation import STUDENT, Input
@@ -229,18 +230,25 @@ def _air(scene: Scene) -> list[Item]:
     by_pressure, by_humidity = _weather_slopes(scene)
     fluctuation = scene.campaign.site.ranging.path_index_fluctuation_ppm
     items = []
-    for k, name in enumerate(field.names[:-1]):
+    for k, name in enumerate(field.stations):
         given = Input(f"offset of thermometer {name}", 0.0, float(field.sigmas[k]))
         source = ASSUMED + "never compared with a standard"
         items.append(Item(f"thermometer {name}", given, "°C", by_index * float(scene.path.slopes[0, k]), source))
-    profile = field.names[-1]
-    unit = "°C" if profile == "bend" else "°C/m"
-    given = Input(f"{profile} of temperature with height", 0.0, float(field.sigmas[-1]))
-    source = ASSUMED + ("half-way between the stations" if profile == "bend" else "stations at one height")
+    at = len(field.stations)
+    unit = "°C" if field.profile == "bend" else "°C/m"
+    given = Input(f"{field.profile} of temperature with height", 0.0, float(field.sigmas[at]))
+    source = ASSUMED + ("half-way between the stations" if field.profile == "bend" else "stations at one height")
+    items.append(Item("profile", given, unit, by_index * float(scene.path.slopes[0, at]), source))
+    line = field.line_of_first
+    if line is not None:
+        column = field.names.index(line.name)
+        given = Input(f"temperature of {line.name} by sound", 0.0, float(field.sigmas[column]))
+        items.append(
+            Item("sound", given, "°C", by_index * float(scene.path.slopes[0, column]), "path_temperatures.csv")
+        )
     formula = MODELS[scene.settings.air_model].standard_uncertainty / PPM
     return [
         *items,
-        Item("profile", given, unit, by_index * float(scene.path.slopes[0, -1]), source),
         Item(
             "pressure",
             Input("pressure", pressure, assumed.u_pressure_hpa),
@@ -278,19 +286,30 @@ def _weather_slopes(scene: Scene) -> tuple[float, float]:
     temperatures = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
     pressure, humidity = mean_readings(scene)
     middle = float(field.heights.mean())
+    line = field.line_of_first
+    warm = 0.0 if line is None else float(line.at(scene.campaign.shots.mjd_utc[[scene.row]])[0][0])
     slope, level = (0.0, float(temperatures.mean()))
-    if field.names[-1] == "bend":
+    if field.profile == "bend":
         slope, level = np.polyfit(field.heights - middle, temperatures, 1)
 
     def slopes(z: np.ndarray) -> np.ndarray:
+        at = pressure_at(pressure, middle, z)
         found = air(
             level + slope * (z - middle),
-            pressure_at(pressure, middle, z),
+            at,
             np.full(z.shape, humidity),
             wavelength_um=field.wavelength_um,
             model=field.model,
-        ).sensitivity
-        return np.stack([found.pressure_hpa, found.humidity_percent])
+        )
+        if line is None:
+            return np.stack([found.sensitivity.pressure_hpa, found.sensitivity.humidity_percent])
+        # sound gives the temperature, the stations' air the vapour
+        chosen = MODELS[field.model]
+        saturated = saturation(level + slope * (z - middle), at, chosen.vapour_formula)
+        state = (warm, at, found.vapour_pressure_hpa)
+        held = chosen.partials(*state, wavelength_um=field.wavelength_um, co2_ppm=chosen.co2_ppm)
+        by_pressure = held.pressure_hpa + held.vapour_pressure_hpa * humidity / 100.0 * saturated.per_hpa
+        return np.stack([by_pressure, held.vapour_pressure_hpa * saturated.pressure_hpa / 100.0])
 
     by_pressure, by_humidity = mean_over_height(slopes, scene.a[2], scene.b[2])
     return float(by_pressure), float(by_humidity)

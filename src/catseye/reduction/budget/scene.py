@@ -174,7 +174,7 @@ def scene_of(
     a, b = ends
     mirror = campaign.mirror_of(ranger)
     references = references_of(campaign, phases, wrong, row)
-    field = AirField.of(campaign, settings)
+    field = AirField.of(campaign, settings).on_lines(shots.mjd_utc[[row]], [frozenset((ranger, target))])
     path = field.along(shots.mjd_utc[[row]], a[None], b[None], np.zeros(len(field.names)))
     distance = float(np.linalg.norm(a - b))
     incidence, obliquity = 0.0, 0.0
