@@ -88,3 +88,17 @@ def test_the_air_is_told_with_its_state_and_both_uncertainties():
     assert told["formula_uncertainty"] == state.standard_uncertainty
     # the slope as printed, four digits
     assert told["standard_uncertainty"] == pytest.approx(math.hypot(5e-8, 0.3 * 0.8921e-6), rel=1e-3)
+
+
+def test_benchmarks_are_told_as_refractometers(reduction):
+    """Each path's index must agree with the stations' within both uncertainties, as night-01's stations nearly do."""
+    told = reduction_object(reduction)["air"]
+    assert told["lines_by_sound"] == {}
+    assert [one["benchmark"] for one in told["benchmarks"]] == [b.target for b in reduction.campaign.benchmarks]
+    for one in told["benchmarks"]:
+        assert one["shots"] > 0
+        u = math.hypot(one["u_path_ppm"], one["u_weather_ppm"])
+        assert abs(one["path_ppm"] - one["weather_ppm"]) < 3.0 * u
+        # about 0.93 ppm a degree: the same difference in degrees
+        difference = one["path_ppm"] - one["weather_ppm"]
+        assert one["thermometers_too_warm_c"] == pytest.approx(difference / 0.93, rel=0.08, abs=0.02)

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye import __version__
+from catseye.constants import PPM
 from catseye.gateways.output import FORMAT
 
 if TYPE_CHECKING:
     from catseye.atmosphere.air import Air
     from catseye.records.campaign import Campaign
     from catseye.reduction.epoch import Reduction
+    from catseye.reduction.refractometer import BenchmarkSeries
 
 PACKAGES = ("numpy", "scipy", "pydantic", "matplotlib", "threadpoolctl", "typer")
 CERTIFICATE = ("serial", "measured_on", "valid_until", "by", "report")
@@ -116,7 +118,9 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
 
 
 def estimated_air(reduction: "Reduction") -> dict[str, Any]:
-    """What the ranges said about the thermometers and the profile; units in the keys."""
+    """What the ranges, the benchmarks and sound said of the air; units in the keys."""
+    from catseye.reduction.refractometer import benchmark_refractometers
+
     *stations, profile = reduction.coordinates.air.items()
     (name, (value, u)) = profile
     key = "gradient_c_per_m" if name == "gradient" else "bend_c"
@@ -125,7 +129,33 @@ def estimated_air(reduction: "Reduction") -> dict[str, Any]:
         "thermometers": {station: {"offset_c": offset, "u_offset_c": us} for station, (offset, us) in stations},
         key: value,
         f"u_{key}": u,
+        "lines_by_sound": {
+            line: {"too_warm_c": warm, "u_too_warm_c": us} for line, (warm, us) in reduction.coordinates.sound.items()
+        },
+        "benchmarks": [benchmark_object(series) for series in benchmark_refractometers(reduction)],
     }
+
+
+def benchmark_object(series: "BenchmarkSeries") -> dict[str, Any]:
+    """What a benchmark path says of the air beside the weather stations, means over its used shots."""
+    used = series.used
+    return {
+        "benchmark": series.benchmark,
+        "ranger": series.ranger,
+        "shots": int(used.sum()),
+        "path_ppm": mean_ppm(series.path[used]),
+        "u_path_ppm": mean_ppm(series.u_path[used]),
+        "weather_ppm": mean_ppm(series.weather[used]),
+        "u_weather_ppm": mean_ppm(series.u_weather[used]),
+        "adjusted_ppm": mean_ppm(series.adjusted[used]),
+        "thermometers_too_warm_c": series.too_warm_c,
+        "u_thermometers_too_warm_c": series.u_too_warm_c,
+    }
+
+
+def mean_ppm(refractivity: np.ndarray) -> float:
+    """Mean of refractivities in ppm; nan of none."""
+    return float(refractivity.mean()) / PPM if len(refractivity) else float("nan")
 
 
 def surface_object(reduction: "Reduction") -> dict[str, Any] | None:

@@ -8,11 +8,12 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.figures import figures
-from catseye.gateways.objects import versions
+from catseye.gateways.objects import benchmark_object, versions
 from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.summary import feed_arm_rows, passages, pointing, trust_limits
 from catseye.gateways.tables import kind_of
 from catseye.reduction.epoch import Reduction
+from catseye.reduction.refractometer import benchmark_refractometers
 from catseye.reduction.surface import UNOBSERVED
 
 CONTENTS = {
@@ -258,6 +259,28 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
         else ("half-way between the stations warmer than on their line by", "°C")
     )
     rows.append((label, f"{value:+.4f} {unit}", f"{u:.4f} {unit}"))
+    rows += [
+        (f"{line}: its sound reads too warm by", f"{warm:+.3f} °C", f"{s:.3f} °C")
+        for line, (warm, s) in reduction.coordinates.sound.items()
+    ]
+    benchmarks = [
+        (
+            one["benchmark"],
+            one["ranger"],
+            str(one["shots"]),
+            f"{one['path_ppm']:.2f} ± {one['u_path_ppm']:.2f}",
+            f"{one['weather_ppm']:.2f} ± {one['u_weather_ppm']:.2f}",
+            f"{one['adjusted_ppm']:.2f}",
+            f"{one['thermometers_too_warm_c']:+.2f} ± {one['u_thermometers_too_warm_c']:.2f}",
+        )
+        for one in map(benchmark_object, benchmark_refractometers(reduction))
+        if one["shots"]
+    ]
+    columns = ("benchmark", "ranger", "shots", "by the path", "by the stations", "adjusted", "stations too warm (°C)")
+    paths = paragraph(
+        "Each benchmark path is a refractometer: n_g − 1 (ppm) from its phase, its certificate and the ranger's sheet, "
+        "beside the weather stations as they read and as the adjustment leaves them."
+    )
     return section(
         "air",
         CONTENTS["air"],
@@ -266,6 +289,7 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
         else "",
         picture(drawn["weather"], "What the weather stations recorded."),
         table((f"estimated with the coordinates (model {reduction.settings.air_model})", "value", "u"), rows, "tnn"),
+        *([paths, table(columns, benchmarks, "ttnnnnn")] if benchmarks else []),
     )
 
 

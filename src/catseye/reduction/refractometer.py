@@ -177,8 +177,8 @@ class BenchmarkSeries:
     u_common            of it what all rows share: certificate, D0, rest of leakage
     weather, u_weather  (m,) by the stations as they read, and the u of their sensors' offsets and of the formula
     adjusted            (m,) with the offsets that the adjustment found
-    too_warm_c, u_too_warm_c   °C that the thermometers would have to read too high for the mean difference, and its u
-                        from the path's side
+    too_warm_c, u_too_warm_c   °C that the thermometers would have to read too high for the mean difference of the used
+                        shots, and its u from the path's side; nan where none was used
     """
 
     benchmark: str
@@ -252,20 +252,22 @@ def _series(reduction: "Reduction", benchmark: "Benchmark", rows: np.ndarray) ->
     air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), nothing)
     formula = MODELS[reduction.settings.air_model].standard_uncertainty
     u_weather = np.sqrt(np.sum((air.slopes * field.sigmas) ** 2, axis=1) + formula**2)
-    difference = path - air.refractivity
+    used = ranges.used[rows]
+    count = max(int(used.sum()), 1)
+    difference = float((path - air.refractivity)[used].sum()) / count if used.any() else np.nan
     per_c = float(air.slopes[:, : len(field.stations)].sum(axis=1).mean())
-    u_mean = float(np.sqrt(noise.sum() / len(rows) ** 2 + u_common**2))
+    u_mean = float(np.sqrt(noise[np.ix_(used, used)].sum() / count**2 + u_common**2)) if used.any() else np.nan
     return BenchmarkSeries(
         benchmark=benchmark.target,
         ranger=benchmark.ranger,
         mjd_utc=mjd,
-        used=ranges.used[rows],
+        used=used,
         path=path,
         u_path=u_path,
         u_common=u_common,
         weather=air.refractivity,
         u_weather=u_weather,
         adjusted=ranges.refractivity[rows],
-        too_warm_c=float(difference.mean()) / per_c,
+        too_warm_c=difference / per_c,
         u_too_warm_c=u_mean / per_c,
     )
