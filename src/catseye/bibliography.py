@@ -42,6 +42,7 @@ SOURCES: dict[str, Source] = {
             "2.44 omits the plus signs between X_r and its offset",
             "3.1 says the coordinates are unique: three ranges give two points, mirror images in the stations' plane",
             "2.5 (example) says the y origin is the tooling ball of ZY2: z is meant",
+            "chapter 6, item 1: by the group index alone the middle of a lens comes late, not the edge",
             "figure 1.1 (REFRACT.EQ) sets the wet bulb tp = t after the psychrometer's equations, which then see "
             "saturated air",
             "4.3 prints gamma_w = 1.004 for water vapour, about 1.33 is right: humid air 0.5 m/s faster at 20 °C, 50 %",
@@ -54,11 +55,14 @@ SOURCES: dict[str, Source] = {
     "GOLDMAN00": Source(
         title="M. A. Goldman, Calibration of the GBT triplet retroreflector units, 2000",
         locator="National Radio Astronomy Observatory, 29 June 2000",
-        used="eqs. 3.4, 3.5, 3.8-3.10, 3.13, 3.14, 3.16, 3.17, B.1, figure 10",
+        used="eqs. 3.4, 3.5, 3.8-3.29, section 3.4, A.1-A.8, B.1, C, D.1-D.5, figures 2 to 11",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
+            "3.23 with D_TOPPL good to 2 mm gives incidences to some mrad, and none where D_0 exceeds D_1",
+            "3.4's table: H_rp is 25.146 mm for a 38.4 mm prism, not 25.2; P_c of the ball -173.715 mm, not -173.6",
+            "D: not insignificant for H_corr, the ball has 108 mm more glass: 1.1 um for 1e-5 of the index ratio",
             "D.3 gives n_air at 20.5 C, the value belongs to 20.0 C; D.4 prints -0.985e-6, -0.895887e-6 is right",
         ),
     ),
@@ -75,7 +79,7 @@ SOURCES: dict[str, Source] = {
     "SCHOTT14": Source(
         title="Schott AG, Data sheet N-BK7 517642.251, 2014",
         locator="Schott optical glass data sheets, 1 February 2014",
-        used="the six constants of the Sellmeier dispersion formula, 312.6 to 2325.4 nm",
+        used="the six constants of the Sellmeier dispersion formula, 312.6 to 2325.4 nm; of dn/dT; expansion",
     ),
     "TIE29": Source(
         title="Schott AG, Technical information TIE-29: Refractive index and dispersion, 2005",
@@ -146,7 +150,7 @@ SOURCES: dict[str, Source] = {
     "JCGM100": Source(
         title="JCGM, Evaluation of measurement data: guide to the expression of uncertainty in measurement, 2008",
         locator="JCGM 100:2008",
-        used="4.2.3, 5.1.3, eqs. 10, 13, 16 and G.2b (combined uncertainty, degrees of freedom), annex H.1",
+        used="4.2.3, 5.1.3, 5.1.4, F.2, eqs. 10, 13, 16 and G.2b (combined uncertainty, degrees of freedom), annex H.1",
     ),
     "BAARDA73": Source(
         title="W. Baarda, S-transformations and criterion matrices, Netherlands Geodetic Commission, 1973",
@@ -310,12 +314,12 @@ SOURCES: dict[str, Source] = {
     "SIEGMAN86": Source(
         title="A. E. Siegman, Lasers, University Science Books, 1986",
         locator="ISBN 978-0-935702-11-8",
-        used="chapter 17: radius and curvature of a Gaussian beam, share through an aperture",
+        used="chapters 15, 17, 20: ray matrices, Gaussian beams, share through an aperture, the Huygens integral",
     ),
     "GOODMAN05": Source(
         title="J. W. Goodman, Introduction to Fourier optics, third edition, Roberts, 2005",
         locator="ISBN 978-0-9747077-2-3",
-        used="chapter 4: Fresnel's diffraction integral",
+        used="chapter 4: Fresnel's diffraction integral; Parseval's theorem",
     ),
     "YARIV97": Source(
         title="A. Yariv, Optical electronics in modern communications, fifth edition, Oxford, 1997",
@@ -594,5 +598,165 @@ SOURCES: dict[str, Source] = {
         title="C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992",
         locator="doi:10.1214/ss/1177011137",
         used="section 3.3: initial positive sequence estimator of the variance of a mean of correlated values",
+    ),
+    "MALITSON65": Source(
+        title="I. H. Malitson, Interspecimen comparison of the refractive index of fused silica, 1965",
+        locator="doi:10.1364/JOSA.55.001205",
+        used="the three-term Sellmeier formula, 0.21 to 3.71 um, and lines of table I",
+    ),
+    "SCHOTT17": Source(
+        title="Schott AG, Optical glass catalogue, 20 January 2017",
+        locator="schott_2017-01-20b.agf, as refractiveindex.info records it",
+        used="LITHOSIL-Q: constants of dn/dT and thermal expansion",
+    ),
+    "OHARA17": Source(
+        title="Ohara Inc., Optical glass catalogue, 30 November 2017",
+        locator="OHARA Zemax catalogue 2017-11-30, as refractiveindex.info records it",
+        used="S-LAH79: Sellmeier constants, constants of dn/dT, thermal expansion",
+    ),
+    "TIE19": Source(
+        title="Schott AG, Technical information TIE-19: Temperature coefficient of the refractive index",
+        locator="Schott Advanced Optics, 2016",
+        used="change of the absolute index with temperature; index of the reference air",
+    ),
+    "YODER58": Source(
+        title="P. R. Yoder, Study of light deviation errors in triple mirrors and tetrahedral prisms, 1958",
+        locator="doi:10.1364/JOSA.48.000496",
+        used="deviation by dihedral errors, aperture and total reflection of corner reflectors",
+    ),
+    "SNYDER75": Source(
+        title="J. J. Snyder, Paraxial ray analysis of a cat's-eye retroreflector, Applied Optics 14, 1975",
+        locator="doi:10.1364/AO.14.001825",
+        used="the mirror in the focus of the cat's-eye's front",
+    ),
+    "BORN99": Source(
+        title="M. Born and E. Wolf, Principles of Optics, seventh edition, Cambridge University Press, 1999",
+        locator="doi:10.1017/CBO9781139644181",
+        used="section 1.5: Fresnel's formulae (room L cites it too: join)",
+    ),
+    "JCGM106": Source(
+        title="JCGM, Evaluation of measurement data: The role of measurement uncertainty in conformity "
+        "assessment, 2012",
+        locator="JCGM 106:2012",
+        used="clause 7: conformity probability, two-sided tolerance interval, normal law",
+    ),
+    "YUN11": Source(
+        title="G. Yun, K. Crabtree and R. A. Chipman, Three-dimensional polarization ray-tracing calculus I: "
+        "definition and diattenuation, Applied Optics 50, 2011",
+        locator="doi:10.1364/AO.50.002855",
+        used="the 3 x 3 matrix of a surface, and that they multiply",
+    ),
+    "CHIPMAN18": Source(
+        title="R. A. Chipman, W.-S. T. Lam and G. Young, Polarized Light and Optical Systems, CRC Press, 2018",
+        locator="doi:10.1201/9781351129121",
+        used="Jones matrices of wave plates, and of light that returns through them",
+    ),
+    "PECK62": Source(
+        title="E. R. Peck, Polarization properties of corner reflectors and cavities, Journal of the Optical "
+        "Society of America 52, 1962",
+        locator="doi:10.1364/JOSA.52.000253",
+        used="the six ways round a corner straight on; reference 99 of PARKER04",
+    ),
+    "PLAYER88": Source(
+        title="M. A. Player, Polarization properties of a cube-corner reflector, Journal of Modern Optics 35, 1988",
+        locator="J. Mod. Opt. 35 (11), pages 1813-1820",
+        used="a lossless corner is a turn, a linear retarder and a turn; the index that makes a quarter wave",
+        errata=(
+            "the abstract prints 1.76476 for the quarter-wave corner; 1.767476 is right (our inference: a digit lost)",
+        ),
+    ),
+    "LIU97": Source(
+        title="J. Liu and R. M. A. Azzam, Polarization properties of corner-cube retroreflectors: theory and "
+        "experiment, Applied Optics 36, 1997",
+        locator="doi:10.1364/AO.36.001553",
+        used="Jones matrices of the six propagation trips, straight on",
+    ),
+    "CHANG71": Source(
+        title="R. F. Chang, D. G. Currie, C. O. Alley and M. E. Pittman, Far-field diffraction pattern for corner "
+        "reflectors with complex reflection coefficients, Journal of the Optical Society of America 61, 1971",
+        locator="doi:10.1364/JOSA.61.000431",
+        used="six sectors added as amplitudes in the far field",
+    ),
+    "IEC14": Source(
+        title="International Electrotechnical Commission, IEC 60825-1:2014, Safety of laser products, Part 1: "
+        "Equipment classification and requirements, edition 3",
+        locator="IEC 60825-1:2014",
+        used="clauses 4.3, 5.3; tables 3 to 10, A.1, A.2, A.5, 400 to 1400 nm",
+    ),
+    "ANSI14": Source(
+        title="Laser Institute of America, ANSI Z136.1-2014, American National Standard for Safe Use of Lasers, 2014",
+        locator="ANSI Z136.1-2014",
+        used="tables 5b to 5e, 6, 7, 8; hazard distance, 400 to 1400 nm",
+    ),
+    "ICNIRP13": Source(
+        title="International Commission on Non-Ionizing Radiation Protection, Guidelines on limits of exposure to "
+        "laser radiation of wavelengths between 180 nm and 1,000 um, Health Physics 105, 2013",
+        locator="doi:10.1097/HP.0b013e3182983fd4",
+        used="the limits that both standards print",
+    ),
+    "ISO05": Source(
+        title="ISO 11146-1:2005, Lasers: test methods for laser beam widths, divergence angles and beam "
+        "propagation ratios",
+        locator="International Organization for Standardization, Geneva, 2005",
+        used="the beam propagation ratio M^2",
+    ),
+    "SELF83": Source(
+        title="S. A. Self, Focusing of spherical Gaussian beams, Applied Optics 22, 1983",
+        locator="doi:10.1364/AO.22.000658",
+        used="the thin-lens formula for waists",
+    ),
+    "COLLINS70": Source(
+        title="S. A. Collins, Lens-system diffraction integral written in terms of matrix optics, 1970",
+        locator="doi:10.1364/JOSA.60.001168",
+        used="the diffraction integral of an ABCD system",
+    ),
+    "MACLEOD10": Source(
+        title="H. A. Macleod, Thin-film optical filters, fourth edition, CRC Press, 2010",
+        locator="ISBN 978-1-4200-7302-7",
+        used="chapters 2 and 6: characteristic matrix, tilted admittances, quarter-wave stacks",
+    ),
+    "BABIC92": Source(
+        title="D. I. Babić and S. W. Corzine, Analytic expressions for the reflection delay, penetration depth, "
+        "and absorptance of quarter-wave dielectric mirrors, 1992",
+        locator="doi:10.1109/3.123281",
+        used="delay of an endless quarter-wave mirror",
+    ),
+    "JOHNSON72": Source(
+        title="P. B. Johnson and R. W. Christy, Optical constants of the noble metals, Physical Review B 6, 1972",
+        locator="doi:10.1103/PhysRevB.6.4370",
+        used="table I: n, k of gold and silver, 0.617 to 1.088 um",
+    ),
+    "RAKIC95": Source(
+        title="A. D. Rakić, Algorithm for the determination of intrinsic optical constants of metal films: "
+        "application to aluminum, 1995",
+        locator="doi:10.1364/AO.34.004755",
+        used="n, k of aluminium, 0.620 to 1.033 um",
+    ),
+    "GAO12": Source(
+        title="L. Gao, F. Lemarchand and M. Lequime, Exploitation of multiple incidences spectrometric "
+        "measurements for thin film reverse engineering, 2012",
+        locator="doi:10.1364/OE.20.015734",
+        used="index of a Ta2O5 film, 0.6 to 1.1 um, fitted here",
+    ),
+    "DODGE84": Source(
+        title="M. J. Dodge, Refractive properties of magnesium fluoride, Applied Optics 23, 1984",
+        locator="doi:10.1364/AO.23.001980",
+        used="dispersion of the ordinary ray",
+    ),
+    "BARNES92": Source(
+        title="N. P. Barnes and L. B. Petway, Variation of the Verdet constant with temperature of terbium "
+        "gallium garnet, 1992",
+        locator="doi:10.1364/JOSAB.9.001912",
+        used="rotation by wavelength and temperature",
+    ),
+    "SALEH07": Source(
+        title="B. E. A. Saleh and M. C. Teich, Fundamentals of photonics, second edition, Wiley, 2007",
+        locator="ISBN 978-0-471-35832-9",
+        used="section 6.6: Jones matrices of a Faraday isolator",
+    ),
+    "BOR88": Source(
+        title="Z. Bor, Distortion of femtosecond laser pulses in lenses and lens systems, 1988",
+        locator="Journal of Modern Optics 35 (12), pages 1907-1918",
+        used="delay between pulse and phase front behind a lens",
     ),
 }

@@ -25,6 +25,10 @@ REFUSED = [
     ({"pressure_hpa": 93300.0}, "pressure 93300 hPa is outside 100-1400 hPa, where [CIDDOR96] holds"),
     ({"pressure_hpa": -1.0}, "pressure -1 hPa is outside 100-1400 hPa, where [CIDDOR96] holds"),
     ({"humidity_percent": 100.1}, "relative humidity 100.1 % is outside 0-100 %, where [CIDDOR96] holds"),
+    (
+        {"humidity_percent": 100.0000001},
+        "relative humidity 100.0000001 % is outside 0-100 %, where [CIDDOR96] holds",
+    ),
     ({"humidity_percent": -0.1}, "relative humidity -0.1 % is outside 0-100 %, where [CIDDOR96] holds"),
     ({"co2_ppm": 5000.0}, "carbon dioxide 5000 ppm is outside 0-2000 ppm, where [CIDDOR96] holds"),
     (

@@ -240,3 +240,25 @@ def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text, mas
 def test_zero_celsius_is_a_legal_dew_and_frost_point():
     assert float(humidity.vapour_pressure_of_dew_point_hpa(0.0, 933.0)) == pytest.approx(6.136, abs=1e-3)
     assert float(humidity.vapour_pressure_of_frost_point_hpa(0.0, 933.0)) == pytest.approx(6.137, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "said"),
+    [
+        (humidity.dew_point_c, (-5.0, 933.0), "vapour pressure -5 hPa is outside"),
+        (humidity.dew_point_c, (1e9, 933.0), r"vapour pressure 1e\+09 hPa is outside"),  # was -3238 °C
+        (humidity.dew_point_c, (10.0, -933.0), "pressure -933 hPa is outside"),  # was 7.0 °C
+        (humidity.dew_point_c, (np.nan, 933.0), "vapour pressure is not a number"),
+        (humidity.frost_point_c, (-5.0, 933.0), "vapour pressure -5 hPa is outside"),
+        (humidity.frost_point_c, (1.0, 93300.0), "pressure 93300 hPa is outside"),
+        (humidity.saturation_pressure_hpa, (-300.0, 933.0), "temperature -300 °C is outside"),  # was 1e39 hPa
+        (humidity.saturation_pressure_hpa, (20.0, 93300.0), "pressure 93300 hPa is outside"),
+        (humidity.ice_saturation_pressure_hpa, (20.0, 933.0), "temperature of ice 20 °C is outside"),
+        (humidity.vapour_pressure_hpa, (20.0, 933.0, 120.0), "relative humidity 120 % is outside"),
+        (humidity.vapour_pressure_hpa, (20.0, 933.0, np.nan), "relative humidity is not a number"),
+        (humidity.vapour_pressure_hpa, (20.0, np.nan, 50.0), "pressure is not a number"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_every_converter(function, arguments, said):
+    with pytest.raises(ValidityError, match=said):
+        function(*arguments)

@@ -10,6 +10,8 @@ import pytest
 from catseye.records.path_temperature import PathTemperature
 from catseye.records.reading import Folder
 from catseye.records.recording import read_sheet, wav_bytes, wav_samples
+from catseye.signal.delay import DelayPlan
+from catseye.signal.waveform import sampled
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "acoustic"
 FILES = [EXAMPLE / f"evening-{i}.wav" for i in (1, 2, 3, 4)]
@@ -229,6 +231,7 @@ def test_what_cannot_be_done_is_1_in_one_line(catseye, arguments, said):
         ([("duration_s = 0.02", "duration_s = 0.9")], 16_000, "arrivals are sought from"),
         ([("stop_hz = 5000.0", "stop_hz = 9000.0")], 16_000, "not held by 16000 samples"),
         ([("shots = 2", "shots = 3")], 16_000, "arrivals are sought from"),
+        ([("interval_s = 0.3", "interval_s = 0.001")], 16_000, "one arrival would count as several shots"),
         ([('file = "x.wav"', 'file = "y.wav"')], 16_000, "does not name 'x.wav'"),
         ([("[signal]\n", "[[weather]]\nmjd_utc=61365.0\n\n[signal]\n")], 16_000, "weather"),
         ([("emission_s = 0.02", 'emission_s = 0.02\nweighting = "whitened"\nwindow_ms = 40.0')], 16_000, "too few"),
@@ -257,3 +260,46 @@ def test_the_sheet_reads_as_documented():
     assert len(digest) == 64
     assert sheet.start_of("evening-2.wav") == 61365.10694444
     assert sheet.start_of("other.wav") is None
+
+
+def test_a_file_by_two_of_its_names_is_given_twice(catseye):
+    same = EXAMPLE.parent / "acoustic" / ".." / "acoustic" / "night.csv"
+    status, out, complained = catseye("acoustic", EXAMPLE / "night.csv", same)
+    assert (status, out) == (1, "")
+    assert "night.csv: is given twice" in complained
+
+
+def test_times_of_a_sound_of_unknown_frequency_are_refused(catseye, tmp_path):
+    text = (EXAMPLE / "night.toml").read_text()
+    signal = text[text.index("[signal]") : text.index("[[weather]]")]
+    (tmp_path / "night.csv").write_text((EXAMPLE / "night.csv").read_text())
+    (tmp_path / "night.toml").write_text(text.replace(signal, ""))
+    status, out, complained = catseye("acoustic", tmp_path / "night.csv")
+    assert (status, out) == (1, "")
+    assert "night.toml: frequency_hz is missing" in complained
+
+
+@pytest.mark.parametrize("place", ["mine.csv", "nowhere/t.csv", "out/t.csv", "out"])
+def test_a_table_that_cannot_be_written_leaves_nothing_written(catseye, tmp_path, place):
+    (tmp_path / "mine.csv").write_text("mine")
+    out = tmp_path / "out"
+    status, said, complained = catseye("acoustic", EXAMPLE / "night.csv", "--out", out, "--write", tmp_path / place)
+    assert (status, said) == (1, "")
+    assert f"--write {tmp_path / place}" in complained
+    assert [item.name for item in tmp_path.iterdir()] == ["mine.csv"]
+
+
+def test_the_loops_noise_moves_both_directions_at_once(catseye, tmp_path, codes):
+    """What it does to the temperature is what a delay of that size does; taken as two noises it would be 1/sqrt(2)."""
+    still = ("u_time_us = 4.0", "u_time_us = 0.0")
+    noisy = codes.astype(float)
+    noisy[2] += 3000.0 * np.random.default_rng(5).standard_normal(codes.shape[1])
+    noisy = np.clip(np.rint(noisy), -32000, 32000).astype(np.int16)
+    (clean,), (path,) = (answer(catseye, made(tmp_path, c, still))["paths"] for c in (codes, noisy))
+    sheet, _ = read_sheet(tmp_path / "x.toml")
+    template = sampled("chirp", 16e3, **sheet.signal.values)
+    u_loop = float(DelayPlan(template, sampling_hz=16e3, window=5e-3)(noisy[2], 0.02125).u_delay)
+    parts, per_second = path["parts_c"], path["parts_c"]["delay"] / 3e-6
+    assert u_loop > 5e-7
+    # the correlation is as the reduction makes it but for the stretch's start: the noise's estimate differs a little
+    assert parts["time"] == pytest.approx(np.hypot(clean["parts_c"]["time"], per_second * u_loop), rel=0.05)

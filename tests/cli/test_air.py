@@ -56,6 +56,8 @@ def test_a_cold_retroreflector_is_warned_of(catseye):
     assert found["margin_k"] == pytest.approx(5.0 - 5.78, abs=0.02)  # dew point of 75 % at 10 °C: 5.8 °C
     assert 0.9 < found["probability"] < 0.98
     assert "condensation" not in asked(catseye, *cool)
+    damp = asked(catseye, *cool, "--surface-c", 5, "--u-humidity-percent", 5)["condensation"]
+    assert damp["u_margin_k"] == pytest.approx(0.97, abs=0.03)  # 1 % of humidity is 0.19 K of dew point here
     status, out, _ = catseye("air", *cool, "--surface-c", 5)
     assert status == 0
     assert "surface       dew: 0.8 K below the dew point" in out
@@ -120,6 +122,8 @@ def test_what_cannot_be_is_one_line_and_status_1(catseye, arguments, said):
         ("air", "--temperature-c", 20, "--humidity-percent", 50),
         ("air", "--temperature-c", 20, "--humidity-percent", 50, "--barometer-mmhg", 700),
         (*MERCURY, "--latitude-deg", 38),
+        (*MERCURY, "--gravity", 9.798, "--latitude-deg", 0),
+        (*WEATHER, "--humidity-percent", 50, "--u-surface-c", 0.5),
         (*WEATHER, "--humidity-percent", 50, "--gravity", 9.8),
         (*WEATHER, "--humidity-percent", 50, "--u-dew-point-c", 0.2),
         (*WEATHER, "--humidity-percent", 50, "--u-temperature-c", -1),

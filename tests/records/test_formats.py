@@ -9,15 +9,19 @@ from catseye.errors import InputError
 from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import Mirror, MirrorGeometry
 from catseye.records.monument import Monument, MonumentGeometry
+from catseye.records.path_temperature import PathTemperature
 from catseye.records.reading import Folder, read_record
 from catseye.records.record import Record
+from catseye.records.recording import AcousticSheet
 from catseye.records.shot import Shot, read_buffers
 from catseye.records.site import Site
 from catseye.records.solids import Solids
 from catseye.records.structural_model import StructuralModel
 from catseye.records.target import Benchmark, FeedArm, Targets
 from catseye.records.triplet import Triplet
+from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.records.weather import WeatherSample
+from catseye.reduction.refractometer_night import PathSheet
 
 FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
 RECORDS: dict[str, type[Record]] = {
@@ -35,11 +39,15 @@ RECORDS: dict[str, type[Record]] = {
     "keep-out-1.toml": KeepOut,
     "solids-1.toml": Solids,
     "structural-model-1.toml": StructuralModel,
+    "triplet-measurement-1.toml": TripletMeasurement,
+    "acoustic-1.toml": AcousticSheet,
+    "refractometer-1.toml": PathSheet,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (Benchmark, 6),
     "weather-1.csv": (WeatherSample, 5),
     "shots-1.csv": (Shot, 5),
+    "path-temperatures-1.csv": (PathTemperature, 3),
 }
 
 

@@ -9,7 +9,7 @@ from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.atmosphere.sound_path import bent_ray_excess, mean_temperature_excess, travel_time
 from catseye.atmosphere.sound_real_gas import speed
 from catseye.errors import ValidityError
-from catseye.reduction.acoustic import NO_TIME, OUTSIDE, USED, path_temperatures
+from catseye.reduction.acoustic import NO_TIME, NO_WIND, OUTSIDE, USED, path_temperatures
 
 LENGTH, P, H = 100.0, 933.0, 50.0
 STATION = {"pressure_hpa": P, "u_pressure_hpa": 0.3, "humidity_percent": H, "u_humidity_percent": 3.0}
@@ -201,6 +201,13 @@ def test_a_bad_time_is_a_status_and_spoils_no_other():
     assert found.temperature_c[0] == pytest.approx(20.0, abs=1e-6)
     for values in (found.temperature_c, found.u_temperature_c, found.group_refractivity, found.u_group_refractivity):
         assert np.isfinite(values).tolist() == [True, False, False, False]
+
+
+def test_two_times_of_a_hurricane_are_a_status_and_leave_no_wind():
+    found = path_temperatures([LENGTH / 443.0, 0.2, 0.29], [LENGTH / 243.0, 0.2, 0.29], 5e-6, **PATH, u_crosswind=0.0)
+    assert found.status == (NO_WIND, OUTSIDE, USED)
+    for values in (found.temperature_c, found.u_temperature_c, found.wind, found.u_wind, found.group_refractivity):
+        assert np.isfinite(values).tolist() == [False, False, True]
 
 
 @pytest.mark.parametrize(

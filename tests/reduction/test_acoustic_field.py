@@ -182,3 +182,39 @@ def test_refusals(change, kind, complaint):
 def test_a_path_from_a_station_to_itself_is_refused():
     with pytest.raises(ValidityError, match="length of the path 0 m"):
         sound_field(STATIONS, [0], [0], [0.1], 1e-5, u_position=1e-3, **WEATHER, temperature=TEMPERATURE, wind=None)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"time": np.full(3, 0.2)}, "source has the shape (72,), time (3,)"),
+        ({"source": np.where(SOURCE == 8, -1, SOURCE)}, "source is not all whole numbers from 0 to 8"),
+        ({"receiver": np.where(RECEIVER == 8, 9, RECEIVER)}, "receiver is not all whole numbers from 0 to 8"),
+        ({"receiver": RECEIVER + 0.5}, "receiver is not all whole numbers"),
+        ({"stations": STATIONS[:, :2]}, "stations have the shape (9, 2)"),
+        ({"u_time": -1e-5}, "u_time -1e-05"),
+        ({"u_time": np.ones(3)}, "u_time has the shape (3,)"),
+        ({"u_position": np.nan}, "u_position is not a number"),
+        ({"u_humidity_percent": -3.0}, "u_humidity_percent -3"),
+        (
+            {"temperature": Prior(15.0, 8.0, (Scale(1.0, (0.01, 0.01, 0.01)),))},
+            "correlation lengths is longer than 500",
+        ),
+    ],
+)
+def test_what_would_be_answered_wrongly_or_not_at_all_is_refused(change, complaint):
+    given = {"stations": STATIONS, "source": SOURCE, "receiver": RECEIVER, "time": heard(STATIONS), "u_time": 1e-5}
+    given |= {"u_position": 2e-3, **WEATHER, "temperature": TEMPERATURE, "wind": WIND, **change}
+    with pytest.raises(ValidityError) as caught:
+        sound_field(**given)
+    assert complaint in str(caught.value)
+
+
+def test_times_of_no_air_are_refused_as_times_and_lines_to_nowhere_as_lines():
+    length = np.linalg.norm(STATIONS[RECEIVER] - STATIONS[SOURCE], axis=1)
+    with pytest.raises(EstimationError, match="no travel time of 72 is that of sound in air"):
+        inverted(length / 370.0)
+    field = inverted(heard(STATIONS))
+    for end in ([np.nan, 0.0, 0.0], [1e9, 0.0, 0.0]):
+        with pytest.raises(ValidityError, match="length of the line"):
+            field.along([0.0, 0.0, 0.0], end)

@@ -7,7 +7,7 @@ from catseye.atmosphere import humidity
 from catseye.atmosphere.air import MODELS, air, group_refractivity_of_vapour
 from catseye.atmosphere.psychrometer import vapour_pressure_of_wet_bulb_hpa, wet_bulb_c
 from catseye.errors import ValidityError
-from catseye.reduction.air_routes import HYGROMETERS, Moisture, air_by, station_pressure_hpa
+from catseye.reduction.air_routes import HYGROMETERS, Moisture, air_by, station_pressure_hpa, surface_of
 
 DEGREE = np.pi / 180
 
@@ -103,7 +103,47 @@ def test_air_above_its_barometer_is_thinner():
     assert high.humidity_percent == low.humidity_percent
 
 
+def test_air_far_from_its_barometer_says_what_it_does_not_know_of_the_pressure():
+    """A barometric formula typed again, draws of lapse and gravity: 1 km up the pressure is known to 1.1 hPa only."""
+    moist, t, u_t = Moisture("vapour_pressure_hpa", 0.0), 10.0, 0.5
+    formula = air_by(t, 933.0, moist)[1]
+    rng = np.random.default_rng(62)
+    lapse, g = rng.normal(0.0, 0.0065, 4000), rng.normal(9.80665, 0.02, 4000)
+    ts, rise = rng.normal(t, u_t, 4000), 900.0
+    mean = ts + 273.15 - lapse * rise / 2.0
+    p = 933.0 * np.exp(-g * 0.0289635 * rise / (8.314510 * mean))  # mean of T for that of 1/T: 1e-4 of the fall
+    scatter = np.std(air_by(ts, p, moist)[0].group_refractivity)
+    _, claimed = air_by(t, 933.0, moist, above_barometer=rise, u_temperature_c=u_t)
+    # 4000 draws know a scatter to 1.1 %; the formula's 4e-4 of the fall is 0.011 ppm of 0.47
+    assert np.sqrt(claimed**2 - formula**2) == pytest.approx(scatter, rel=0.04)
+    wet = Moisture("humidity_percent", 0.0)
+    assert air_by(t, 933.0, wet, above_barometer=rise, u_temperature_c=u_t)[1] == pytest.approx(claimed, rel=1e-6)
+    assert air_by(t, 933.0, moist, above_barometer=10.0)[1] == pytest.approx(formula, rel=1e-2)
+
+
+def test_the_margin_of_a_surface_is_as_uncertain_as_the_instrument_makes_it():
+    """Each reading moved by its uncertainty moves the dew point by its share; only some need the thermometer."""
+    t, p, surface = 10.0, 933.0, 5.5
+    for kind, shown, u in (("humidity_percent", 75.0, 5.0), ("dew_point_c", 5.78, 0.4), ("wet_bulb_c", 7.9, 0.2)):
+        found = surface_of(
+            air_by(t, p, Moisture(kind, shown, u))[0], Moisture(kind, shown, u), surface,
+            u_surface_c=0.1, u_temperature_c=0.3,
+        )  # fmt: skip
+
+        def dew(kind=kind, shown=shown, t=t):
+            return float(air_by(t, p, Moisture(kind, shown), model="rueger1990")[0].dew_point_c)
+
+        by_reading = (dew(shown=shown + 0.01) - dew(shown=shown - 0.01)) / 0.02
+        by_air = (dew(t=t + 0.01) - dew(t=t - 0.01)) / 0.02
+        expected = np.sqrt(0.1**2 + (by_reading * u) ** 2 + (by_air * 0.3) ** 2)
+        # the formulas' own part: 0.1 % of vapour, or 1 % of the psychrometer's coefficient, is 0.05 K at most
+        assert expected <= found.u_margin_k < np.hypot(expected, 0.06), kind
+        assert 0.0 < found.probability < 1.0
+
+
 def test_what_cannot_be_is_refused():
+    with pytest.raises(ValidityError, match="height above the barometer 5000 m is outside -1000 to 1000 m"):
+        air_by(20.0, 933.0, Moisture("dew_point_c", 10.0), above_barometer=5000.0)
     with pytest.raises(ValidityError, match="over saturation"):
         air_by(20.0, 933.0, Moisture("dew_point_c", 21.0))
     with pytest.raises(ValidityError, match="wet bulb 21 °C is above the dry bulb"):

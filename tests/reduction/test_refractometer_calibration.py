@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from catseye.atmosphere.air import group_refractivity
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.refractometer import phase_slope
 from catseye.reduction.refractometer_calibration import calibrate_path
@@ -130,6 +131,19 @@ def test_a_jump_of_the_path_begins_a_section_and_says_its_size(night):
         assert np.sqrt(np.mean((c.refractivity - simulated.index)[good] ** 2)) < 0.3e-6
 
 
+def test_air_that_slowly_leaves_the_thermometers_is_no_jump(tmp_path):
+    """A drainage flow, 2 °C colder on the path alone for an hour: the phase follows it, and the index with it."""
+    simulated = simulate_path_night(7, PathPlan(patch_c=0.0, eddies_c=0.0, walk_mrad_per_root_hour=0.0))
+    k = -float(phase_slope(simulated.plan.path_length))
+    hours = (simulated.mjd_utc - simulated.mjd_utc[0]) * 24.0
+    more = 2e-6 * np.exp(-0.5 * ((hours - 4.0) / 0.4) ** 2)
+    flow = dataclasses.replace(simulated, phase=np.mod(simulated.phase - k * more, 2.0 * np.pi))
+    c = calibrate_path(read(flow.write(tmp_path / "n.csv")))
+    assert [s.reason for s in c.followed.sections] == ["start"]
+    z = (c.refractivity - simulated.index - more) / c.u_refractivity
+    assert np.nanmax(np.abs(z)) < 5.0
+
+
 def test_a_gap_is_bridged_by_the_weather_or_named_as_ambiguous(night):
     """The weather is good to a quarter cycle at 5 sigma over 100 m and 3 hours, over 20 km it is not."""
     gap = ((3.0, 6.0),)
@@ -143,6 +157,56 @@ def test_a_gap_is_bridged_by_the_weather_or_named_as_ambiguous(night):
     good = np.isfinite(far.refractivity)  # each section stands on its own weather
     assert set(far.followed.section[good]) == {0, 1}
     assert np.max(np.abs(far.refractivity - simulated.index)[good]) < 0.2e-6
+
+
+def test_a_faint_reading_is_passed_over_and_ends_no_section(night, tmp_path):
+    """0.35 rad of one phase: five of it are more than a quarter cycle, of which its neighbours know nothing."""
+    _, right = night(20, PathPlan(patch_c=0.0))
+    readings = read(tmp_path / "n20.csv")
+    u = readings.u_phase.copy()
+    u[[0, 100, 150]] = 0.35
+    c = calibrate_path(dataclasses.replace(readings, u_phase=u))
+    assert [s.reason for s in c.followed.sections] == ["start"]
+    assert [c.status[k] for k in (0, 100, 150)] == ["stray"] * 3
+    assert np.max(np.abs(c.followed.phase - right.followed.phase)) < 1e-9
+    good = np.isfinite(c.refractivity)
+    assert np.max(np.abs(c.refractivity - right.refractivity)[good]) < 0.02e-6
+
+
+def test_a_long_path_without_weather_for_hours_stays_a_few_sections(night):
+    """Over 5 km the air walks a quarter cycle in 20 minutes without weather; it is not a section a reading."""
+    plan = PathPlan(path_length=5000.0, noise_c=0.02, eddies_c=0.02, patch_c=0.0, weather_gaps=((2.0, 4.5),))
+    simulated, c = night(3, plan)
+    assert len(c.followed.sections) == 1
+    good = np.isfinite(c.refractivity)
+    assert good.sum() > 300
+    assert np.max(np.abs(c.refractivity - simulated.index)[good]) < 0.2e-6
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_the_ratio_is_above_one_where_the_paths_air_changes_less_than_the_sensors(tmp_path, share):
+    """Phases made of half, or twice, the change that the sensors read; the reverse of it is the ratio."""
+    simulated = simulate_path_night(9, PathPlan(patch_c=0.0, walk_mrad_per_root_hour=0.0))
+    k = -float(phase_slope(simulated.plan.path_length))
+    less = (1.0 - share) * k * (simulated.index - simulated.index.mean())
+    turned = dataclasses.replace(simulated, phase=np.mod(simulated.phase + less, 2.0 * np.pi))
+    c = calibrate_path(read(turned.write(tmp_path / "n.csv")))
+    assert c.slope.agrees is False
+    assert c.slope.ratio == pytest.approx(1.0 / share, rel=0.1)
+    assert any("above 1 the path's air changes less" in note for note in c.notes)
+
+
+def test_the_calibration_stands_at_the_weather_that_its_index_belongs_to(night):
+    """With a jump: n_g(t0, h0, p0) and phase_0 are of the first section, not of the night, 2 ppm away."""
+    _, c = night(11, PathPlan(jumps={4.0: 0.0003}, patch_c=0.0))
+    assert len(c.followed.sections) == 2
+    by_weather = float(
+        group_refractivity(c.temperature_0_c, c.pressure_0_hpa, c.humidity_0_percent, model="rueger1990")
+    )
+    # mean of the index against the index of the mean: some hundredths of a ppm over 3 °C
+    assert by_weather == pytest.approx(c.index_0, abs=0.15e-6)
+    half = c.readings.mjd_utc[c.followed.section == 0]
+    assert half[0] < c.mjd_0 < half[-1]
 
 
 def test_turns_of_a_long_path_are_unwrapped(night):

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
+from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.errors import ValidityError
 from catseye.signal.delay import DelayPlan, DelayStatus, delay, fast_length, noise_spectrum
 from catseye.signal.waveform import chirp, maximum_length_chips, maximum_length_sequence, pulse, sampled
@@ -297,3 +298,21 @@ def test_a_chirp_has_its_frequencies_where_they_belong():
 def test_signals_that_cannot_be_made_are_refused(kind, values, said):
     with pytest.raises(ValidityError, match=said):
         sampled(kind, FS, **values)
+
+
+@pytest.mark.parametrize("kind", ["chirp", "pulse"])
+def test_a_correlation_shows_the_phase_velocity_of_air_that_disperses(kind):
+    """Air at 0 °C with little vapour: group and phase are 35 ppm and more apart."""
+    fs, length, speed, n = 48e3, 100.0, 340.0, 2**16
+    values = {"start_hz": 1500.0, "stop_hz": 5000.0, "duration": 0.02} if kind == "chirp" else {"centre_hz": 3e3}
+    template = sampled(kind, fs, **{"duration": 4e-3, **values})
+    hertz = np.fft.rfftfreq(n, 1.0 / fs)
+    late = length / (speed * (1.0 + dispersion(0.0, 933.0, 1.0, hertz).phase))
+    spectrum = np.fft.rfft(np.pad(template, (0, n - len(template))))
+    plan = DelayPlan(template, sampling_hz=fs, window=2e-3)
+    found = plan(np.fft.irfft(spectrum * np.exp(-2j * np.pi * hertz * late), n), length / speed)
+    seen = length / float(found.delay) / speed - 1.0
+    there = dispersion(0.0, 933.0, 1.0, plan.bandwidth / (2.0 * np.pi))
+    # the mean over the band is that at its rms frequency to second order in its width
+    assert seen == pytest.approx(there.of_a_pulse()[0], abs=2e-6)
+    assert there.group - there.phase > 30e-6

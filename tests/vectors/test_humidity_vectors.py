@@ -23,10 +23,6 @@ def test_a_printed_number_is_reproduced(vector):
     ), f"{vector['source']}: {vector['why']}"
 
 
-def test_the_notes_929_37_is_697_09_truncated_twice():
-    assert int(697.09 * 1.333224 * 100) == 92937
-
-
 def test_the_notes_example_with_its_own_rounded_factors_is_929_383():
     """The project's fact sheet, [PARKER04] eqs. 1.19 and 1.20 as printed."""
     from catseye.atmosphere.barometer import temperature_corrected_mmhg

@@ -60,7 +60,7 @@ class Air:
     group_wavelength: Any
     sensitivity: Sensitivity
     phase_sensitivity: Sensitivity
-    standard_uncertainty: float
+    standard_uncertainty: Any
     co2_ppm: Any
     model: str
 
@@ -270,7 +270,7 @@ def _air(chosen: Model, temperature_c, pressure_hpa, vapour, relative, *, wavele
         group_wavelength=SPEED_OF_LIGHT / ((1.0 + group) * np.asarray(modulation_hz, float)),
         sensitivity=chosen.partials(*state, **light).with_humidity_held(saturation, relative),
         phase_sensitivity=chosen.partials(*state, **light, kind="phase").with_humidity_held(saturation, relative),
-        standard_uncertainty=chosen.standard_uncertainty,
+        standard_uncertainty=chosen.uncertainty(vapour),
         co2_ppm=co2_ppm if chosen.co2_slope else chosen.co2_ppm,
         model=chosen.name,
     )

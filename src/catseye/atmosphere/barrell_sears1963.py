@@ -1,7 +1,7 @@
 """The formula of Barrell and Sears as geodesists resolved upon it in 1960 and 1963: what older instruments carry.
 
 Its form is (n_L - 1) = (n_g - 1)/(1 + a t) p/760 - 5.5e-8 e/(1 + a t), p and e in mm Hg. The resolution's a is
-0.003661 = 1/273.15; 1/273.16, also seen, is 2e-6 of the refractivity or less.
+0.003661 = 1/273.15; 1/273.16, also seen, is 6e-6 of the refractivity or less (2e-9 of the index).
 """
 
 from catseye.atmosphere.ideal_gas import densities, density_slopes, limits

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catseye.atmosphere import humidity
-from catseye.atmosphere.hygrometer import HUMIDITY
 from catseye.atmosphere.model import Limit
 from catseye.constants import ZERO_CELSIUS_K
 from catseye.errors import ValidityError
@@ -23,6 +22,7 @@ SKY_MIDNIGHT, SKY_PER_HPA = 0.013, 0.00012
 STILL_AIR, PER_WIND = 2.8, 3.0  # [WATMUFF77]: W/(m² K), and per m/s of wind
 SURFACE = Limit("surface temperature", "°C", -100.0, 100.0, "saturation over water and ice")
 WIND = Limit("wind", "m/s", 0.0, 7.0, "[WATMUFF77]")
+SKY_EMISSIVITY = Limit("emissivity of the sky", "(ratio)", 0.0, 1.0, "[BERDAHL84]")
 EMISSIVITY = Limit("emissivity", "(ratio)", 0.0, 1.0, "the notion of emissivity")
 SKY_VIEW = Limit("view of the sky", "(ratio)", 0.0, 1.0, "the notion of a share")
 STEPS = 20
@@ -88,7 +88,7 @@ def condensation(
     SURFACE.check(surface_c)
     humidity.AIR_TEMPERATURE.check(temperature_c)
     humidity.PRESSURE.check(pressure_hpa)
-    HUMIDITY.check(humidity_percent)
+    humidity.HUMIDITY.check(humidity_percent)
     u_s, u_t, u_h, covariance = (
         np.asarray(u, float) for u in (u_surface_c, u_temperature_c, u_humidity_percent, covariance_c2)
     )
@@ -114,7 +114,8 @@ def radiative_depression_k(temperature_c, dew_point_c, pressure_hpa=1000.0, *, w
     """How far a surface cools below the air by radiating to a clear midnight sky, in K: an estimate for planning.
 
     temperature_c   air temperature, -40 to 50 °C
-    dew_point_c     dew point over water, -40 °C to the air's temperature; the sky was fitted from -13 to 24 °C
+    dew_point_c     dew point over water, -40 °C to the air's temperature; the sky was fitted from -13 to 24 °C, and
+                    where the fit passes a black body's emissivity (34 °C at 1000 hPa) it is refused
     pressure_hpa    total pressure, 100 to 1400 hPa
     wind            along the surface, 0 to 7 m/s
     emissivity      of the surface in the thermal infrared: 0.9 for glass, 0.03 for bare gold
@@ -143,6 +144,7 @@ def radiative_depression_k(temperature_c, dew_point_c, pressure_hpa=1000.0, *, w
         )
     kelvin, share = t + ZERO_CELSIUS_K, dew / 100.0
     sky = SKY[0] + SKY[1] * share + SKY[2] * share**2 + SKY_MIDNIGHT + SKY_PER_HPA * (np.asarray(pressure_hpa) - 1000.0)
+    SKY_EMISSIVITY.check(sky)
     received = kelvin**4 * (sky_view * sky + (1.0 - np.asarray(sky_view, float)))
     radiates = np.asarray(emissivity, float) * STEFAN_BOLTZMANN
     h = STILL_AIR + PER_WIND * np.asarray(wind, float)
@@ -182,6 +184,6 @@ def _line(margin, threshold, threat, deposit, u, probability) -> str:
         return "clear: the air holds no vapour"
     point = f"the {threat} point, {threshold:.1f} °C"
     if u > 0.0:
-        point = f"{point}, ± {u:.1f} K; {100.0 * probability:.0f} % probable"
+        point = f"{point}, ± {u:.{'1f' if u >= 0.1 else '1g'}} K; {100.0 * probability:.0f} % probable"
     side = "below" if margin < 0.0 else "above"
     return f"{'clear' if deposit == 'none' else deposit}: {abs(margin):.1f} K {side} {point}"

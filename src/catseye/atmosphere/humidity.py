@@ -62,6 +62,8 @@ DEW_POINT = Limit("dew point", "°C", -100.0, 100.0, "saturation over water")
 FROST_POINT = Limit("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
 OVER_ICE = Limit("temperature of ice", "°C", -100.0, MELTING_C, "ice", places=2)
 AIR_TEMPERATURE = Limit("temperature", "°C", -100.0, 100.0, "saturation over water")
+HUMIDITY = Limit("relative humidity", "%", 0.0, 100.0, "unsaturated air")
+OVER_ICE_HUMIDITY = Limit("relative humidity over ice", "%", 0.0, 300.0, "supersaturation over ice")  # 265 % at -100 °C
 VAPOUR_PRESSURE = Limit("vapour pressure", "hPa", 0.0, 1400.0, "the notion of a pressure")
 
 
@@ -84,11 +86,14 @@ def saturation_pressure_hpa(temperature_c, pressure_hpa):
     temperature_c   air temperature, -40 to 50 °C
     pressure_hpa    total pressure, 500 to 1100 hPa (enters through the enhancement factor)
 
+    Raises ValidityError outside -100 to 100 °C and 100 to 1400 hPa.
     Source: [RUEGER90] eq. 5.27 ([PARKER04] eq. 1.3). Good to 0.1 % from -20 to 50 °C, 0.8 % low at -40 °C.
 
     >>> round(float(saturation_pressure_hpa(20.0, 933.0)), 4)
     23.4646
     """
+    AIR_TEMPERATURE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
     return saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
 
 
@@ -98,13 +103,13 @@ def ice_saturation_pressure_hpa(temperature_c, pressure_hpa):
     temperature_c   air temperature, -50 to 0 °C
     pressure_hpa    total pressure, 500 to 1100 hPa
 
+    Raises ValidityError outside -100 to 0.01 °C and 100 to 1400 hPa.
     Source: [RUEGER90] eq. 5.28 ([PARKER04] eq. 1.4). Good to 0.3 %.
 
     >>> round(float(ice_saturation_pressure_hpa(-10.0, 933.0)), 4)
     2.6096
     """
-    t, p = np.asarray(temperature_c, float), np.asarray(pressure_hpa, float)
-    return ICE_E0 * (ICE_F0 + ICE_FP * p) * np.exp(ICE_A * t / (ICE_B + t))
+    return ice_saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
 
 
 def iapws_saturation_pressure_hpa(temperature_c):
@@ -155,6 +160,7 @@ def saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
     pressure_hpa    total pressure, 500 to 1100 hPa
     formula         `buck`, `ciddor` or `iapws`
 
+    Nothing is checked but the formula's name: solvers pass here on their way.
     Source: [RUEGER90] eq. 5.27; [CIDDOR96] appendix A; [IAPWS97] eq. 30. Good to 0.1 %; the slopes are analytic.
 
     >>> round(float(saturation(20.0, 1013.25, "ciddor").pressure_hpa), 4)
@@ -195,11 +201,15 @@ def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="
     formula            `buck`, `ciddor` or `iapws`; over ice `buck` or `iapws`
     over_ice           the humidity is stated over ice, which few instruments and no weather service does
 
+    Raises ValidityError outside -100 to 100 °C (over ice, 0.01 °C), 100 to 1400 hPa, and 0 to 100 % (300 %).
     Source: [RUEGER90] eq. 5.29 ([PARKER04] eq. 1.5). Good to 0.1 % of itself, the formula's part.
 
     >>> round(float(vapour_pressure_hpa(20.0, 933.0, 50.0)), 4)
     11.7323
     """
+    AIR_TEMPERATURE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
+    (OVER_ICE_HUMIDITY if over_ice else HUMIDITY).check(humidity_percent)
     saturated = (ice_saturation if over_ice else saturation)(temperature_c, pressure_hpa, formula)
     return saturated.pressure_hpa * np.asarray(humidity_percent, float) / 100.0
 
@@ -269,6 +279,7 @@ def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     pressure_hpa          total pressure, 500 to 1100 hPa
     formula               the one that gave the vapour pressure: then saturated air's dew point is its temperature
 
+    Raises ValidityError for a vapour pressure outside 0 to 1400 hPa or a pressure outside 100 to 1400 hPa.
     Source: [PARKER04] eq. 1.7 for `buck`; the others are inverted by Newton's method in 1/T from there, at most
     eight steps, nan where a step still exceeds 1e-9 of T (`iapws` below -100 °C). The inversion is exact to 1e-9 °C.
 
@@ -276,6 +287,8 @@ def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     9.267
     """
     _known(formula, FORMULAS)
+    VAPOUR_PRESSURE.check(vapour_pressure_hpa)
+    PRESSURE.check(pressure_hpa)
     e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
     buck = _buck_inverse(np.log(e / (BUCK_E0 * (BUCK_F0 + BUCK_FP * p))), BUCK_A, BUCK_B)
     return buck if formula == "buck" else _newton_c(e, p, FORMULAS[formula], buck)
@@ -289,6 +302,7 @@ def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     pressure_hpa          total pressure, 500 to 1100 hPa
     formula               `buck` or `iapws`, the one that gave the vapour pressure
 
+    Raises ValidityError as `dew_point_c`.
     Source: [PARKER04] eqs. 1.4, 1.6 solved as 1.7 is; `iapws` by Newton's method from there, at most eight steps, nan
     where a step still exceeds 1e-9 of T. The inversion is exact to 1e-9 °C.
 
@@ -296,6 +310,8 @@ def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     -10.0
     """
     _known(formula, ICE_FORMULAS, " over ice")
+    VAPOUR_PRESSURE.check(vapour_pressure_hpa)
+    PRESSURE.check(pressure_hpa)
     e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
     buck = _buck_inverse(np.log(e / (ICE_E0 * (ICE_F0 + ICE_FP * p))), ICE_A, ICE_B)
     frost = buck if formula == "buck" else _newton_c(e, p, ICE_FORMULAS[formula], buck)

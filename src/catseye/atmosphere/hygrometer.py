@@ -18,7 +18,6 @@ from catseye.errors import ValidityError
 U_OVER_WATER = {"buck": 6e-4, "ciddor": 6e-4, "iapws": 2e-4}
 U_OVER_ICE = {"buck": 1e-3, "iapws": 4e-4}
 
-HUMIDITY = Limit("relative humidity", "%", 0.0, 100.0, "unsaturated air")
 MIRROR = Limit("mirror", "°C", -100.0, 100.0, "saturation")
 DEPOSITS = ("dew", "frost")
 
@@ -96,7 +95,7 @@ def of_relative_humidity(temperature_c, pressure_hpa, humidity_percent, formula=
     """
     humidity.AIR_TEMPERATURE.check(temperature_c)
     humidity.PRESSURE.check(pressure_hpa)
-    HUMIDITY.check(humidity_percent)
+    humidity.HUMIDITY.check(humidity_percent)
     share = np.asarray(humidity_percent, float) / 100.0
     at = _saturated(temperature_c, pressure_hpa, formula, over_ice)
     e = share * at.pressure_hpa

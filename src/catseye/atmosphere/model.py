@@ -163,8 +163,9 @@ class Limit:
         mask = outside if values.ndim else None
         if np.isnan(first):
             raise ValidityError(f"{self.quantity} is not a number{where}; give a value in {span} {self.unit}", mask)
+        said = f"{first:g}" if not self.lower <= float(f"{first:g}") <= self.upper else repr(first)  # 100.0000001 %
         raise ValidityError(
-            f"{self.quantity} {first:g} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
+            f"{self.quantity} {said} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
             mask,
         )
 
@@ -179,7 +180,8 @@ class Model:
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
     density_slopes         function of the same giving each factor's DensitySlopes
     vapour_formula         the saturation formula it goes with, a name in `humidity.FORMULAS`
-    standard_uncertainty   of the formula itself in the group index, perfect weather given
+    standard_uncertainty   of the formula itself in the group index of dry air, perfect weather given
+    vapour_uncertainty     what each hPa of vapour adds to it in squares; see `uncertainty`
     limits                 argument's name -> Limit
     co2_ppm                carbon dioxide for which `dispersion` holds
     co2_slope              share by which each further ppm raises the dry air's refractivity; 0: no such term
@@ -195,11 +197,18 @@ class Model:
     limits: dict[str, Limit]
     co2_ppm: float
     co2_slope: float = 0.0
+    vapour_uncertainty: float = 0.0
 
     def check(self, **arguments) -> None:
         """Raise ValidityError for the first argument outside its limit."""
         for argument, value in arguments.items():
             self.limits[argument].check(value)
+
+    def uncertainty(self, vapour_pressure_hpa):
+        """Standard uncertainty of the formula itself in the group index of air with this vapour, hPa."""
+        if not self.vapour_uncertainty:
+            return self.standard_uncertainty
+        return np.hypot(self.standard_uncertainty, self.vapour_uncertainty * np.asarray(vapour_pressure_hpa, float))
 
     def coefficients(self, wavelength_um, co2_ppm, kind: Kind = "group") -> Gases:
         """Refractivity that each gas adds per unit of its density factor."""

@@ -35,9 +35,12 @@ class Dispersion(NamedTuple):
     standard: Any
 
     def of_a_pulse(self):
-        """The share between both and its standard uncertainty: a broad pulse shows one or the other."""
-        middle, half = 0.5 * (self.phase + self.group), 0.5 * np.abs(self.group - self.phase)
-        return middle, np.hypot(self.standard, half)
+        """The share that a correlation with the known signal shows, and its standard uncertainty: the phase's.
+
+        A real signal has no phase of its own to give: the delay with the highest correlation is the mean of the phase
+        delays with weight f² |S|², whatever the band, so the frequency to give is the signal's root mean square one.
+        """
+        return self.phase, self.standard
 
 
 def relaxation_hz(temperature_c, pressure_hpa, vapour_pressure_hpa):

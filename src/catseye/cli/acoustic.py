@@ -1,5 +1,6 @@
 """The command of temperatures measured by sound."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -50,19 +51,19 @@ def acoustic(
     from catseye.gateways.output import refuse_output, whole_directory, whole_file
     from catseye.reduction.acoustic_recording import reduce_acoustic
 
-    _refuse_outputs(files, sheet, write)
+    _refuse_outputs(files, sheet, out, write)
     if out is not None:
         for file in files:
             refuse_output(out, file)
     paths = reduce_acoustic(files, sheet, model=model, air_model=air_model)
-    if out is not None:
-        from catseye.gateways.acoustic_report import write_acoustic
+    with ExitStack() as stack:  # both or none: what cannot be written is refused first
+        if write is not None:
+            stack.enter_context(whole_file(write, "--write", MARK)).append(path_temperatures_csv(paths))
+        if out is not None:
+            from catseye.gateways.acoustic_report import write_acoustic
 
-        with whole_directory(out, files[0]) as directory:
-            write_acoustic(paths, directory)
-    if write is not None:
-        with whole_file(write, "--write", MARK) as pieces:
-            pieces.append(path_temperatures_csv(paths))
+            with whole_directory(out, files[0]) as directory:
+                write_acoustic(paths, directory)
     if json:
         from catseye.gateways.objects import json_line
 
@@ -76,8 +77,14 @@ def acoustic(
                 say(wrapped("Written to", str(place)))
 
 
-def _refuse_outputs(files: list[Path], sheet: Path | None, write: Path | None) -> None:
-    """Nothing that is read may be written."""
+def _refuse_outputs(files: list[Path], sheet: Path | None, out: Path | None, write: Path | None) -> None:
+    """Nothing that is read may be written, and nothing foreign put where a directory is replaced as a whole."""
     inputs = {path.resolve() for path in (*files, *([sheet] if sheet else (f.with_suffix(".toml") for f in files)))}
     if write is not None and write.resolve() in inputs:
         raise InputError(f"--write {write}: is an input (expected another name)")
+    if write is None:
+        return
+    if not write.resolve().parent.is_dir():
+        raise InputError(f"--write {write}: its directory does not exist (expected one that does)")
+    if out is not None and (write.resolve() == out.resolve() or out.resolve() in write.resolve().parents):
+        raise InputError(f"--write {write}: lies in --out {out}, which holds that table (expected a place outside it)")

@@ -84,6 +84,8 @@ def air(
         "vapour_pressure_hpa": vapour_pressure_hpa,
     }
     moisture = _moisture(given, u_of)
+    if u_surface_c > 0.0 and surface_c is None:
+        raise typer.BadParameter("belongs to --surface-c.", param_hint="'--u-surface-c'")
     _one_pressure(pressure_hpa, barometer_mmhg, mercury_c, gravity, latitude_deg, elevation_m)
     if pressure_hpa is None:
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
@@ -103,7 +105,8 @@ def air(
     )
     found = air_object(state, wavelength_um, u)
     if surface_c is not None:
-        surface = surface_of(state, surface_c, u_surface_c, u_temperature_c)
+        u_weather = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
+        surface = surface_of(state, moisture, surface_c, u_surface_c=u_surface_c, **u_weather)
         found["condensation"] = surface._asdict()
     if json:
         say(json_line(found))
@@ -150,8 +153,8 @@ def _one_pressure(
                 param_hint="'--pressure-hpa'",
             )
         return
-    place = latitude is not None and elevation is not None
-    if mercury_c is None or (gravity is None) != place or (gravity is not None and (latitude or elevation)):
+    place = [value is not None for value in (latitude, elevation)]
+    if mercury_c is None or not (all(place) if gravity is None else not any(place)):
         raise typer.BadParameter(
             "needs --mercury-c, and --gravity or both --latitude-deg and --elevation-m.",
             param_hint="'--barometer-mmhg'",

@@ -18,6 +18,7 @@ import numpy as np
 from catseye.errors import EstimationError, ValidityError
 
 NODES, NODES_PER_LENGTH = 8, 5  # Gauss-Legendre nodes: to begin with, and more for each correlation length
+LONGEST = 500.0  # correlation lengths: a longer line would need more nodes than are worth while
 SHORT = 1e-4  # correlation lengths: a shorter line counts as its mid-point, good to 1e-9
 SUSPECT = 3.29  # of a standard normal variable: 1 in 1000
 WORST_CONDITION = 1e13
@@ -37,8 +38,10 @@ class Scale:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sigma) and self.sigma >= 0.0):
             raise ValidityError(f"standard deviation {self.sigma:g} of a field's scale is not 0 or more")
-        if not all(length > 0.0 for length in self.lengths):
-            raise ValidityError(f"correlation lengths {self.lengths} m of a field's scale are not all above 0")
+        if len(self.lengths) != 3 or not all(length > 0.0 for length in self.lengths):
+            raise ValidityError(
+                f"correlation lengths {self.lengths} m of a field's scale are not three or are not all above 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -268,6 +271,11 @@ def _correlation(a: Lines, b: Lines, lengths: np.ndarray) -> np.ndarray:
     p, u = a.start / lengths, (a.end - a.start) / lengths
     q, v = b.start / lengths, (b.end - b.start) / lengths
     longest = float(np.max(np.linalg.norm(u, axis=1), initial=0.0))
+    if not longest <= LONGEST:
+        raise ValidityError(
+            f"a line of {longest:g} correlation lengths is longer than {LONGEST:g}: shorten the line, or give the "
+            "field a longer scale (what is so small averages out)"
+        )
     size = np.linalg.norm(v, axis=1)
     point = size < SHORT
     q, v, size = np.where(point[:, None], q + 0.5 * v, q), np.where(point[:, None], 0.0, v), np.where(point, 1.0, size)

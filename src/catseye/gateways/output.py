@@ -23,6 +23,7 @@ FORMATS = (
     "catseye-calibration-1",
     "catseye-acoustic-1",
     "catseye-refractometer-1",
+    "catseye-beam-1",
 )
 
 

@@ -136,7 +136,8 @@ def _slope(found: "PathCalibration") -> str:
     if slope.agrees is None:
         return f"{theory:.3f} mrad a ppm by theory; the index changed too little to test it"
     verdict = "agrees" if slope.agrees else "DISAGREES"
-    return f"{theory:.3f} mrad a ppm by theory; fitted freely {slope.ratio:.3f} ± {slope.u:.3f} of it: {verdict}"
+    times = f"{slope.ratio:.3f} ± {slope.u:.3f} times"
+    return f"{theory:.3f} mrad a ppm by theory; the weather's index goes {times} as far as that: {verdict}"
 
 
 def _length(found: "PathCalibration") -> str:
@@ -256,7 +257,7 @@ def refractometer_report(found: "PathCalibration", when: datetime) -> str:
     parameters = _parameters(found)["thermometers"]
     cards = [
         card("n_g − 1", f"{found.index_0 / PPM:.3f} ± {found.u_index_0 / PPM:.3f} ppm", "at the reference phase"),
-        card("Slope over theory", _card_slope(found), "1: the path's air changes as the sensors'"),
+        card("Weather over phase", _card_slope(found), "1: the path's air changes as the sensors'"),
         card("Readings", f"{found.status.count('good')} of {len(found.readings)}", "used in the calibration"),
     ]
     thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in parameters.items()]

@@ -21,6 +21,7 @@ from catseye.errors import ValidityError
 USED = "used"
 NO_TIME = "no travel time"
 OUTSIDE = "speed of no air within the model's limits"
+NO_WIND = f"wind above {WIND.upper:g} m/s: the two times do not belong together"
 
 LENGTH = Limit("length of the path", "m", 0.1, 10_000.0, "the notion of a path", places=1)
 DELAY = Limit("delay", "s", -1.0, 1.0, "the notion of a delay")
@@ -123,7 +124,7 @@ def path_temperatures(
         np.broadcast_to(np.asarray(v, float), (count,))
         for v in (length, pressure_hpa, humidity_percent, crosswind, u_crosswind)
     )
-    _check_spreads(
+    check_spreads(
         u_time=u_time,
         u_length=u_length,
         u_delay=u_delay,
@@ -146,7 +147,10 @@ def path_temperatures(
     spread = np.sqrt(4.0 * (speed_gradient * u_speed_gradient) ** 2 + 2.0 * u_speed_gradient**4)
     speed, u_speed_crosswind = straight_line_speed(seen.speed * (1.0 - early), across, u_across)
     t = np.atleast_1d(temperatures_c(speed, p, h, None, model, co2_ppm, frequency_hz))
-    status = np.where(np.isfinite(t), USED, np.where(good, OUTSIDE, NO_TIME))
+    calm = ~(np.abs(seen.wind) > WIND.upper)
+    status = np.where(~good, NO_TIME, np.where(~calm, NO_WIND, np.where(np.isfinite(t), USED, OUTSIDE)))
+    t = np.where(calm, t, np.nan)
+    good = np.isfinite(t)
 
     at = np.where(np.isfinite(t), t, 20.0)  # only so that slopes exist everywhere; nan again below
     slope = sound(at, p, h, model=model, co2_ppm=co2_ppm).sensitivity
@@ -168,16 +172,14 @@ def path_temperatures(
     }
     covariance = np.diag(noise**2) + sum(np.outer(part, part) for part in common.values())
     light = air(at, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=co2_ppm)
-    group = _group_covariance(
-        light, np.isfinite(t), noise, common, {"pressure": u_pressure_hpa, "humidity": u_humidity_percent}
-    )
+    group = _group_covariance(light, good, noise, common, {"pressure": u_pressure_hpa, "humidity": u_humidity_percent})
     return PathTemperatures(
         temperature_c=t,
         u_temperature_c=np.sqrt(np.diag(covariance)),
         covariance_c2=covariance,
         wind=np.where(good, seen.wind, np.nan),
         u_wind=np.where(good, seen.u_wind(u_time, length, u_length, u_delay), np.nan),
-        group_refractivity=np.where(np.isfinite(t), light.group_refractivity, np.nan),
+        group_refractivity=np.where(good, light.group_refractivity, np.nan),
         u_group_refractivity=np.sqrt(np.diag(group)),
         covariance_group=group,
         status=tuple(str(text) for text in status),
@@ -256,9 +258,10 @@ def _check(length, delay, crosswind, speed_gradient, wind, u_wind, one_way) -> N
             "one direction does not tell wind from temperature: give wind and u_wind, m/s along the path"
         )
     WIND.check(wind)
-    _check_spreads(u_wind=u_wind)
+    check_spreads(u_wind=u_wind)
 
 
-def _check_spreads(**spreads) -> None:
+def check_spreads(**spreads) -> None:
+    """Raise ValidityError for the first standard uncertainty that is none."""
     for name, value in spreads.items():
         Limit(name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty").check(value)

@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 
 from catseye.atmosphere.air import air
+from catseye.atmosphere.model import Limit
 from catseye.atmosphere.sound import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
-from catseye.reduction.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
+from catseye.reduction.acoustic import LENGTH, NO_TIME, OUTSIDE, USED, check_spreads
 
 PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
 CLOSE_ENOUGH_C = 1e-6
+NOTHING = "no travel time of {} is that of sound in air; check the delay and the places"
 WINDIEST = 60.0  # m/s that a wind and a temperature other than expected may make together
+LINE = Limit("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
 COMMON = ("delay", "pressure", "humidity", "formula")  # after three coordinates a station
 
 
@@ -82,6 +85,7 @@ class SoundField:
         Pressure and humidity are one for all lines, those of the station as the sound has corrected them.
         """
         lines = Lines(np.atleast_2d(np.asarray(start, float)), np.atleast_2d(np.asarray(end, float)))
+        LINE.check(np.linalg.norm(lines.end - lines.start, axis=1))
         means = self.tomogram.scalar_along(lines)
         at = len(means.parameters) - len(COMMON) + np.array([COMMON.index("pressure"), COMMON.index("humidity")])
         p, h, co2_ppm = self.weather
@@ -152,11 +156,17 @@ def sound_field(
 
     Source: exact geometry of `atmosphere.sound_path`, [TARANTOLA05] for the estimate; linearised about each path's own
     temperature and wind, again until nothing changes. Raises ValidityError for weather and shapes, EstimationError
-    where no time is left.
+    where no time is left, or where temperature and wind do not settle.
     """
     stations, time = np.asarray(stations, float), np.asarray(time, float)
-    source, receiver = np.asarray(source, int), np.asarray(receiver, int)
-    u_time = np.broadcast_to(np.asarray(u_time, float), time.shape)
+    source, receiver, u_time = _ends(stations, source, receiver, time, u_time)
+    check_spreads(
+        u_time=u_time,
+        u_position=u_position,
+        u_delay=u_delay,
+        u_pressure_hpa=u_pressure_hpa,
+        u_humidity_percent=u_humidity_percent,
+    )
     ray = stations[receiver] - stations[source]
     LENGTH.check(np.linalg.norm(ray, axis=1))
     if temperature.u_mean <= 0.0 and not temperature.scales:
@@ -173,7 +183,10 @@ def sound_field(
     )
     at, blown = np.full(len(time), temperature.mean), np.zeros((len(time), 3))
     before = np.full(len(time), np.inf)
+    limit = model_named(model).limits["temperature_c"]
     for turn in range(PASSES):
+        if not np.any(good):
+            raise EstimationError(NOTHING.format(len(time)))
         kept = paths.only(np.flatnonzero(good))
         observed, along, design, outside = kept.linearised(at[good], blown[good], values, model, first=turn == 0)
         if np.any(outside):
@@ -182,9 +195,7 @@ def sound_field(
             kept = paths.only(np.flatnonzero(good))
             observed, along, design = observed[~outside], along[~outside], design[~outside]
         if not np.any(good):
-            raise EstimationError(
-                f"no travel time of {len(time)} is that of sound in air; check the delay and the places"
-            )
+            raise EstimationError(NOTHING.format(len(time)))
         noise = np.diag((kept.per_second(along) * kept.u_time) ** 2)
         along = np.zeros_like(along) if wind is None else along
         found = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
@@ -193,10 +204,32 @@ def sound_field(
             blown[good] = np.stack(
                 [found.vector_along(kept.lines, np.tile(axis, (len(observed), 1))).value for axis in np.eye(3)], axis=1
             )
-        if np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
+        beyond = good & ~((at >= limit.lower) & (at <= limit.upper))
+        status[beyond], good[beyond] = OUTSIDE, False
+        if not np.any(beyond) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
             break
         before = at.copy()
+    else:
+        raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; leave out the wildest times")
     return SoundField(found, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
+
+
+def _ends(stations: np.ndarray, source: Any, receiver: Any, time: np.ndarray, u_time: Any) -> tuple:
+    """Source, receiver and noise of each time, (m,) each; ValidityError for other shapes and unknown stations."""
+    if stations.ndim != 2 or stations.shape[1] != 3:
+        raise ValidityError(f"stations have the shape {stations.shape} (expected (n, 3), m)")
+    ends = []
+    for name, given in (("source", source), ("receiver", receiver)):
+        index = np.asarray(given)
+        if time.ndim != 1 or index.shape != time.shape:
+            raise ValidityError(f"{name} has the shape {index.shape}, time {time.shape} (expected (m,) both)")
+        if index.dtype.kind not in "iu" or np.any((index < 0) | (index >= len(stations))):
+            raise ValidityError(f"{name} is not all whole numbers from 0 to {len(stations) - 1}, a station each")
+        ends.append(index.astype(int))
+    u_time = np.asarray(u_time, float)
+    if u_time.shape not in ((), time.shape):
+        raise ValidityError(f"u_time has the shape {u_time.shape} (expected one, or {time.shape})")
+    return *ends, np.broadcast_to(u_time, time.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,13 +114,13 @@ def reduce_acoustic(
 
     Raises InputError, one line with file, place, value and what was expected; a bad shot is a status.
     """
-    groups: dict[Path, list[Path]] = {}
+    groups: dict[Path, tuple[Path, list[Path]]] = {}
     for file in files:
         beside = sheet if sheet is not None else file.with_suffix(".toml")
         if beside.resolve() == file.resolve():
             raise refusal(file.name, "is given as the recording and as its sheet (expected a sheet .toml)")
-        groups.setdefault(beside, []).append(file)
-    return [_path(beside, members, model, air_model) for beside, members in groups.items()]
+        groups.setdefault(beside.resolve(), (beside, []))[1].append(file)
+    return [_path(beside, members, model, air_model) for beside, members in groups.values()]
 
 
 def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
@@ -130,7 +130,7 @@ def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> Ac
     for path in files:
         read = read_recording(path, sheet)
         if read.file in hashes:
-            raise refusal(read.file, "is given twice (expected each file once)")
+            raise refusal(read.file, "is given twice, or two files have that name (expected each once, names apart)")
         hashes[read.file] = read.digest
         try:
             parts.append(_timed(read, sheet) if isinstance(read, TravelTimes) else _heard(read, sheet, beside.name))
@@ -167,8 +167,16 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Shots
     sent, u_sent, loop = emission, np.zeros(len(mjd)), None
     if "loop" in recording.samples:
         loop = listener.arrivals("loop", emission, LOOP_WINDOW)
-        sent, u_sent = loop.delay, loop.u_delay
+        both = {"ab", "ba"} <= recording.samples.keys()
+        # one loop serves both directions: in the mean its noise does not fall, so it counts twice in squares
+        sent, u_sent = loop.delay, loop.u_delay * (np.sqrt(2.0) if both else 1.0)
     window = listener.window(flight, weather[0])
+    if sheet.interval_s is not None and sheet.shots > 1 and sheet.interval_s <= 2.0 * window:
+        raise refusal(
+            sheet_file,
+            f"interval_s = {sheet.interval_s:g} is within the window of an arrival, {2e3 * window:.4g} ms wide: one "
+            "arrival would count as several shots (expected a longer interval_s, or a narrower window_ms)",
+        )
     offset = sheet.clock_offset_us * MICROSECOND
     delay = sheet.delay_us * MICROSECOND
     texts = [[] if loop is None else [f"loop: {text}"] for text in (loop.texts if loop else [""] * len(mjd))]
@@ -300,9 +308,14 @@ def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
 
 
 def frequency_hz(sheet: AcousticSheet) -> float:
-    """Of the sound, for the air's dispersion: the sheet's, else the root mean square of the signal's, else 0."""
-    if sheet.frequency_hz is not None or sheet.signal is None:
-        return sheet.frequency_hz or 0.0
+    """Of the sound, for the air's dispersion: the sheet's, else the root mean square of the signal's."""
+    if sheet.frequency_hz is not None:
+        return sheet.frequency_hz
+    if sheet.signal is None:
+        raise ValidityError(
+            "frequency_hz is missing (expected the sound's where there is no [signal]: the air's dispersion is 0.03 C "
+            "in moist air, 0.2 C in dry; 0 for a speed at zero frequency)"
+        )
     sampling_hz = sheet.sampling_hz or 192e3
     samples = sampled(sheet.signal.kind, sampling_hz, **sheet.signal.values)
     return DelayPlan(samples, sampling_hz=sampling_hz, window=1e-3).bandwidth / TWO_PI

@@ -250,7 +250,6 @@ class AirField:
         weather = self._weather(mjd_utc, parameters)
         chosen = MODELS[self.model]
         chosen.check(temperature_c=warm)
-        light = {"wavelength_um": self.wavelength_um, "co2_ppm": chosen.co2_ppm}
 
         def profile(z: np.ndarray) -> np.ndarray:
             share, last, temperature, pressure, humidity = weather(z)
@@ -259,9 +258,9 @@ class AirField:
                 for step in (0.0, 0.5, -0.5)
             )
             state = (np.broadcast_to(warm[:, None], z.shape), pressure, vapour)
-            partials = chosen.partials(*state, **light)
+            partials = chosen.partials(*state, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
             per_c = partials.vapour_pressure_hpa * (above - below)
-            index = chosen.refractivity(*state, **light)
+            index = chosen.refractivity(*state, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
             by_stations = -per_c * np.moveaxis(share, -1, 0)
             return np.concatenate([index[None], by_stations, (per_c * last)[None], partials.temperature_c[None]])
 

@@ -3,14 +3,15 @@
 Each way that the notes name ends in the same answer, with the uncertainty that its instruments give it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from catseye.atmosphere import barometer, hygrometer
+from catseye.atmosphere import barometer, humidity, hygrometer
 from catseye.atmosphere.air import MODELS, Air, air, air_of_vapour, group_partials
 from catseye.atmosphere.condensation import Condensation, condensation
+from catseye.atmosphere.model import Limit
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
@@ -23,6 +24,9 @@ HYGROMETERS: tuple[Hygrometer, ...] = (
     "ice_bulb_c",
     "vapour_pressure_hpa",
 )
+ABOVE = Limit("height above the barometer", "m", -1000.0, 1000.0, "air of one temperature")
+U_STANDARD_GRAVITY = 0.02  # m/s²: gravity at stations from 9.78 to 9.83 stands for 9.80665
+U_LAPSE = 0.0065  # °C/m, of air taken to be of one temperature: as much as the standard air's falls
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,9 @@ def air_by(
     temperature_c     of the air, °C
     pressure_hpa      at the barometer, hPa
     moisture          what was read
-    above_barometer   height of the air above the barometer, m, within 1 km: at rest and of one temperature between
+    above_barometer   height of the air above the barometer, m, within 1 km: at rest and of one temperature between;
+                      what that leaves open of the pressure (a lapse of 6.5 °C/km: 0.012 hPa over 100 m, 1.1 hPa over
+                      1 km) and what gravity does enters the uncertainty
     u_temperature_c   standard uncertainty of the temperature, °C; it reaches the index by the density and by the vapour
     u_pressure_hpa    of the pressure, hPa
     u_co2_ppm         of the carbon dioxide, ppm
@@ -86,42 +92,62 @@ def air_by(
 
     >>> found, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), model="rueger1990")
     >>> round(float(found.humidity_percent), 2), round(float(u) * 1e6, 4)
-    (50.0, 0.1002)
+    (50.0, 0.0791)
     """
     light = {"wavelength_um": wavelength_um, "model": model, "co2_ppm": co2_ppm}
     u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
-    at = _carried(temperature_c, pressure_hpa, above_barometer, moisture, model)
+    at, u["u_pressure_hpa"], at_per_c = _carried(
+        temperature_c, pressure_hpa, above_barometer, moisture, model, u_pressure_hpa
+    )
     if moisture.kind == "humidity_percent":
         found = air(temperature_c, at, moisture.value, modulation_hz=modulation_hz, **light)
-        return found, found.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
+        slope = found.sensitivity
+        # a thermometer read too high also carries the pressure wrongly
+        by_c = slope._replace(temperature_c=slope.temperature_c + slope.pressure_hpa * at_per_c)
+        whole = replace(found, sensitivity=by_c)
+        return found, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
     vapour = read(temperature_c, at, moisture, model)
     found = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=modulation_hz, **light)
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
+    by_p = partials.pressure_hpa + partials.vapour_pressure_hpa * vapour.per_pressure_hpa
+    partials = partials._replace(temperature_c=partials.temperature_c + by_p * at_per_c)
     formula = np.hypot(found.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
     return found, vapour.index_uncertainty(partials, moisture.u, **u, u_model=formula)
 
 
-def surface_of(state: Air, surface_c, u_surface_c=0.0, u_temperature_c=0.0) -> Condensation:
+def surface_of(
+    state: Air, moisture: Moisture, surface_c, *, u_surface_c=0.0, u_temperature_c=0.0, u_pressure_hpa=0.0
+) -> Condensation:
     """Whether a surface in this air will dew or frost over.
 
-    state             the air
+    state             the air that `air_by` found
+    moisture          what was read: its uncertainty is the dew point's, and the air's temperature counts only where the
+                      instrument needs it (a mirror reads the dew point itself)
     surface_c         temperature of the surface, °C
-    u_surface_c       its standard uncertainty, °C
+    u_surface_c       its standard uncertainty, °C; uncorrelated with the air's
     u_temperature_c   that of the air's temperature, °C
+    u_pressure_hpa    that of the pressure, hPa
 
-    >>> found, _ = air_by(10.0, 933.0, Moisture("humidity_percent", 75.0))
-    >>> str(surface_of(found, 5.0).deposit)
-    'dew'
+    >>> read_so = Moisture("humidity_percent", 75.0, 3.0)
+    >>> found, _ = air_by(10.0, 933.0, read_so)
+    >>> surface = surface_of(found, read_so, 5.0)
+    >>> str(surface.deposit), round(float(surface.u_margin_k), 2)
+    ('dew', 0.58)
     """
+    reading = read(state.temperature_c, state.pressure_hpa, moisture, state.model)
+    u_vapour = reading.standard_uncertainty_hpa(
+        moisture.u, u_temperature_c=u_temperature_c, u_pressure_hpa=u_pressure_hpa
+    )
     # to rounding and the formulas' 0.2 % air may be a little more than saturated; the surface's answer is the same
-    humidity = np.minimum(state.humidity_percent, 100.0)
+    relative = np.minimum(state.humidity_percent, 100.0)
     return condensation(
         surface_c,
         state.temperature_c,
         state.pressure_hpa,
-        humidity,
+        relative,
         u_surface_c=u_surface_c,
-        u_temperature_c=u_temperature_c,
+        # the threshold hangs on the vapour alone: its uncertainty, as humidity at a temperature that is exact
+        u_humidity_percent=100.0 * u_vapour / humidity.saturation(state.temperature_c, state.pressure_hpa).pressure_hpa,
     )
 
 
@@ -144,12 +170,17 @@ def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrome
     return hygrometer.of_wet_bulb(temperature_c, moisture.value, pressure_hpa, over_ice=over_ice)
 
 
-def _carried(temperature_c, pressure_hpa, above, moisture: Moisture, model: str):
-    """Pressure at the air's height; the air between has the vapour that the instrument shows at the barometer."""
+def _carried(temperature_c, pressure_hpa, above, moisture: Moisture, model: str, u_pressure_hpa):
+    """Pressure at the air's height, its standard uncertainty but for the temperature's, its slope by that (hPa/°C).
+
+    The air between has the vapour that the instrument shows at the barometer.
+    """
+    ABOVE.check(above)
     if np.all(np.asarray(above) == 0.0):
-        return pressure_hpa
+        return pressure_hpa, u_pressure_hpa, 0.0
     e = read(temperature_c, pressure_hpa, moisture, model).vapour_pressure_hpa
     carried = barometer.carried_pressure(
         pressure_hpa, temperature_c, 0.0, above, lapse_c_per_m=0.0, vapour_pressure_hpa=e
     )
-    return carried.pressure_hpa
+    u = carried.standard_uncertainty_hpa(u_pressure_hpa, u_lapse=U_LAPSE, u_gravity=U_STANDARD_GRAVITY)
+    return carried.pressure_hpa, u, carried.per_temperature_c

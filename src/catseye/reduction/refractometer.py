@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.atmosphere.air import MODELS
+from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.reduction.air import AirField
@@ -250,7 +251,9 @@ def _series(reduction: "Reduction", benchmark: "Benchmark", rows: np.ndarray) ->
     a, b = (coordinates.x[coordinates.index(name)] for name in (benchmark.ranger, benchmark.target))
     nothing = np.zeros(len(field.names))
     air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), nothing)
-    formula = MODELS[reduction.settings.air_model].standard_uncertainty
+    t, p, h = field.smoothed(mjd).mean(axis=1).T
+    chosen = MODELS[field.model]
+    formula = chosen.uncertainty(vapour_pressure_hpa(t, p, h, chosen.vapour_formula))
     u_weather = np.sqrt(np.sum((air.slopes * field.sigmas) ** 2, axis=1) + formula**2)
     used = ranges.used[rows]
     count = max(int(used.sum()), 1)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.air import MODELS, group_refractivity
+from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import EstimationError
 from catseye.reduction.refractometer import AbsoluteIndex, absolute_group_index, phase_slope
@@ -39,9 +40,9 @@ STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrate
 
 @dataclass(frozen=True)
 class SlopeTest:
-    """The slope of phase against index, fitted freely, over the theoretical one.
+    """How far the weather's index goes, fitted freely, over what the phase and -(4 pi f/c) L say of it.
 
-    ratio       1 when the phase follows the weather as -(4 pi f/c) L says
+    ratio       1 when the phase follows the weather; above 1 the path's air changes less than the sensors'
     u           of the scatter
     agrees      within three u, the length's own included; None where the index hardly changed
     """
@@ -56,8 +57,8 @@ class PathCalibration:
     """A calibrated path and the index of its air; rows as in the readings.
 
     index_0, u_index_0   group refractivity at phase_0 and its standard uncertainty, at the time mjd_0
-    phase_0        rad, of the first section: the mean of its readings
-    temperature_0_c, pressure_0_hpa, humidity_0_percent   mean weather of the fit
+    phase_0        rad, of the first calibrated section: the mean of its readings
+    temperature_0_c, pressure_0_hpa, humidity_0_percent   mean weather of that section's readings
     names, x, covariance   of all parameters (ppm, °C, hPa, %, rad): see `names`
     budget         cause -> its part of u_index_0
     refractivity, u_refractivity   (m,) n_g - 1 by the phase; nan where the phase is not followed or not calibrated
@@ -181,7 +182,10 @@ class _Fit:
     def _parameters(self) -> tuple[tuple[str, ...], np.ndarray]:
         """Names, and the matrix of weights that is known beforehand."""
         r, sheet = self.readings, self.readings.sheet
-        formula = MODELS[sheet.air_model].standard_uncertainty / PPM
+        chosen, there = MODELS[sheet.air_model], np.isfinite(self.weather.index)
+        p, h = (float(np.mean(column[self.rows])) for column in (r.pressure_hpa, r.humidity_percent))
+        vapour = vapour_pressure_hpa(float(np.nanmean(r.temperature_c[there])), p, h, chosen.vapour_formula)
+        formula = float(chosen.uncertainty(vapour)) / PPM
         u_length = sheet.u_path_length_mm * MILLIMETRE / sheet.path_length_m
         u = [*r.u_temperature_c, sheet.u_pressure_hpa, sheet.u_humidity_percent, formula, u_length]
         names = [f"index {s + 1}" for s in self.calibrated]
@@ -349,7 +353,9 @@ def _told(fit: _Fit) -> PathCalibration:
     readings, followed, sheet = fit.readings, fit.followed, fit.readings.sheet
     mean, w_reading, _ = fit.tests()
     keep = fit.reading_in & fit.value_in.any(axis=1)
-    when = float(readings.mjd_utc[fit.rows[keep]].mean()) if keep.any() else float(readings.mjd_utc[0])
+    first = followed.section[fit.rows] == fit.calibrated[0]  # the section that phase_0 and index_0 belong to
+    keep = keep & first if (keep & first).any() else first
+    when = float(readings.mjd_utc[fit.rows[keep]].mean())
     row = int(fit.rows[keep][np.argmin(np.abs(readings.mjd_utc[fit.rows[keep]] - when))])
     at = fit.at(np.array([row]))[0]
     at[: len(fit.calibrated)], at[fit.names.index("length")] = 0.0, 0.0
@@ -491,7 +497,7 @@ def _budget(fit: _Fit, at: np.ndarray) -> dict[str, float]:
 
 
 def _slope(known: _Fit) -> SlopeTest:
-    """The slope of a fit that knows nothing of the length; noise of the phase flattens it, which is put right."""
+    """Of a fit that knows nothing of the length; noise of the phase flattens it, which is put right."""
     fit = _Fit(known.readings, known.weather, known.followed)
     at = fit.names.index("length")
     fit.prior[at, at] = (fit.prior[at, at] ** -0.5 + UNKNOWN_SLOPE) ** -2
@@ -521,8 +527,8 @@ def _notes(fit: _Fit, slope: SlopeTest, absolute: AbsoluteIndex, index_0: float,
             notes.append(f"section {number + 1} has fewer than {LASTING} readings with weather: not calibrated")
     if slope.agrees is False:
         notes.append(
-            f"phase and weather disagree: the slope is {slope.ratio:.3f} ± {slope.u:.3f} of the theoretical one; "
-            "below 1 the path's air changes less than the sensors'"
+            f"phase and weather disagree: the weather's index changes {slope.ratio:.3f} ± {slope.u:.3f} times as much "
+            "as the phase says; above 1 the path's air changes less than the sensors'"
         )
     k, first = len(readings.thermometers), len(fit.calibrated)
     for i, name in enumerate(readings.thermometers if k > 1 else ()):

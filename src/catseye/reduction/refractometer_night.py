@@ -240,7 +240,11 @@ def path_weather(readings: PathReadings) -> PathWeather:
 
 
 class ReadingStatus(IntEnum):
-    """What became of a reading: FOLLOWED, STRAY (off its neighbours, which agree) or LEFT_OUT (by the table)."""
+    """What became of a reading: FOLLOWED, STRAY (off its neighbours, which agree) or LEFT_OUT (by the table).
+
+    A STRAY, too, is one whose own u spoils a prediction that would tell its whole cycles: faint, or hours without
+    weather.
+    """
 
     FOLLOWED = 0
     STRAY = 1
@@ -287,7 +291,8 @@ def follow_phase(readings: PathReadings, weather: PathWeather) -> FollowedPhase:
     of the latest readings'. A gap over which that prediction is not good to a quarter cycle at five sigma ends the
     section: its whole cycles are not guessed. A step that lasts for five readings is a jump of path or electronics and
     begins a section, too; a shorter one is a stray. Steps below that are found by the medians of fifteen readings on
-    either side, six times what such medians usually differ by. A step of a whole number of turns cannot be seen.
+    either side, six times what such medians usually differ by, and at least half of it sudden: air that slowly leaves
+    the thermometers' is no jump. A step of a whole number of turns cannot be seen.
 
     Source: [PARKER04] section 1.6; the rule is that of `signal.cycles`: the nearest integer with a margin.
     """
@@ -336,6 +341,11 @@ class _Follower:
         self.bridged: list[str] = []
 
     def follow(self, rows: np.ndarray, expected: np.ndarray, left_out: np.ndarray) -> FollowedPhase:
+        certain = SIGMAS * self.sigma[rows] < 0.25 * TWO_PI
+        if certain.any():  # a reading too faint to tell its own cycle ends no section: it is passed over
+            vague, rows = rows[~certain], rows[certain]
+        else:
+            vague = rows[:0]
         usual = float(np.median(np.diff(self.hours[rows]))) if len(rows) > 1 else 0.0
         self._begin(rows, "start", "the first readings")
         waiting: list[int] = []
@@ -343,6 +353,9 @@ class _Follower:
             u, off = self._against(row)
             gap = self.hours[row] - self.hours[self.recent[-1][0]]
             if gap > 0.0 and SIGMAS * u >= 0.25 * TWO_PI:
+                if SIGMAS * np.sqrt(u**2 - self.sigma[row] ** 2) < 0.25 * TWO_PI:
+                    self.turned[row] = self._level() + off
+                    continue  # not the gap is too long but this reading too vague
                 text = f"no reading for {gap:.2f} h, over which the prediction is good to {u / TWO_PI:.2f} cycles only"
                 self._begin(rows[place:], "ambiguous gap", text)
                 u, off = self._against(row)
@@ -363,6 +376,9 @@ class _Follower:
                 waiting = []
             elif len(waiting) == LASTING:
                 waiting.pop(0)
+        for row in vague:
+            near = self.turned[rows[np.argmin(np.abs(self.hours[rows] - self.hours[row]))]]
+            self.turned[row] = near + _wrapped(self.rest[row] - near)
         self.status[left_out] = ReadingStatus.LEFT_OUT
         self._small_steps()
         return self._followed(expected)
@@ -380,6 +396,7 @@ class _Follower:
                 apart = medians[WINDOW:] - medians[:-WINDOW]
                 formal = 1.25 * np.median(self.sigma[rows]) * np.sqrt(2.0 / WINDOW)
                 usual = max(1.4826 * float(np.median(np.abs(apart))), float(formal))
+                apart = np.where(np.abs(self._sudden(self.turned[rows])) > 0.5 * np.abs(apart), apart, 0.0)
                 at = int(np.argmax(np.abs(apart)))
                 if abs(apart[at]) > max(STEP * usual, best):
                     best, step = float(abs(apart[at])), float(apart[at])
@@ -388,6 +405,15 @@ class _Follower:
                 return
             self.starts.append((where, "jump", self._step_text(step)))
             self.starts[1:] = sorted(self.starts[1:])
+
+    @staticmethod
+    def _sudden(values: np.ndarray) -> np.ndarray:
+        """What is left of each step between windows when a straight line runs on either side of it: none of a slope."""
+        place = np.arange(WINDOW) - 0.5 * (WINDOW - 1)
+        toward = 1.0 / WINDOW + 0.5 * WINDOW * place / np.sum(place**2)  # the line's value at the window's late end
+        late = np.convolve(values, toward[::-1], mode="valid")
+        early = np.convolve(values, toward, mode="valid")
+        return early[WINDOW:] - late[:-WINDOW]
 
     def _cut(self, values: np.ndarray) -> int:
         """Where the values fall apart into two levels with the least sum of absolute departures."""

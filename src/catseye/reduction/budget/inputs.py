@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.air import MODELS, air
-from catseye.atmosphere.humidity import saturation
+from catseye.atmosphere.humidity import saturation, vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.propagation import STUDENT, Input
@@ -246,7 +246,10 @@ def _air(scene: Scene) -> list[Item]:
         items.append(
             Item("sound", given, "°C", by_index * float(scene.path.slopes[0, column]), "path_temperatures.csv")
         )
-    formula = MODELS[scene.settings.air_model].standard_uncertainty / PPM
+    chosen = MODELS[scene.settings.air_model]
+    temperature = float(field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0].mean())
+    vapour = vapour_pressure_hpa(temperature, pressure, humidity, chosen.vapour_formula)
+    formula = float(chosen.uncertainty(vapour)) / PPM
     return [
         *items,
         Item(

@@ -66,7 +66,9 @@ def group_air(readings: Readings) -> Air:
         modulation_hz=sheet.modulation_hz,
     )
     return Air(
-        np.asarray(state.group_index), np.array([*state.sensitivity[: len(SENSORS)]]), state.standard_uncertainty
+        np.asarray(state.group_index),
+        np.array([*state.sensitivity[: len(SENSORS)]]),
+        float(np.max(state.standard_uncertainty)),
     )
 
 
@@ -75,7 +77,7 @@ def phase_air(readings: Readings, wavelength_um: float) -> Air:
     sheet = readings.sheet
     state = air(*(readings.get(name) for name in SENSORS), wavelength_um=wavelength_um, model=sheet.air_model)
     slopes = np.array([*state.phase_sensitivity[: len(SENSORS)]])
-    return Air(np.asarray(state.phase_index), slopes, state.standard_uncertainty)
+    return Air(np.asarray(state.phase_index), slopes, float(np.max(state.standard_uncertainty)))
 
 
 def half_wavelength(readings: Readings, state: Air) -> np.ndarray:
