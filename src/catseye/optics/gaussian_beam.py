@@ -4,6 +4,8 @@ Scalar and paraxial. A retroreflector sends back what falls on its aperture, tur
 curvature: beyond it the light spreads by what it had spread and by diffraction at the aperture.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +13,9 @@ from catseye.errors import ValidityError
 
 NODES_PER_FRINGE = 12.0  # of the quadrature over an aperture, for each zone of Fresnel
 FEWEST_NODES, MOST_NODES = 200, 20_000
+CHORDS_PER_RADIAN = 0.85  # over a whole chord, for each radian that the phase runs from its middle to its end
+FEWEST_CHORDS, MOST_CHORDS = 16, 320
+WIDE = 4.5  # beam radii: exp(-40) of the light is beyond
 
 
 def radius(distance: ArrayLike, *, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
@@ -90,6 +95,169 @@ def returned_share(distance: float, *, aperture: float, receiver: float, waist: 
         amplitude = np.abs(kernel @ field) * wave_number / distance
         power += float(np.sum(2.0 * np.pi * outer[part] * outer_weight[part] * amplitude**2))
     return power
+
+
+def share_within_ellipse(aperture: ArrayLike, radius_x: ArrayLike, radius_y: ArrayLike) -> NDArray:
+    """Share of an elliptical Gaussian beam's power that falls on a centred circular aperture.
+
+    aperture             m, its radius, 0 or more
+    radius_x, radius_y   m, above 0, of the beam at 1/e^2 in its two planes
+
+    Source: the Gaussian integrated along radii, exactly, and around by the trapezium rule, which converges faster than
+    any power for a periodic integrand: 1e-12 for axes up to 1 : 4, 1e-6 to 1 : 10.
+
+    >>> round(float(share_within_ellipse(0.01, 0.01, 0.01)), 6), round(float(share_within_ellipse(0.01, 0.02, 0.01)), 6)
+    (0.864665, 0.590095)
+    """
+    _positive(radius_x=radius_x, radius_y=radius_y)
+    a, x, y = (np.asarray(v, dtype=float)[..., None] for v in np.broadcast_arrays(aperture, radius_x, radius_y))
+    if not np.all(a >= 0.0):
+        raise ValidityError(f"aperture = {float(a.min())} m is not 0 or more")
+    around = (np.arange(64) + 0.5) * 0.5 * np.pi / 64
+    fall = 2.0 * ((np.cos(around) / x) ** 2 + (np.sin(around) / y) ** 2)
+    return np.mean(-np.expm1(-(a**2) * fall) / fall, axis=-1) * 2.0 / (x * y)[..., 0]
+
+
+def imaged_waist(
+    distance: ArrayLike, *, focal_length: ArrayLike, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0
+) -> tuple[NDArray, NDArray]:
+    """Where a thin lens puts the next waist, m behind it, and the radius there, m.
+
+    distance       m, from the waist to the lens; below zero where the beam meets the lens before its waist
+    focal_length   m, not 0
+    waist          m, above 0
+    wavelength     m, above 0
+    quality        M^2, at least 1
+
+    A waist in the front focal plane goes to the back focal plane, the widest that there is; the farthest comes from a
+    Rayleigh range before or behind that place.
+
+    Source: [SELF83], the thin-lens formula for waists. Exact for a paraxial beam.
+
+    >>> [round(float(v), 9) for v in imaged_waist(1.0, focal_length=1.0, waist=1e-4, wavelength=0.78e-6)]
+    [1.0, 0.002482817]
+    """
+    _positive(waist=waist, wavelength=wavelength)
+    f, w = np.asarray(focal_length, float), np.asarray(waist, float)
+    rayleigh = np.pi * w**2 / (np.asarray(quality, float) * np.asarray(wavelength, float))
+    beyond = np.asarray(distance, float) - f
+    shrunk = f**2 / (beyond**2 + rayleigh**2)
+    return f + beyond * shrunk, w * np.sqrt(shrunk)
+
+
+def waist_for(distance: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
+    """Waist, m, at the head that makes the beam smallest at a distance: there it is wider by the root of 2.
+
+    distance     m, above 0
+    wavelength   m, above 0
+    quality      M^2, at least 1
+
+    Source: the minimum of `radius` over the waist, a Rayleigh range equal to the distance.
+
+    >>> round(float(waist_for(120.0, 0.78e-6)), 6)
+    0.005458
+    """
+    _positive(distance=distance, wavelength=wavelength)
+    return np.sqrt(np.asarray(quality, float) * np.asarray(wavelength, float) * np.asarray(distance, float) / np.pi)
+
+
+def farthest_waist(lens_radius: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
+    """Distance, m, beyond which no lens that the beam fills to a radius can put a waist.
+
+    lens_radius   m, above 0: radius of the beam on the lens at 1/e^2
+    wavelength    m, above 0
+    quality       M^2, at least 1
+
+    At this distance the waist is the lens's radius over the root of 2.
+
+    Source: [SIEGMAN86] ch. 17, the maximum of the waist's distance for a given radius on the lens.
+
+    >>> round(float(farthest_waist(0.010, 0.78e-6)), 3)
+    201.384
+    """
+    _positive(lens_radius=lens_radius, wavelength=wavelength)
+    return 0.5 * np.pi * np.asarray(lens_radius, float) ** 2 / (np.asarray(quality, float) * np.asarray(wavelength))
+
+
+def powers_through(
+    q: ArrayLike, *, wavelengths: ArrayLike, discs: Sequence[float], systems: Sequence[ArrayLike]
+) -> NDArray[np.float64]:
+    """Shares (d,) of a beam's power within round apertures one behind the other, each lit by what the last let pass.
+
+    q             (2,) complex parameters of the beam in the first aperture, m, in its two planes: see `abcd`
+    wavelengths   (2,) m: of the light times M^2 of each plane
+    discs         (d,) m, above 0: radii of the apertures, centred
+    systems       (d - 1, 2, 2, 2) matrices from one aperture to the next, in the two planes; their B not 0
+
+    M^2 above 1 is an ideal beam of that longer wavelength: exact as long as nothing clips it; diffraction by an edge
+    is then M^2 times too wide, so that what returns is rather too small.
+
+    Raises ValidityError where fringes are too many to follow (wide apertures close together).
+
+    Source: the diffraction integral of an ABCD system, [COLLINS70]; [SIEGMAN86] ch. 20. Each disc is cut into
+    chords; Gauss-Legendre to some 1e-6 of the power.
+
+    >>> from catseye.optics.abcd import beam_at_waist, free_space, onward
+    >>> q, back = onward(beam_at_waist(0.010, 0.78e-6), free_space(100.0)), free_space(100.0)
+    >>> powers_through([q, q], wavelengths=[0.78e-6] * 2, discs=[0.019, 0.05], systems=[[back, back]]).round(4).tolist()
+    [0.9989, 0.9988]
+    """
+    _positive(wavelengths=wavelengths, discs=discs)
+    k, z, steps = 2.0 * np.pi / np.asarray(wavelengths, float), np.asarray(q, complex), np.asarray(systems, float)
+    w = np.sqrt(-2.0 / (k * np.imag(1.0 / z)))
+    edges = np.array([min(discs[0], WIDE * float(w.max())), *discs[1:]])
+    counts = _chord_counts(edges, np.real(1.0 / z), steps, k)
+    outer, inner, area = _chords(edges[0], counts[0])
+    chirp = 0.5j * k / z
+    field = np.sqrt(2.0 / (np.pi * w[0] * w[1])) * np.exp(-chirp[0] * outer[:, None] ** 2 - chirp[1] * inner**2)
+    shares = [float(np.sum(area * np.abs(field) ** 2))]
+    axes = np.array([0, 1])  # of the outer and of the inner coordinate
+    for edge, count, step in zip(edges[1:], counts[1:], steps, strict=True):
+        (a, _, _, d), rates = step[axes].reshape(2, 4).T, k[axes] / step[axes, 0, 1]
+        chirped = np.exp(-0.5j * (rates[0] * a[0] * outer[:, None] ** 2 + rates[1] * a[1] * inner**2))
+        lit = field * chirped * area * np.sqrt(np.abs(rates[0] * rates[1])) / (2.0 * np.pi)
+        far_outer, far_inner, far_area = _chords(edge, count)  # its outer coordinate is the inner one of here
+        field = np.zeros(far_inner.shape, dtype=complex)
+        for row, x, y in zip(lit, outer, inner, strict=True):
+            field += (row @ np.cos(rates[1] * np.outer(y, far_outer)))[:, None] * np.cos(rates[0] * x * far_inner)
+        bend = rates[1] * d[1] * far_outer[:, None] ** 2 + rates[0] * d[0] * far_inner**2
+        field *= np.exp(-0.5j * bend)
+        outer, inner, area, axes = far_outer, far_inner, far_area, axes[::-1]
+        shares.append(float(np.sum(area * np.abs(field) ** 2)))
+    return np.array(shares)
+
+
+def _chord_counts(
+    edges: NDArray[np.float64], curvature: NDArray[np.float64], steps: NDArray[np.float64], k: NDArray[np.float64]
+) -> list[int]:
+    """Nodes on half a chord of each disc, enough for the phase that comes in and the one that is put on to go on."""
+    bends, spread, counts = curvature, 0.0, []
+    for i, edge in enumerate(edges):
+        run = 0.0
+        if i < len(steps):
+            a, b = steps[i][:, 0, 0], steps[i][:, 0, 1]
+            if np.any(b == 0.0):
+                raise ValidityError("apertures that are images of each other (expected way between them: B not 0)")
+            run = float(np.max(k * (0.5 * edge**2 * np.abs(a / b + bends) + edge * edges[i + 1] / np.abs(b))))
+            bends = steps[i][:, 1, 1] / b
+        run = max(run + edge * spread, 2.0 * edge * spread)  # the power's fringes are twice as fine as the field's
+        count = FEWEST_CHORDS + int(0.5 * CHORDS_PER_RADIAN * run)
+        if count > MOST_CHORDS:
+            raise ValidityError(
+                f"the light's phase runs over {run:.0f} rad of an aperture of {edge:.4g} m, more than is followed "
+                "(expected smaller apertures or more way between them)"
+            )
+        counts.append(count)
+        spread = float(np.max(k * edge / np.abs(b))) if i < len(steps) else 0.0
+    return counts
+
+
+def _chords(edge: float, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Places on a quarter of a disc, outer (c,) and inner (c, c), and the area of all four that each stands for."""
+    node, weight = np.polynomial.legendre.leggauss(2 * count)
+    node, weight = node[count:], weight[count:]
+    along, chord = edge * np.sin(0.5 * np.pi * node), edge * np.cos(0.5 * np.pi * node)[:, None]
+    return along, chord * node, 4.0 * 0.5 * np.pi * weight[:, None] * weight * chord**2
 
 
 def _quadrature(edge: float, phase: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,4 +1,4 @@
-"""From light on a photodiode to a signal of some amplitude, and the noise that comes with it."""
+"""From light on a lens and a photodiode to a signal of some amplitude, its delay, and the noise that comes with it."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,3 +69,94 @@ def u_phase(amplitude: ArrayLike, density: ArrayLike, duration: ArrayLike) -> ND
     0.01
     """
     return np.sqrt(np.asarray(density, float) / np.asarray(duration, float)) / np.asarray(amplitude, float)
+
+
+def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, group: ArrayLike) -> NDArray[np.float64]:
+    """Path (...), m, by which the modulation through a lens at a height comes later than on the axis: below zero.
+
+    height   (...) m, from the axis
+    powers   1/m, (e,) or one number: of each thin element, their sum 1/focal length
+    phase    (e,) phase indices of their glasses
+    group    (e,) group indices
+
+    All rays of a sharp image take the same time for the wave (Fermat). The modulation is slower by n_g - n_p in glass,
+    and a collecting lens is thickest in its middle: by the group index it is the middle that comes late [BOR88], not
+    the outer rays as [PARKER04] chapter 6, item 1, has it. Outer rays can be late by the lens's own spherical
+    aberration, which is the same for wave and modulation: see `traced_lens`. A lens of two glasses whose focal length
+    does not change with the wavelength has no lag: the sum below is h^2/2 of wavelength times change of power. A
+    mirror has none.
+
+    Source: derived here, -h^2/2 sum power (n_g - n_p)/(n_p - 1): each element is thinner at h by h^2 power/2(n_p - 1).
+    [BOR88] has it for a single lens. Paraxial; `traced_lens` is exact.
+
+    >>> round(float(lens_group_lag(0.025, 1 / 0.2, 1.511187, 1.527464)) * 1e6, 2)
+    -49.75
+    """
+    power, n_p, n_g = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (powers, phase, group))
+    return -0.5 * np.asarray(height, float) ** 2 * np.sum(power * (n_g - n_p) / (n_p - 1.0), axis=-1)
+
+
+def lens_group_range(
+    aperture: ArrayLike, beam_radius: ArrayLike, *, powers: ArrayLike, phase: ArrayLike, group: ArrayLike
+) -> NDArray[np.float64]:
+    """Metres that a range reads short (below zero) by `lens_group_lag`, against light on the axis of the lens.
+
+    aperture              (...) m, above 0: radius of the receiving lens
+    beam_radius           (...) m, above 0: of the light on it at 1/e^2; infinite for even light
+    powers, phase, group  of the lens's elements, as for `lens_group_lag`
+
+    The light passes the lens once, on its way back: half of the mean lag. A constant of the instrument only as long as
+    the light on the lens stays the same: it grows with the distance, and the internal reference has another.
+
+    Source: the detected modulation is the sum over the lens of power times exp(-i w lag/c), [GOODMAN05] (Parseval); to
+    first order its phase is the mean lag; mean h^2 of a Gaussian cut at the aperture. To 1e-4 of itself.
+
+    >>> lens = {"powers": 1 / 0.2, "phase": 1.511187, "group": 1.527464}
+    >>> round(float(lens_group_range(0.025, np.inf, **lens)) * 1e6, 2)
+    -12.44
+    """
+    a, w = np.asarray(aperture, float), np.asarray(beam_radius, float)
+    x = 2.0 * (a / w) ** 2
+    tiny = x < 1e-4  # even light: the Gaussian's expression loses its digits
+    safe = np.where(tiny, 1.0, x)
+    mean = a**2 * np.where(tiny, 0.5 - x / 12.0, 1.0 / safe - np.exp(-safe) / -np.expm1(-safe))
+    return 0.5 * lens_group_lag(np.sqrt(mean), powers, phase, group)
+
+
+def traced_lens(
+    heights: ArrayLike, *, r1: float, r2: float, thickness: float, phase: float, group: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Paths (r,), m, of wave and modulation through a lens to the plane of its paraxial focus, less the axis'.
+
+    heights        (r,) m, of rays parallel to the axis
+    r1, r2         m, radii, above zero where the centre lies behind the surface; infinite for a plane
+    thickness      m, on the axis
+    phase, group   indices of the glass over those of the air
+
+    The first is the lens's spherical aberration on a flat detector there, the second has the group lag besides. At f/4
+    a plano-convex lens with its flat side to the target has +181 um at the edge and -51 um of lag; the right way round
+    it is +43 and -50. NaN for a ray that misses.
+
+    Source: exact rays, see `ray_trace`.
+    """
+    from catseye.optics.abcd import thick_lens
+    from catseye.optics.ray_trace import Plane, Rays, Sphere
+
+    def surface(vertex: float, radius: float) -> Plane | Sphere:
+        if np.isinf(radius):
+            return Plane((0.0, 0.0, vertex), (0.0, 0.0, 1.0))
+        return Sphere((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
+
+    whole = thick_lens(r1, r2, thickness=thickness, index=phase)
+    image = Plane((0.0, 0.0, thickness - float(whole[0, 0] / whole[1, 0])), (0.0, 0.0, 1.0))
+    h = np.concatenate([[0.0], np.ravel(np.asarray(heights, float))])
+    front, back, start = surface(0.0, r1), surface(thickness, r2), -1.0
+    position = np.stack([h, np.zeros_like(h), np.full_like(h, start)], axis=-1)
+    direction = np.broadcast_to([0.0, 0.0, 1.0], position.shape)
+
+    def path(n: float) -> NDArray[np.float64]:
+        rays = Rays(position, direction, np.zeros_like(h)).to(front, 1.0).refracted(front, 1.0 / phase)
+        rays = rays.to(back, n).refracted(back, phase).to(image, 1.0)
+        return rays.path[1:] - rays.path[0]
+
+    return path(phase), path(group)

@@ -2,7 +2,7 @@
 
 How far off its axis each kind of retroreflector still serves stands in one table, `ACCEPTANCE`. A cube corner is used
 as long as `least_share` of its face sends light back (`optics.prism.clear_share`); what the polished faces of an
-uncoated prism let through beyond some 17 deg is not counted there.
+uncoated prism let through beyond 20 deg on the side of an edge (`optics.solid_prism`) is not counted there.
 """
 
 from collections.abc import Mapping

@@ -1,0 +1,109 @@
+"""The command of triplet units measured in the laboratory."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.networks import Out
+from catseye.cli.terminal import ProgressLine, say, wrapped
+
+if TYPE_CHECKING:
+    from catseye.reduction.triplet import TripletReduction
+
+
+@app.command(
+    epilog="\b\nExample: catseye triplet examples/triplets/TR99.toml\n"
+    "         catseye triplet examples/triplets/*.toml --out triplet-sheets\n"
+    "         catseye triplet --blank sheet.html"
+)
+def triplet(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILE.toml ...", help="Sheets of measured units: docs/formats/triplet.md."),
+    ] = None,
+    blank: Annotated[
+        Path | None, typer.Option("--blank", metavar="SHEET.html", help="Write the blank form, to print and fill in.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not."""
+    if not files and blank is None:
+        raise typer.BadParameter("at least one is needed, or --blank.", param_hint="'FILE.toml ...'")
+    if not files and (out is not None or json):
+        raise typer.BadParameter("are needed with --out and --json.", param_hint="'FILE.toml ...'")
+    units = _reduced(files or [], out, quiet)
+    if blank is not None:
+        _write_blank(blank)
+    if json:
+        _say_objects(units)
+    elif not quiet:
+        _tell(units, out, blank)
+
+
+def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "dict[Path, TripletReduction]":
+    """Every sheet read and reduced; with an `out`, written whole or not at all."""
+    if not files:
+        return {}
+    from catseye.gateways.output import refuse_output, whole_directory
+    from catseye.gateways.triplet_files import refuse_namesakes, write_triplets
+    from catseye.records.reading import Folder
+    from catseye.records.triplet_measurement import TripletMeasurement
+    from catseye.reduction.triplet import reduce_triplet
+
+    if out is not None:
+        refuse_namesakes(files)
+        for path in files:
+            refuse_output(out, path)
+    progress = ProgressLine(quiet)
+    units: dict[Path, TripletReduction] = {}
+    hashes: dict[Path, str] = {}
+    try:
+        for done, path in enumerate(files):
+            progress("reducing", done, len(files))
+            folder = Folder(path.parent)
+            units[path] = reduce_triplet(folder.record(path.name, TripletMeasurement))
+            hashes[path] = folder.hashes[path.name]
+        if out is not None:
+            with whole_directory(out, files[0]) as directory:
+                write_triplets(units, directory, hashes, progress)
+    finally:
+        progress.clear()
+    return units
+
+
+def _write_blank(path: Path) -> None:
+    from catseye.gateways.output import whole_file
+    from catseye.gateways.triplet_form import MARK, blank_form
+
+    with whole_file(path, "--blank", MARK) as pieces:
+        pieces.append(blank_form())
+
+
+def _say_objects(units: "dict[Path, TripletReduction]") -> None:
+    """One object, or a list of them for several files."""
+    from catseye.gateways.objects import json_line
+    from catseye.gateways.triplet_objects import triplet_object
+
+    told = [triplet_object(found, path.name) for path, found in units.items()]
+    say(json_line(told[0] if len(told) == 1 else told))
+
+
+def _tell(units: "dict[Path, TripletReduction]", out: Path | None, blank: Path | None) -> None:
+    """The whole sheet of one unit; of several, what each comes to."""
+    from catseye.gateways.triplet_sheet import text_sheet, verdict
+
+    if len(units) == 1:
+        ((path, found),) = units.items()
+        say(text_sheet(found, path.name).rstrip())
+    for path, found in units.items() if len(units) > 1 else ():
+        say(f"{path.name}: triplet {found.measurement.triplet}")
+        for title, text in verdict(found):
+            say(wrapped(title, text))
+    if out is not None:
+        say(wrapped("Written to", f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"))
+    if blank is not None:
+        say(wrapped("Written to", f"{blank}: the blank form"))

@@ -1,0 +1,296 @@
+"""A beam train as figures, words, object and files; coatings as curves."""
+
+import csv
+import hashlib
+import io
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.objects import json_page, versions
+from catseye.gateways.output import PROVENANCE
+from catseye.optics import coating
+from catseye.records.beam import BeamTrain
+from catseye.records.reading import Folder
+from catseye.reduction.beam import BeamPath, beam_profile, reduce_beam
+
+FORMAT = "catseye-beam-1"
+DRAWN = ("gold", "silver", "aluminium", "protected-aluminium", "dielectric")
+ANGLES = np.arange(0.0, 80.5, 0.5)  # degrees
+BAND_UM = (0.65, 0.95)
+WIDTHS = (10, 17, 19, 9, 9, 9)
+POLARIZATIONS: tuple[coating.Polarization, ...] = ("s", "p")
+
+
+def beam_figure(found: BeamPath) -> str:
+    """SVG text: the beam's radii along its path, and the power that returns by distance.
+
+    found   a reduced beam train
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(12.0, 6.6))  # margins by hand: the automatic ones differ in the last digit
+        edges = {"left": 0.06, "right": 0.985, "bottom": 0.08, "top": 0.95, "hspace": 0.38, "wspace": 0.2}
+        grid = figure.add_gridspec(2, 3, width_ratios=[1.0, 1.5, 1.0], **edges)
+        profile = beam_profile(found.train)
+        way, radii = profile["outward"]
+        outward = figure.add_subplot(grid[0, 0])
+        _leg(outward, found, "outward", (way / MILLIMETRE, radii))
+        outward.set(title="Laser to mirror", xlabel="from the laser (mm)", ylabel="radius at 1/e² (mm)")
+        _range(figure.add_subplot(grid[0, 1]), found, profile)
+        way, radii = profile["inward"]
+        inward = figure.add_subplot(grid[0, 2])
+        _leg(inward, found, "inward", ((way - way[0]) / MILLIMETRE, radii), way[0])
+        inward.set(title="Mirror to detector", xlabel="from the first inward element (mm)")
+        _power(figure.add_subplot(grid[1, :]), found)
+        return svg(figure)
+
+
+def _leg(ax, found: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> None:
+    """Radii in both planes and the apertures that stand there, within a head."""
+    way, radii = profile
+    for k, axis in enumerate("xy"):
+        ax.plot(way, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, label=axis)
+    stops = [place for place in found.places if place.leg == leg and np.isfinite(place.aperture)]
+    top = 1.15 * max([float(np.max(radii)), *(place.aperture for place in stops)]) / MILLIMETRE
+    for place in stops:
+        at, edge = (place.way - start) / MILLIMETRE, place.aperture / MILLIMETRE
+        ax.plot([at, at], [edge, top], color=INK, lw=2.2, solid_capstyle="butt")
+    ax.set_ylim(0.0, top)
+    ax.legend(loc="best")
+
+
+def _range(ax, found: BeamPath, profile: dict) -> None:
+    clipped = next(place for place in found.places if place.leg == "reflector")
+    for leg, style in (("range", "-"), ("back", (0, (4, 2)))):
+        way, radii = profile[leg]
+        along = way - profile["range"][0][0]
+        for k, axis in enumerate("xy"):
+            label = f"{axis}, {'out' if leg == 'range' else 'back, unclipped'}"
+            ax.plot(along, radii[:, k] / MILLIMETRE, color=SERIES[k], ls=style, lw=1.6, label=label)
+    at, edge = found.train.distance_m, clipped.aperture / MILLIMETRE
+    ax.axvline(at, color=FAINT, lw=0.7)
+    ax.plot([at, at], [edge, 10.0 * edge], color=INK, lw=2.2, solid_capstyle="butt")
+    colour = BAD if clipped.clipped > 0.01 else INK
+    text = f"{clipped.name}  \n{100 * clipped.clipped:.2g} % passes beside it  "
+    ax.text(at, 1.05 * edge, text, fontsize=7.5, color=colour, va="bottom", ha="right")
+    ax.set_ylim(0.0, 1.25 * max(edge, float(max(np.max(profile[leg][1]) for leg in ("range", "back"))) / MILLIMETRE))
+    ax.set(title="To the reflector and back", xlabel="path from the mirror (m)")
+    ax.legend(loc="upper right", ncols=1)
+
+
+def _power(ax, found: BeamPath) -> None:
+    known = [row for row in found.returned if row.status == "ok"]
+    ax.plot([r.distance for r in known], [100.0 * r.hit for r in known], "o-", ms=4, color=SERIES[2], label="hits it")
+    both = [100.0 * r.hit * r.collected for r in known]
+    ax.plot([r.distance for r in known], both, "s-", ms=4, color=SERIES[0], label="and comes back to the detector")
+    for row in found.returned:
+        if row.status != "ok":
+            ax.axvline(row.distance, color=BAD, lw=1.0, ls=":")
+    ax.set(title="Share of the beam", xlabel="distance to the reflector (m)", ylabel="share (%)")
+    ax.set_ylim(max(0.0, 1.1 * min(both, default=0.0) - 10.0), 101.0)
+    ax.legend(loc="lower left")
+
+
+def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0) -> str:
+    """SVG text: reflectance by angle and by wavelength, and what a mirror adds to a range by angle.
+
+    names           of `coating.named`
+    wavelength_um   um, that they are made for
+    incidence       rad, that they are made for, and of the middle panel
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(12.6, 4.6))
+        edges = {"left": 0.055, "right": 0.985, "bottom": 0.2, "top": 0.92, "wspace": 0.22}
+        by_angle, by_wavelength, path = figure.subplots(1, 3, gridspec_kw=edges)
+        light = np.linspace(*BAND_UM, 601)
+        for colour, name in zip(SERIES, names, strict=False):
+            made = coating.named(name, wavelength_um, incidence)
+            for polarization, style in zip(POLARIZATIONS, ("-", (0, (3, 1.5))), strict=True):
+                drawn = {"color": colour, "ls": style, "lw": 1.4}
+                labelled = {**drawn, "label": name} if polarization == "s" else drawn
+                across = coating.response(made, wavelength_um, ANGLES * DEGREE, polarization=polarization)
+                by_angle.plot(ANGLES, 100.0 * across.reflectance, **labelled)
+                along = coating.response(made, light, incidence, polarization=polarization)
+                by_wavelength.plot(light * 1e3, 100.0 * along.reflectance, **drawn)
+                added = coating.group_path(made, wavelength_um, ANGLES * DEGREE, polarization=polarization)
+                path.plot(ANGLES, np.where(across.reflectance > 0.5, 1e6 * added, np.nan), **drawn)
+        by_angle.set(title=f"At {wavelength_um * 1e3:g} nm", xlabel="incidence (°)", ylabel="reflectance (%)")
+        at = f"At {incidence / DEGREE:g}°, by wavelength"
+        by_wavelength.set(title=at, xlabel="wavelength (nm)", ylabel="reflectance (%)")
+        path.set(title="What the range grows by", xlabel="incidence (°)", ylabel="range (µm)", ylim=(-0.2, 2.6))
+        for ax in (by_angle, by_wavelength):
+            ax.set_ylim(-2.0, 102.0)
+        figure.legend(*by_angle.get_legend_handles_labels(), loc="lower center", ncols=len(names))
+        by_angle.text(0.03, 0.05, "full: s, dashed: p", transform=by_angle.transAxes, fontsize=8, color=FAINT)
+        return svg(figure)
+
+
+def beam_plot(file: Path) -> tuple[str, dict[str, Any]]:
+    """The figure of a beam train as SVG text, and what it says in numbers.
+
+    file   the record
+    """
+    found = read_beam(file)[0]
+    return beam_figure(found), {"name": found.train.name, "power_on_detector": found.places[-1].power}
+
+
+def coating_plot(
+    names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0
+) -> tuple[str, dict[str, Any]]:
+    """Coating curves as SVG text, and reflectance and range at the angle that they are made for.
+
+    names           of `coating.named`; one that is not known raises ValidityError
+    wavelength_um   um
+    incidence       rad
+    """
+    told: dict[str, Any] = {"wavelength_um": wavelength_um, "incidence": incidence}
+    for name in names:
+        made = coating.named(name, wavelength_um, incidence)
+        for polarization in POLARIZATIONS:
+            how = f"{name}_{polarization}".replace("-", "_")
+            shown = coating.response(made, wavelength_um, incidence, polarization=polarization)
+            added = coating.group_path(made, wavelength_um, incidence, polarization=polarization)
+            told[f"{how}_reflectance"], told[f"{how}_range"] = float(shown.reflectance), float(added)
+    return coating_figure(names, wavelength_um, incidence), told
+
+
+def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
+    """A beam train's file, reduced, and the hash of what was read.
+
+    file       the record
+    distance   m, instead of the record's
+    """
+    folder = Folder(file.parent)
+    train = folder.record(file.name, BeamTrain)
+    if distance is not None:
+        train = train.model_copy(update={"distance_m": distance})
+    return reduce_beam(train), folder.hashes
+
+
+def beam_object(found: BeamPath) -> dict[str, Any]:
+    """Everything as a plain object, SI units.
+
+    found   a reduced beam train
+    """
+    keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
+    rows = ("distance", "radius", "hit", "collected", "power", "status")
+    return {
+        "name": found.train.name,
+        "distance": found.train.distance_m,
+        "places": [{key: getattr(place, key) for key in keys} for place in found.places],
+        "returned": [{key: getattr(row, key) for key in rows} for row in found.returned],
+        "smallest": {"waist": found.smallest_waist[0], "radius": found.smallest_waist[1]},
+        "range_effects": found.range_effects,
+        "u_image": found.u_image,
+        "laser": found.laser,
+    }
+
+
+def lines(found: BeamPath) -> Iterator[str]:
+    """The tables as lines of text.
+
+    found   a reduced beam train
+    """
+    yield f"{found.train.name}, reflector at {found.train.distance_m:g} m"
+    columns = (
+        ("way", "radius x, y", "front R x, y", "aperture", "clipped", "power"),
+        ("m", "mm", "m", "mm", "%", "mW"),
+    )
+    for words in columns:
+        yield " " * 34 + " ".join(f"{word:>{width}}" for word, width in zip(words, WIDTHS, strict=True))
+    for place in found.places:
+        size = " ".join(f"{_cell(r / MILLIMETRE, '8.4f'):>8}" for r in place.radius)
+        front = " ".join(f"{_front(c):>9}" for c in place.curvature)
+        edge, lost = _cell(place.aperture / MILLIMETRE, ".2f"), _cell(100.0 * place.clipped, ".3g")
+        power = _cell(place.power * 1e3, ".4f")
+        yield f"{place.leg:<9} {place.name:<24.24} {place.way:9.3f} {size} {front} {edge:>9} {lost:>9} {power:>9}"
+    yield f"{'distance, m':<12} {'radius x, y, mm':>17} {'hits, %':>10} {'collected, %':>13} {'detector, mW':>13}"
+    for row in found.returned:
+        size = " ".join(f"{r / MILLIMETRE:8.3f}" for r in row.radius)
+        got = f"{100 * row.collected:13.4f} {row.power * 1e3:13.5f}" if row.status == "ok" else f"  {row.status}"
+        yield f"{row.distance:<12g} {size:>17} {100 * row.hit:10.4f} {got}"
+    waist, spot = (1e3 * v for v in found.smallest_waist)
+    yield f"smallest possible spot there: {spot:.3f} mm, from a waist of {waist:.3f} mm at the head"
+    for name, effect in found.range_effects.items():
+        yield f"range too long by {_cell(effect * 1e6, '.3f') or 'what is not known'} µm: {name}"
+    if np.isfinite(found.u_image):
+        yield f"u of the range from the image's place: {found.u_image * 1e6:.3f} µm"
+    for name, value in found.laser.items():
+        yield f"{name.replace('_', ' ')}: {f'{value * 1e6:.3f} µm' if name.startswith('range') else f'{value:.4g}'}"
+
+
+def write_beam(found: BeamPath, directory: Path, inputs: dict[str, str]) -> None:
+    """Tables, figure, object, and last the provenance with the hashes of the others.
+
+    found       a reduced beam train
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    inputs      hashes of what was read
+    """
+    files: dict[str, Callable[[], str]] = {
+        "beam.csv": lambda: _places_csv(found),
+        "returned.csv": lambda: _returned_csv(found),
+        "beam.json": lambda: json_page(beam_object(found)),
+        "beam.svg": lambda: beam_figure(found),
+    }
+    outputs = {}
+    for name, text in files.items():
+        raw = text().encode("utf-8")
+        outputs[name] = hashlib.sha256(raw).hexdigest()
+        (directory / name).write_bytes(raw)
+    provenance = {
+        "format": FORMAT,
+        "made_by": "catseye beam",
+        "when_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "settings": {"distance_m": found.train.distance_m},
+        "inputs_sha256": inputs,
+        "outputs": outputs,
+    }
+    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+
+
+def _places_csv(found: BeamPath) -> str:
+    header = "leg,name,way_m,radius_x_m,radius_y_m,curvature_x_per_m,curvature_y_per_m,aperture_m,clipped,power_w"
+    rows = (
+        (p.leg, p.name, *map(_exact, (p.way, *p.radius, *p.curvature, p.aperture, p.clipped, p.power)))
+        for p in found.places
+    )
+    return _table(header, rows)
+
+
+def _returned_csv(found: BeamPath) -> str:
+    header = "distance_m,radius_x_m,radius_y_m,hit,collected,power_w,status"
+    rows = ((*map(_exact, (r.distance, *r.radius, r.hit, r.collected, r.power)), r.status) for r in found.returned)
+    return _table(header, rows)
+
+
+def _table(header: str, rows: Iterator[tuple[str, ...]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header.split(","))
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def _exact(value: float) -> str:
+    return f"{float(value):.10g}" if np.isfinite(value) else ""
+
+
+def _cell(value: float, form: str) -> str:
+    return format(float(value), form) if np.isfinite(value) else ""
+
+
+def _front(curvature: float) -> str:
+    """Radius of a wavefront in metres; flat where it is beyond ten thousand kilometres."""
+    if not np.isfinite(curvature):
+        return ""
+    return "flat" if abs(curvature) < 1e-7 else f"{1.0 / curvature:.5g}"

@@ -1,0 +1,169 @@
+"""A glass as a plain object for JSON and as rows for people: indices, slopes, what a prism of it does, the others."""
+
+from typing import Any
+
+from catseye.atmosphere.air import air
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.optics import prism
+from catseye.optics.glass import (
+    GLASSES,
+    absolute_index,
+    glass_named,
+    group_index,
+    group_wavelength,
+    index_over_air,
+    phase_index,
+    reference_air,
+    slopes,
+    temperature_slopes,
+)
+
+MODULATION_HZ = 1.5e9  # the GBT's
+AIR = (20.0, 933.0, 50.0)  # °C, hPa, %: of the notes' example, [PARKER04] eq. 1.49, by their model
+OBLIQUE = 30.0 * DEGREE  # at which the prism's change is told
+
+
+def glass_object(name: str, wavelength_um: float, temperature_c: float, height_mm: float) -> dict[str, Any]:
+    """One glass as `catseye glass NAME --json` gives it.
+
+    name            in GLASSES
+    wavelength_um   in vacuum, um
+    temperature_c   °C, of the glass
+    height_mm       of a prism of it, mm, above 0
+    """
+    glass = glass_named(name)
+    height = height_mm * MILLIMETRE
+    vacuum = absolute_index(wavelength_um, name, temperature_c)
+    here = wavelength_um / float(reference_air(wavelength_um, glass.reference_c).phase)
+    by_wavelength, by_temperature = slopes(here, name), temperature_slopes(wavelength_um, name, temperature_c)
+    about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
+    air_index = {"air_phase": float(about.phase_index), "air_group": float(about.group_index)}
+    true = index_over_air(wavelength_um, name, temperature_c, **air_index)
+    over_air = {
+        **{f"{key}_index": value for key, value in air_index.items()},
+        "phase_index_over_air": float(true.phase),
+        "group_index_over_air": float(true.group),
+        "notes_group_index_over_air": float(group_index(wavelength_um, name)) / air_index["air_group"],
+    }
+    per_c = (float(by_temperature.group), glass.expansion)
+    return {
+        "name": name,
+        "what": glass.what,
+        "formula": glass.formula,
+        "source": glass.source,
+        "limits_um": [glass.shortest_um, glass.longest_um],
+        "reference_c": glass.reference_c,
+        "wavelength_um": wavelength_um,
+        "temperature_c": temperature_c,
+        "phase_index": phase_index(wavelength_um, name),
+        "group_index": group_index(wavelength_um, name),
+        "phase_index_per_um": by_wavelength.phase,
+        "group_index_per_um": by_wavelength.group,
+        "group_wavelength": group_wavelength(MODULATION_HZ, wavelength_um, name),
+        "absolute_phase_index": vacuum.phase,
+        "absolute_group_index": vacuum.group,
+        "absolute_phase_index_per_c": by_temperature.phase,
+        "absolute_group_index_per_c": by_temperature.group,
+        "expansion_per_c": glass.expansion,
+        "prism": _prism_object(height, over_air, per_c),
+        "others": {
+            other: _other(other, name, wavelength_um, height, air_index["air_group"])
+            for other in GLASSES
+            if other != name
+        },
+    }
+
+
+def _prism_object(height: float, over_air: dict[str, float], per_c: tuple[float, float]) -> dict[str, Any]:
+    """What a prism so high does, in the air of the notes' example; `per_c`: of group index and length, 1/K."""
+    group, notes = over_air["group_index_over_air"], over_air["notes_group_index_over_air"]
+    constant = float(prism.range_constant(height, group))
+    return {
+        "height": height,
+        **over_air,
+        "range_constant": constant,
+        "range_constant_per_c": constant * per_c[1] - (1.0 + group**-2) * height * per_c[0],
+        "reference_depth": prism.reference_depth(height, group),
+        "range_change_at_30_deg": prism.oblique_change(
+            height, OBLIQUE, group=group, phase=over_air["phase_index_over_air"]
+        ),
+        "notes_range_constant": prism.range_constant(height, notes),
+    }
+
+
+def _other(other: str, name: str, wavelength_um: float, height: float, air_group: float) -> dict[str, Any] | None:
+    """What it costs to take one glass for another; None where the other's formula does not reach."""
+    known = GLASSES[other]
+    if not known.shortest_um <= wavelength_um <= known.longest_um:
+        return None
+    n, m = (float(group_index(wavelength_um, which)) / air_group for which in (name, other))
+    wrong = prism.wrong_glass(height, assumed=n, true=m)
+    return {
+        "phase_index": phase_index(wavelength_um, other) - phase_index(wavelength_um, name),
+        "group_index": group_index(wavelength_um, other) - group_index(wavelength_um, name),
+        "range_too_long_about_point": wrong.about_point,
+        "range_too_long_about_face": wrong.about_face,
+    }
+
+
+def glass_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+    """The object's lines for a terminal, each (title, text)."""
+    own = found["prism"]
+    rows = [
+        (found["name"], f"{found['what']}; {found['source']}, {_limits(found)}"),
+        ("air", f"phase index {found['phase_index']:.8f}, group index {found['group_index']:.8f} at "
+                f"{found['wavelength_um']:g} µm, relative to air as the notes take them"),
+        ("slopes", f"{found['phase_index_per_um']:+.5f} and {found['group_index_per_um']:+.5f} per µm"),
+        ("modulation", f"{found['group_wavelength'] * 1e3:.6f} mm at 1500 MHz, half of it "
+                       f"{found['group_wavelength'] * 5e2:.6f} mm"),
+        ("vacuum", f"phase index {found['absolute_phase_index']:.6f}, group index {found['absolute_group_index']:.6f} "
+                   f"at {found['temperature_c']:g} °C; {found['absolute_phase_index_per_c'] * 1e6:+.2f} and "
+                   f"{found['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
+        ("expansion", f"{found['expansion_per_c'] * 1e6:.1f} ppm per °C"),
+        ("prism", f"{own['height'] * 1e3:g} mm high in air of 20 °C, 933 hPa, 50 %: range constant "
+                  f"{own['range_constant'] * 1e3:.4f} mm ({own['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
+                  f"{own['reference_depth'] * 1e3:.4f} mm below the face, "
+                  f"{own['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),
+        ("the notes", f"take the index as relative to vacuum: n = {own['notes_group_index_over_air']:.6f} instead of "
+                      f"{own['group_index_over_air']:.6f}, range constant {own['notes_range_constant'] * 1e3:.4f} mm, "
+                      f"{(own['notes_range_constant'] - own['range_constant']) * 1e6:+.1f} µm"),
+    ]  # fmt: skip
+    for other, cost in found["others"].items():
+        said = "its formula does not reach this wavelength"
+        if cost is not None:
+            said = (
+                f"group index {cost['group_index']:+.2e}; taken for {found['name']} a range is "
+                f"{cost['range_too_long_about_point'] * 1e6:.2f} µm too long "
+                f"({cost['range_too_long_about_face'] * 1e6:.2f} µm about the face)"
+            )
+        rows.append((other, said))
+    return rows
+
+
+def table_object() -> dict[str, Any]:
+    """All glasses as `catseye glass --json` gives them."""
+    return {
+        "glasses": {
+            name: {
+                "what": glass.what,
+                "formula": glass.formula,
+                "source": glass.source,
+                "limits_um": [glass.shortest_um, glass.longest_um],
+                "reference_c": glass.reference_c,
+                "thermal_source": glass.thermal.source,
+                "expansion_per_c": glass.expansion,
+            }
+            for name, glass in GLASSES.items()
+        }
+    }
+
+
+def _limits(found: dict[str, Any]) -> str:
+    shortest, longest = found["limits_um"]
+    return f"{shortest:g} to {longest:g} µm"
+
+
+def table_rows() -> list[tuple[str, str]]:
+    """The table's lines for a terminal."""
+    table = table_object()["glasses"]
+    return [(name, f"{entry['what']}; {entry['source']}, {_limits(entry)}") for name, entry in table.items()]

@@ -1,0 +1,150 @@
+"""Figure of what cube corners do to polarized light, as SVG text: six sectors, an analyser, the far field's axis."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.optics.coating import index
+from catseye.optics.corner_polarization import (
+    EDGES,
+    ORDERS,
+    Corner,
+    far_field_jones,
+    hollow_corner,
+    returned_power,
+    sector_jones,
+    solid_corner,
+    through_plate,
+)
+from catseye.optics.glass import phase_index
+from catseye.optics.polarization import ellipse, linear, retarder
+
+AZIMUTHS = np.linspace(0.0, np.pi, 73)
+TILTS = np.radians(np.linspace(0.0, 20.0, 21))  # total reflection ends at 20.3 deg towards an edge
+OBLIQUE = np.radians(15.0)
+METALS = ("gold", "silver", "aluminium")
+
+
+def corners(wavelength_um: float, glass: str) -> dict[str, Corner]:
+    """The kinds that are compared, by what people call them."""
+    glass_index = float(phase_index(wavelength_um, glass))
+    metals = {metal: np.conj(complex(index(metal, wavelength_um))) for metal in METALS}  # there time runs backwards
+    found = {
+        f"{glass}, bare": solid_corner(glass_index),
+        f"{glass}, aluminium behind": solid_corner(glass_index, metals["aluminium"]),
+    }
+    found |= {f"hollow, {metal}": hollow_corner(behind) for metal, behind in metals.items()}
+    return found
+
+
+def polarization_plot(wavelength_um: float = 0.780, glass: str = "BK7-old") -> tuple[str, dict[str, Any]]:
+    """Three panels as SVG text, and their numbers.
+
+    wavelength_um   um, in air, 0.62 to 1.01: where the metals and the glass are known
+    glass           a name in `glass.GLASSES`
+
+    Raises ValidityError outside. Straight on the corner is lit evenly and has no antireflection to lose at its face.
+    """
+    known = corners(wavelength_um, glass)
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = Figure(figsize=(11.4, 4.3), layout="constrained")
+        left, middle, right = drawn.subplots(1, 3)
+        bare = next(iter(known.values()))
+        _draw_sectors(left, bare, glass)
+        _draw_analyser(middle, known)
+        _draw_axis(right, known)
+        return svg(drawn), {
+            "wavelength_um": wavelength_um,
+            "glass": glass,
+            "index": bare.index,
+            "corners": {name: _numbers(corner) for name, corner in known.items()},
+        }
+
+
+def _numbers(corner: Corner) -> dict[str, float]:
+    """Straight on: shares of the light that fell on it."""
+    jones = sector_jones(corner, 0.0)
+    all_back, crossed, axis = _shares(jones)
+    split = through_plate(jones, retarder(0.5 * np.pi, 0.25 * np.pi))
+    return {
+        "returned": float(all_back.mean()),
+        "crossed_least": float(crossed.min()),
+        "crossed_most": float(crossed.max()),
+        "far_field_axis": float(axis.mean()),
+        "through_splitter_and_quarter_wave": float(returned_power(split, linear(0.0), analyser=linear(0.5 * np.pi))),
+    }
+
+
+def _shares(jones: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """By azimuth of linear light: all that returns, what a crossed analyser passes, the far field's axis."""
+    light = linear(AZIMUTHS)
+    axis = np.sum(np.abs(np.einsum("ij,aj->ai", far_field_jones(jones), light)) ** 2, axis=1)
+    return returned_power(jones, light), returned_power(jones, light, analyser=linear(AZIMUTHS + 0.5 * np.pi)), axis
+
+
+def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
+    """The aperture as the ranger sees it, with the field that leaves each sector."""
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    ax.plot(np.cos(turn), np.sin(turn), color=FAINT, lw=1.0)
+    jones = sector_jones(corner, 0.0)
+    for edge in EDGES:
+        flat = edge[:2] / np.hypot(*edge[:2])
+        ax.plot([0.0, flat[0]], [0.0, flat[1]], color=INK, lw=1.2)
+        ax.plot([0.0, -flat[0]], [0.0, -flat[1]], color=FAINT, lw=0.8, ls="--")
+    for order, j in zip(ORDERS, jones, strict=True):
+        entry = _sector_middle(order)
+        field = j @ linear(0.0)
+        phase = np.exp(-1j * turn)
+        path = -0.62 * entry[:, None] + 0.2 * np.real(field[:, None] * phase)  # it leaves opposite to where it enters
+        ax.plot(*path, color=SERIES[0], lw=1.4)
+        ax.annotate("", path[:, 8], path[:, 0], arrowprops={"arrowstyle": "->", "color": SERIES[0], "lw": 1.4})
+        tilt, turning = ellipse(field)
+        said = f"{np.degrees(tilt):+.0f}°, {np.degrees(turning):+.0f}°"
+        ax.text(*(-1.22 * entry), said, ha="center", va="center", fontsize=7.5, color=INK)
+    ax.annotate("", (0.16, 0.0), (-0.16, 0.0), arrowprops={"arrowstyle": "<->", "color": SERIES[1], "lw": 1.6})
+    ax.set_xlim(-1.6, 1.6)
+    ax.set_ylim(-1.4, 1.4)
+    ax.set_title(f"{glass}, bare, straight on\norange in, blue back: azimuth, ellipticity")
+
+
+def _sector_middle(order: tuple[int, ...]) -> NDArray[np.float64]:
+    """Unit vector to the middle of the sector in which light of this order enters: least along the face met first."""
+    flat = EDGES[:, :2] / np.hypot(*EDGES[0, :2])
+    middle = flat[order[2]] - flat[order[0]]
+    return middle / np.hypot(*middle)
+
+
+def _draw_analyser(ax: Any, known: dict[str, Corner]) -> None:
+    for (name, corner), colour in zip(known.items(), SERIES, strict=False):
+        for tilt, style in ((OBLIQUE, "-"), (0.0, "--")):
+            back, crossed, _ = _shares(sector_jones(corner, tilt))
+            ax.plot(np.degrees(AZIMUTHS), crossed / back, color=colour, ls=style, label=name if tilt else None)
+    ax.set_xlim(0.0, 180.0)
+    ax.set_xticks([0, 45, 90, 135, 180])
+    ax.set_ylim(-0.01, 1.1)
+    ax.set_xlabel("azimuth of linear light from an edge (°)")
+    ax.set_ylabel("share of what returns")
+    ax.set_title(f"Through a crossed analyser\n{np.degrees(OBLIQUE):.0f}° towards an edge; dashed: straight on")
+    ax.legend(loc="upper right")
+
+
+def _draw_axis(ax: Any, known: dict[str, Corner]) -> None:
+    for (name, corner), colour in zip(known.items(), SERIES, strict=False):
+        ends = []
+        for tilt in TILTS:
+            m = far_field_jones(sector_jones(corner, float(tilt)))
+            ends.append(np.linalg.svd(m, compute_uv=False) ** 2)
+        most, least = np.array(ends).T
+        ax.fill_between(np.degrees(TILTS), least, most, color=colour, alpha=0.35, lw=0.0)
+        ax.plot(np.degrees(TILTS), 0.5 * (most + least), color=colour, lw=1.2, label=name)
+    ax.set_xlim(0.0, 20.0)
+    ax.set_ylim(0.0, 1.18)
+    ax.set_xlabel("incidence, towards an edge (°)")
+    ax.set_ylabel("over a perfect corner of that area")
+    ax.set_title("Axis of the far field\nband: best to worst polarization")

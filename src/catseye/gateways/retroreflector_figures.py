@@ -1,0 +1,202 @@
+"""Figures of retroreflectors as SVG text: what returns against the angle, and how a ball aberrates."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from catseye.atmosphere.air import air
+from catseye.constants import DEGREE
+from catseye.errors import ValidityError
+from catseye.gateways.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.optics import prism
+from catseye.optics.cats_eye import BallCatsEye, focal_radius
+from catseye.optics.glass import index_over_air
+from catseye.optics.hollow_cube import HollowCube
+from catseye.optics.retroreflector import Retroreflector
+from catseye.optics.solid_prism import SolidPrism
+
+WIDTH, HEIGHT = 9.4, 4.6  # inches
+POINTS = 361
+FARTHEST_DEG = 90.0
+RECEIVER, DISTANCES = 0.05, (18.0, 50.0, 120.0)  # m: the GBT's lens; its calibration range, and the telescope's
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """What is drawn: the GBT's targets, in the notes' air, unless said otherwise.
+
+    height, aperture     m, of the prism; radius of its face, which the hollow cube's opening has too
+    r1, r2               m, of the ball
+    ball_aperture        m, radius of what is used of the ball
+    glass                a name in GLASSES
+    vacuum_um            wavelength, um
+    reflectance          of each mirror of the hollow cube and of the silvered ball
+    """
+
+    height: float = 0.0381
+    aperture: float = 0.0254
+    r1: float = 1.969 * 0.0254
+    r2: float = 3.799 * 0.0254
+    ball_aperture: float = 0.015
+    glass: str = "BK7-old"
+    vacuum_um: float = 0.780
+    reflectance: float = 0.97
+
+    def targets(self) -> tuple[HollowCube, SolidPrism, BallCatsEye]:
+        """The three of them."""
+        about = air(20.0, 933.0, 50.0, wavelength_um=self.vacuum_um, model="rueger1990")
+        n = index_over_air(self.vacuum_um, self.glass, air_phase=about.phase_index, air_group=about.group_index)
+        index = {"group": float(n.group), "phase": float(n.phase)}
+        return (
+            HollowCube(self.aperture, np.sqrt(2.0) * self.aperture, self.reflectance),
+            SolidPrism(self.height, self.aperture, **index),
+            BallCatsEye(self.r1, self.r2, self.ball_aperture, **index, mirror_reflectance=self.reflectance),
+        )
+
+
+def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, Any]]:
+    """What each kind returns against the incidence, and how its range changes, as SVG text; and in numbers.
+
+    dimensions   of the targets; the GBT's if None
+
+    Source: `optics.hollow_cube`, `solid_prism`, `cats_eye`. Raises ValidityError for sizes that are none.
+    """
+    given = Dimensions() if dimensions is None else dimensions
+    hollow, solid, ball = given.targets()
+    angles = np.linspace(0.0, FARTHEST_DEG, POINTS)
+    incidence = angles * DEGREE
+    kinds: list[tuple[str, Retroreflector, float, str, str]] = [
+        ("hollow cube", hollow, 0.0, SERIES[0], "-"),
+        ("bare prism, ranger on the side of an edge", solid, 0.0, SERIES[1], "-"),
+        ("bare prism, between two edges", solid, np.pi / 3.0, SERIES[1], "--"),
+        ("prism with silvered faces", replace(solid, corner_reflectance=given.reflectance), 0.0, SERIES[3], "-"),
+        ("ball", ball, 0.0, SERIES[2], "-"),
+    ]
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        half = {}
+        for name, kind, azimuth, colour, line in kinds:
+            share = kind.return_share(incidence, azimuth)
+            left.plot(angles, share, line, color=colour, lw=1.4, label=name)
+            half[name.replace(" ", "_").replace(",", "")] = _falls_to_half(angles, share)
+        left.set(xlim=(0, FARTHEST_DEG), ylim=(0, 1), xlabel="incidence (°)", ylabel="share of the light on the face")
+        left.set_title("What returns")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        seen = incidence <= 45.0 * DEGREE
+        _draw_change(right, angles[seen], incidence[seen], solid, given)
+        text = svg(figure)
+    told = {
+        "half_of_normal_at_deg": half,
+        "total_reflection_to_deg": solid.acceptance / DEGREE,
+        "ball_whole_to_deg": ball.acceptance / DEGREE,
+        "appendix_b_less_two_indices_at_30_deg": float(_appendix_b(given, solid, np.array(30.0 * DEGREE))),
+    }
+    return text, told
+
+
+def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float = 0.010) -> tuple[str, dict[str, Any]]:
+    """Range change, deviation and collected light of the ball, as SVG text; and in numbers.
+
+    dimensions    of the ball; the memo's if None
+    beam_radius   m, above 0: at 1/e^2, of the beam at the ball
+
+    Source: `optics.cats_eye`, exact rays. Raises ValidityError for sizes that are none.
+    """
+    if not 0.0 < beam_radius < np.inf:
+        raise ValidityError(f"beam_radius = {beam_radius:g} m is not above 0 and finite")
+    given = Dimensions() if dimensions is None else dimensions
+    ball = given.targets()[2]
+    focal = replace(ball, r2=float(focal_radius(ball.r1, ball.phase)))
+    best = replace(ball, r2=ball.best_radius(beam_radius))
+    shown = [("as it is", ball, SERIES[0], "-"), ("best", best, SERIES[2], "--"), ("focal", focal, SERIES[1], "-")]
+    heights = np.linspace(0.0, ball.aperture, POINTS)
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+        path, bend, light = figure.subplots(1, 3)
+        for name, one, colour, line in shown:
+            label = f"R2 {one.r2 * 1e3:.2f} mm, {name}"
+            path.plot(heights * 1e3, one.path_change(heights) * 1e6, line, color=colour, lw=1.4, label=label)
+            bend.plot(heights * 1e3, one.deviation(heights) / DEGREE * 3600.0, line, color=colour, lw=1.4)
+        weight = heights * np.exp(-2.0 * (heights / beam_radius) ** 2)
+        for axes in (path, bend):
+            axes.axhline(0.0, color=FAINT, lw=0.8)
+            axes.set(xlabel="ray height (mm)", xlim=(0, ball.aperture * 1e3))
+        low, high = path.get_ylim()
+        level = low + 0.18 * (high - low) * weight / weight.max()
+        path.fill_between(heights * 1e3, low, level, color=FAINT, alpha=0.25, lw=0, label="power of the beam")
+        path.set(ylabel="to be added to the range (µm)", ylim=(low, high))
+        path.set_title("Path")
+        bend.set_ylabel("comes back converging by (″)")
+        bend.set_title("Deviation")
+        figure.legend(*path.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        collected = _draw_light(light, ball, beam_radius)
+        text = svg(figure)
+    told = {
+        "range_constant": ball.range_constant,
+        "mean_path_change": ball.mean_path_change(beam_radius),
+        "blur": ball.blur(beam_radius),
+        "r2": ball.r2,
+        "best_r2": best.r2,
+        "focal_r2": focal.r2,
+        "mean_path_change_at_best_r2": best.mean_path_change(beam_radius),
+        "collected_share": collected,
+    }
+    return text, told
+
+
+def _falls_to_half(angles: Any, share: Any) -> float | None:
+    """Where a share first falls to half of what it is straight on; None where it does not."""
+    below = np.nonzero(share <= 0.5 * share[0])[0]
+    if len(below) == 0:
+        return None
+    k = int(below[0])
+    return float(np.interp(-0.5 * share[0], -share[k - 1 : k + 1], angles[k - 1 : k + 1]))
+
+
+def _appendix_b(given: Dimensions, solid: SolidPrism, incidence: Any) -> Any:
+    """Appendix B's change of range less the rigorous one, m."""
+    by_b = prism.obliquity_correction(given.height, solid.group, np.cos(incidence))
+    return by_b - solid.range_change(incidence)
+
+
+def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, given: Dimensions) -> None:
+    """Change of the prism's range, and appendix B's departure from it on an axis of its own."""
+    change = solid.range_change(incidence) * 1e6
+    ax.plot(angles, change, color=SERIES[1], lw=1.4, label="prism: two indices (left axis)")
+    ax.axhline(0.0, color=SERIES[0], lw=1.4, label="hollow cube, ball")
+    ax.set(xlim=(0, 45), xlabel="incidence (°)", ylabel="to be added to the range (µm)")
+    ax.set_title("Change of range")
+    beside = ax.twinx()
+    beside.spines["right"].set_visible(True)
+    beside.grid(visible=False)
+    beside.plot(
+        angles, _appendix_b(given, solid, incidence) * 1e6, ":", color=SERIES[3], lw=1.6,
+        label="appendix B less that (right axis)",
+    )  # fmt: skip
+    beside.set(ylabel="µm", ylim=(0.0, None))
+    handles, labels = ax.get_legend_handles_labels()
+    more, texts = beside.get_legend_handles_labels()
+    ax.legend(handles + more, labels + texts, loc="center left")
+
+
+def _draw_light(ax: Any, ball: BallCatsEye, beam_radius: float) -> dict[str, float]:
+    """Share of the beam that comes back into the receiver, against the mirror's radius; at R2 as it is, by distance."""
+    focus = float(focal_radius(ball.r1, ball.phase))
+    radii = np.linspace(min(0.96 * focus, 0.995 * ball.r2), max(1.01 * focus, 1.005 * ball.r2), 121)
+    collected = {}
+    for distance, colour in zip(DISTANCES, SERIES[2:], strict=False):
+        at = {"beam_radius": beam_radius, "receiver": RECEIVER}
+        shares = [replace(ball, r2=float(r2)).collected_share(distance, **at) for r2 in radii]
+        ax.plot(radii * 1e3, shares, color=colour, lw=1.4, label=f"at {distance:g} m")
+        collected[f"at_{distance:g}_m"] = ball.collected_share(distance, **at)
+    ax.axvline(ball.r2 * 1e3, color=FAINT, lw=0.8, ls=":")
+    ax.set(xlabel="R2 (mm)", ylabel=f"share within {RECEIVER * 1e3:g} mm, by rays", ylim=(0, 1.19))
+    ax.set_title("Light that comes back")
+    ax.legend(loc="upper center", ncols=3, handlelength=1.2, columnspacing=0.9)
+    return collected

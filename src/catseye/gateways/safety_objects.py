@@ -1,0 +1,177 @@
+"""Laser safety of a beam as one object for programs and as words for people."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from catseye.optics.safety import (
+    AVERSION,
+    BINOCULARS,
+    NAKED,
+    NOTICE,
+    TIME_BASE,
+    LaserBeam,
+    classify,
+    hazard_zone,
+    returned_power,
+    sweep_hazard_distance,
+)
+from catseye.optics.safety_limits import ALPHA_MIN, EDITIONS, eye_limits, eye_mpe, factors, skin_limit
+
+DURATIONS = (AVERSION, 10.0, 100.0, 3e4)  # s, of the table
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a beam.
+
+    beam                 the laser's
+    edition              a name in EDITIONS
+    duration             s, of the exposure; None for 0.25 s of visible light, 100 s of infrared
+    aided                what follows is for an eye behind binoculars
+    subtense             rad, of the apparent source
+    scan, period         rad/s that the beam turns by, s from one pass to the next; None for none
+    reflector_distance   m, and diameter, m, of a retroreflector; None for none
+    """
+
+    beam: LaserBeam
+    edition: str = EDITIONS[0]
+    duration: float | None = None
+    aided: bool = False
+    subtense: float = ALPHA_MIN
+    scan: float | None = None
+    period: float | None = None
+    reflector_distance: float | None = None
+    reflector_diameter: float = 0.0508
+
+    @property
+    def seconds(self) -> float:
+        """The exposure's duration."""
+        if self.duration is not None:
+            return self.duration
+        return AVERSION if self.beam.wavelength_um <= 0.7 else TIME_BASE
+
+
+def safety_object(asked: Question) -> dict[str, Any]:
+    """What `catseye safety --json` gives; SI units unless a key says otherwise."""
+    beam, seconds = asked.beam, asked.seconds
+    viewer = BINOCULARS if asked.aided else NAKED
+    verdict = classify(beam, edition=asked.edition, subtense=asked.subtense)
+    others = {name: classify(beam, edition=name, subtense=asked.subtense).laser_class for name in EDITIONS}
+    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, asked.edition)
+    governing = eye_mpe(beam.wavelength_um, seconds, asked.subtense, asked.edition)
+    skin = skin_limit(beam.wavelength_um, seconds)
+    known = factors(beam.wavelength_um, seconds, asked.subtense)
+    return {
+        "notice": NOTICE,
+        "edition": asked.edition,
+        "power": beam.power,
+        "wavelength_um": beam.wavelength_um,
+        "diameter": beam.diameter,
+        "divergence": beam.divergence,
+        "beam_quality": beam.quality,
+        "duration": seconds,
+        "factors": {name: getattr(known, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
+        "mpe_eye": governing.irradiance,
+        "mpe_eye_protects_from": governing.name,
+        "mpe_skin": skin.irradiance,
+        "class": verdict.laser_class,
+        "class_by_edition": others,
+        "reasons": list(verdict.reasons),
+        "emissions": verdict.emissions,
+        "class_limits": verdict.limits,
+        "viewer": viewer.name,
+        "hazard_from": hazard_zone(beam, limits, viewer)[0],
+        "nohd": hazard_zone(beam, limits)[1],
+        "nohd_aided": hazard_zone(beam, limits, BINOCULARS)[1],
+        "skin_hazard_distance": hazard_zone(beam, (skin,))[1],
+        "scan": _scan(asked),
+        "returned": _returned(asked),
+        "what_if": [_what_if(asked, t) for t in DURATIONS],
+    }
+
+
+def _what_if(asked: Question, seconds: float) -> dict[str, float]:
+    """One duration of the table."""
+    beam = asked.beam
+    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, asked.edition)
+    skin = skin_limit(beam.wavelength_um, seconds)
+    return {
+        "duration": seconds,
+        "mpe_eye": min(limit.irradiance for limit in limits),
+        "mpe_skin": skin.irradiance,
+        "nohd": hazard_zone(beam, limits)[1],
+        "nohd_aided": hazard_zone(beam, limits, BINOCULARS)[1],
+        "skin_hazard_distance": hazard_zone(beam, (skin,))[1],
+    }
+
+
+def _scan(asked: Question) -> dict[str, Any] | None:
+    if asked.scan is None:
+        return None
+    given = {"duration": asked.seconds, "period": asked.period, "subtense": asked.subtense, "edition": asked.edition}
+    far = sweep_hazard_distance(asked.beam, asked.scan, viewer=BINOCULARS if asked.aided else NAKED, **given)  # type: ignore[arg-type]
+    return {"rate": asked.scan, "period": asked.period, "hazard_distance": far}
+
+
+def _returned(asked: Question) -> dict[str, Any] | None:
+    if asked.reflector_distance is None:
+        return None
+    viewer = BINOCULARS if asked.aided else NAKED
+    size = {"reflector": asked.reflector_diameter, "viewer": viewer}
+    power = returned_power(asked.beam, asked.reflector_distance, **size)  # type: ignore[arg-type]
+    limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, asked.edition)
+    allowed = min(limit.power for limit in limits if limit.aperture == 7e-3)
+    return {
+        "distance": asked.reflector_distance,
+        "diameter": asked.reflector_diameter,
+        "power_into_eye": power,
+        "limit": allowed,
+        "times_limit": power / allowed,
+    }
+
+
+def safety_passages(told: dict[str, Any]) -> list[tuple[str, str]]:
+    """The same in words: title and text."""
+    passages = [
+        ("Class", f"{told['class']} by {told['edition']}" + _disagreement(told)),
+        *(("", reason) for reason in told["reasons"]),
+        ("Eye", f"{told['mpe_eye']:.4g} W/m² for {told['duration']:g} s ({told['mpe_eye_protects_from']})"),
+        ("Skin", f"{told['mpe_skin']:.4g} W/m²; exceeded {_as_far(told['skin_hazard_distance'])}"),
+        ("Hazard", f"naked eye {_as_far(told['nohd'])}; through 7x50 binoculars {_as_far(told['nohd_aided'])}"),
+    ]
+    if told["class"] in ("1", "2") and told["nohd"] > 0.0:
+        passages.append(
+            ("", f"class {told['class']}, and yet within that distance more than the limit for this exposure")
+        )
+    if told["hazard_from"] > 0.0:
+        passages.append(("", f"{told['viewer']}: only from {told['hazard_from']:.3g} m on, about the waist"))
+    if scan := told["scan"]:
+        often = "one pass" if scan["period"] is None else f"a pass every {scan['period']:g} s"
+        far = f"{told['viewer']} {_as_far(scan['hazard_distance'])}"
+        text = f"at {scan['rate']:g} rad/s, {often}: {far}; counts only where nothing can stop the sweep"
+        passages.append(("Sweeping", text))
+    if back := told["returned"]:
+        where = f"by {back['diameter'] * 1e3:g} mm at {back['distance']:g} m"
+        power = f"{back['power_into_eye'] * 1e3:.3g} mW through the pupil ({told['viewer']})"
+        passages.append(("Sent back", f"{where}: {power}, {back['times_limit']:.3g} times the limit"))
+    return passages
+
+
+def safety_table(told: dict[str, Any]) -> str:
+    """The table of durations as text."""
+    head = f"{'exposure':>10} {'eye W/m²':>10} {'skin W/m²':>10} {'naked eye':>12} {'binoculars':>12} {'skin':>9}"
+    rows = [
+        f"{row['duration']:>8g} s {row['mpe_eye']:>10.4g} {row['mpe_skin']:>10.4g} {row['nohd']:>10.4g} m "
+        f"{row['nohd_aided']:>10.4g} m {row['skin_hazard_distance']:>7.3g} m"
+        for row in told["what_if"]
+    ]
+    return "\n".join((head, *rows))
+
+
+def _disagreement(told: dict[str, Any]) -> str:
+    differs = [f"{name}: {found}" for name, found in told["class_by_edition"].items() if found != told["class"]]
+    return f" ({', '.join(differs)})" if differs else ""
+
+
+def _as_far(distance: float) -> str:
+    return f"up to {distance:.4g} m" if distance > 0.0 else "nowhere"

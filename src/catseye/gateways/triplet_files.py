@@ -1,0 +1,100 @@
+"""All files of the calibration of some triplets: a sheet each as text, page and object, and one table of all."""
+
+import csv
+import hashlib
+import io
+import math
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from catseye.errors import InputError
+from catseye.gateways.certificate_record import FORMAT
+from catseye.gateways.objects import json_page, versions
+from catseye.gateways.output import PROVENANCE
+from catseye.gateways.triplet_objects import triplet_object
+from catseye.gateways.triplet_sheet import html_sheet, text_sheet
+from catseye.reduction.triplet import TripletReduction
+
+COLUMNS = (
+    "file", "triplet", "h_corr_mm", "u_h_corr_mm", "l_mpbc_mm", "u_l_mpbc_mm", "difference_mm", "u_difference_mm",
+    "accepted", "conformity_probability", "placements", "p",
+)  # fmt: skip
+Progress = Callable[[str, int, int], None]
+
+
+def write_triplets(
+    units: Mapping[Path, TripletReduction],
+    directory: Path,
+    hashes: Mapping[Path, str],
+    progress: Progress | None = None,
+) -> None:
+    """NAME.txt, NAME.html, NAME.json for each sheet NAME.toml, triplets.csv, and the provenance with their hashes.
+
+    units       calibrations by the file of their sheet
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    hashes      SHA-256 of each file
+    progress    told of each file
+
+    Raises InputError where two sheets have one name.
+    """
+    refuse_namesakes(list(units))
+    when = datetime.now(UTC)
+    outputs = {}
+
+    def write(name: str, text: str) -> None:
+        raw = text.encode("utf-8")
+        outputs[name] = hashlib.sha256(raw).hexdigest()
+        (directory / name).write_bytes(raw)
+
+    for done, (path, found) in enumerate(units.items()):
+        if progress is not None:
+            progress(f"writing {path.stem}", done, len(units))
+        write(f"{path.stem}.txt", text_sheet(found, path.name))
+        write(f"{path.stem}.html", html_sheet(found, path.name, when, hashes[path]))
+        write(f"{path.stem}.json", json_page(triplet_object(found, path.name)))
+    write("triplets.csv", triplets_csv({path.name: found for path, found in units.items()}))
+    provenance = {
+        "format": FORMAT,
+        "made_by": "catseye triplet",
+        "when_utc": when.isoformat(timespec="seconds"),
+        "versions": versions(),
+        "inputs_sha256": {path.name: hashes[path] for path in units},
+        "outputs": outputs,
+    }
+    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+
+
+def refuse_namesakes(paths: list[Path]) -> None:
+    """Two sheets of one name would write over each other, and one sheet twice is a slip."""
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if path.stem in seen:
+            raise InputError(
+                f"{path}: has the name of {seen[path.stem]} (expected sheets of different names for --out)"
+            )
+        seen[path.stem] = path
+
+
+def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
+    """A row a unit, lengths in mm; an empty cell is unknown.
+
+    units   calibrations by the name of their sheet
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(_row(file, found) for file, found in units.items())
+    return stream.getvalue()
+
+
+def _row(file: str, f: TripletReduction) -> tuple[Any, ...]:
+    lengths = (f.h_corr, f.u_h_corr, f.l_mpbc, f.u_l_mpbc, f.difference, f.u_difference)
+    told = (_plain(1e3 * x) for x in lengths)
+    accepted = "yes" if f.accepted else "no"
+    return (file, f.measurement.triplet, *told, accepted, _plain(f.conformity_probability), len(f.h), _plain(f.p))
+
+
+def _plain(value: float) -> str:
+    return f"{value:.6f}" if math.isfinite(value) else ""

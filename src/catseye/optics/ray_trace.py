@@ -1,0 +1,212 @@
+"""Exact rays in three dimensions through planes and spheres: batches of them, a status for each.
+
+Light bends with the phase index and is delayed with the group index: at a surface Snell's law in vectors takes the
+ratio of phase indices, along a leg the optical path grows by the group index times its length. Nothing is paraxial and
+no formula of the retroreflectors' own files is used, so that these can be checked against it.
+
+Paths are of light that goes from a plane across its direction through a chosen point to the retroreflector and back to
+the same plane: `half_path` is how much further than that point the light seems to have been, one way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+
+Array = NDArray[np.float64]
+AWAY = 1e-12  # m: a ray that starts on a surface does not meet it again at once
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A flat surface.
+
+    point    (3,) m, on it
+    normal   (3,) unit vector, either way
+    """
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+    def distance(self, position: Array, direction: Array) -> Array:
+        """Way (r,) along the rays to the surface, m; NaN where they run along it or it lies behind."""
+        towards = direction @ np.asarray(self.normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            way = -((position - np.asarray(self.point)) @ np.asarray(self.normal)) / towards
+        return np.where(np.isfinite(way) & (way > AWAY), way, np.nan)
+
+    def normals(self, position: Array) -> Array:
+        """Unit normals (r, 3) at points on the surface."""
+        return np.broadcast_to(np.asarray(self.normal), position.shape)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A round surface.
+
+    centre   (3,) m
+    radius   m, above 0
+    far      rays meet its far side rather than its near one
+    """
+
+    centre: tuple[float, float, float]
+    radius: float
+    far: bool = False
+
+    def distance(self, position: Array, direction: Array) -> Array:
+        """Way (r,) along the rays to the surface, m; NaN where they miss it or it lies behind."""
+        from_centre = position - np.asarray(self.centre)
+        middle = -np.sum(from_centre * direction, axis=-1)
+        off = from_centre + middle[..., None] * direction  # the point nearest to the centre
+        square = self.radius**2 - np.sum(off**2, axis=-1)
+        half = np.sqrt(np.where(square >= 0.0, square, np.nan))
+        way = middle + half if self.far else middle - half
+        return np.where(way > AWAY, way, np.nan)
+
+    def normals(self, position: Array) -> Array:
+        """Unit normals (r, 3) at points on the surface."""
+        return (position - np.asarray(self.centre)) / self.radius
+
+
+Surface = Plane | Sphere
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """A batch of rays; NaN for one that missed a surface or was reflected totally where it should have left.
+
+    position    (r, 3) m
+    direction   (r, 3) unit vectors
+    path        (r,) m: optical path behind them, by the group index
+    """
+
+    position: Array
+    direction: Array
+    path: Array
+
+    def to(self, surface: Surface, group: float) -> "Rays":
+        """On to a surface through a medium of group index `group`."""
+        way = surface.distance(self.position, self.direction)
+        return replace(self, position=self.position + way[:, None] * self.direction, path=self.path + group * way)
+
+    def refracted(self, surface: Surface, ratio: float) -> "Rays":
+        """Through the surface they stand on; `ratio` is the phase index before over the one behind."""
+        normal = surface.normals(self.position)
+        cosine = np.sum(self.direction * normal, axis=-1, keepdims=True)
+        rest = 1.0 - ratio**2 * (1.0 - cosine**2)
+        behind = np.copysign(np.sqrt(np.where(rest >= 0.0, rest, np.nan)), cosine)
+        return replace(self, direction=ratio * self.direction + (behind - ratio * cosine) * normal)
+
+    def reflected(self, surface: Surface) -> "Rays":
+        """Back from the surface they stand on."""
+        normal = surface.normals(self.position)
+        along = np.sum(self.direction * normal, axis=-1, keepdims=True)
+        return replace(self, direction=self.direction - 2.0 * along * normal)
+
+    def reflected_in(self, planes: Sequence[Plane], group: float) -> "Rays":
+        """Back from whichever of the planes each ray meets first, through a medium of group index `group`."""
+        ways = np.array([plane.distance(self.position, self.direction) for plane in planes])
+        first = np.argmin(np.where(np.isnan(ways), np.inf, ways), axis=0)
+        way = np.take_along_axis(ways, first[None], axis=0)[0]
+        normal = np.array([plane.normal for plane in planes])[first]
+        along = np.sum(self.direction * normal, axis=-1, keepdims=True)
+        return Rays(
+            self.position + way[:, None] * self.direction,
+            self.direction - 2.0 * along * normal,
+            self.path + group * way,
+        )
+
+
+def corner(apex: ArrayLike, azimuth: float = 0.0, errors: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Plane, ...]:
+    """The three faces of a cube corner that opens towards +z; their normals point into the opening.
+
+    apex      (3,) m
+    azimuth   rad: of the first edge, seen along z; the others follow at 120 deg
+    errors    rad, three: how much the angle between faces 2 and 3, 3 and 1, 1 and 2 exceeds a right angle
+
+    Source: geometry. Faces at an angle a have normals at pi - a: exact for errors as the square root of the normals'
+    Gram matrix, which turns the three as little as can be.
+    """
+    around = azimuth + np.arange(3) * 2.0 * np.pi / 3.0
+    edges = np.stack([np.cos(around), np.sin(around), np.full(3, np.sqrt(0.5))], axis=-1) * np.sqrt(2.0 / 3.0)
+    cosines = np.sin(np.asarray(errors, dtype=float))  # cos(pi - (pi/2 + e)) = sin e
+    gram = np.eye(3)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        gram[i, j] = gram[j, i] = cosines[k]
+    values, vectors = np.linalg.eigh(gram)
+    normals = (vectors * np.sqrt(values)) @ vectors.T @ edges
+    point = tuple(np.asarray(apex, dtype=float))
+    return tuple(Plane(point, tuple(normal / np.linalg.norm(normal))) for normal in normals)
+
+
+def beam(to_ranger: ArrayLike, offsets: ArrayLike, start: float = 1.0) -> Rays:
+    """Parallel rays that come from a ranger far away.
+
+    to_ranger   (3,) unit vector from the retroreflector
+    offsets     (r, 3) m: points that the rays would pass through, undisturbed
+    start       m: distance of the plane where they begin from the origin, before the retroreflector
+    """
+    towards = np.asarray(to_ranger, dtype=float)
+    if abs(float(towards @ towards) - 1.0) > 1e-9:
+        raise ValidityError(
+            f"direction to the ranger has the length {np.linalg.norm(towards):g} (expected a unit vector)"
+        )
+    points = np.atleast_2d(np.asarray(offsets, dtype=float))
+    position = points + (start - points @ towards)[:, None] * towards
+    return Rays(position, np.broadcast_to(-towards, points.shape), np.zeros(len(points)))
+
+
+def half_path(rays: Rays, to_ranger: ArrayLike, point: ArrayLike, start: float = 1.0) -> Array:
+    """How much further than a point the light of returned rays seems to have been, (r,) m, one way.
+
+    rays        from `beam`, out in the air again; each is taken on to the plane across its own direction
+    to_ranger   (3,) as given to `beam`
+    point       (3,) m
+    start       m, as given to `beam`
+
+    Source: definition. For a wave that returns exactly the way it came it is half the group path from a plane through
+    the point and back to it, which minus the range constant of a retroreflector must be.
+    """
+    towards, at = np.asarray(to_ranger, dtype=float), np.asarray(point, dtype=float)
+    out = start - towards @ at
+    back = np.sum((at - rays.position) * rays.direction, axis=-1)  # to the plane across the ray through the point
+    return 0.5 * (rays.path - out + back)
+
+
+def through_prism(
+    rays: Rays,
+    *,
+    height: float,
+    phase: float,
+    group: float,
+    azimuth: float = 0.0,
+    errors: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Rays:
+    """Through a solid cube corner, face z = 0 and corner at z = -height, and out again: three reflections.
+
+    height         m
+    phase, group   index of the glass over that of the air; 1, 1 for a hollow corner behind its clear face
+    azimuth        rad, of the first edge
+    errors         rad, of the three dihedral angles: see `corner`
+    """
+    face = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    faces = corner((0.0, 0.0, -height), azimuth, errors)
+    inside = rays.to(face, 1.0).refracted(face, 1.0 / phase)
+    for _ in range(3):
+        inside = inside.reflected_in(faces, group)
+    return inside.to(face, group).refracted(face, phase)
+
+
+def through_ball(rays: Rays, *, r1: float, r2: float, phase: float, group: float) -> Rays:
+    """Through a cat's-eye about the origin: in by the sphere r1, back from the sphere r2, out by r1.
+
+    r1, r2         m
+    phase, group   index of the glass over that of the air
+    """
+    small, mirror = Sphere((0.0, 0.0, 0.0), r1), Sphere((0.0, 0.0, 0.0), r2, far=True)
+    inside = rays.to(small, 1.0).refracted(small, 1.0 / phase).to(mirror, group).reflected(mirror)
+    out = Sphere((0.0, 0.0, 0.0), r1, far=True)
+    return inside.to(out, group).refracted(out, phase)

@@ -1,0 +1,90 @@
+"""`catseye glass`: the table, one glass, and one line for what cannot be."""
+
+import json
+
+import pytest
+import typer
+
+from catseye.cli import glass  # noqa: F401  its command joins the app
+from catseye.cli.commands import app
+from catseye.cli.terminal import attempt
+from catseye.optics import prism
+from catseye.optics.glass import GLASSES, group_index
+
+
+@pytest.fixture
+def asked(capsys):
+    """`catseye glass` run in this process: exit status, what it said, what it complained of."""
+
+    def run(*arguments):
+        command = typer.main.get_command(app)
+        status = attempt(lambda: command.main(["glass", *map(str, arguments)], prog_name="catseye"))
+        said = capsys.readouterr()
+        return status, said.out, said.err
+
+    return run
+
+
+def test_without_a_name_it_lists_every_glass_with_its_source(asked):
+    status, out, err = asked("--json")
+    assert (status, err) == (0, "")
+    table = json.loads(out)["glasses"]
+    assert list(table) == list(GLASSES)
+    assert all(entry["source"].startswith("[") for entry in table.values())
+    assert all(name in asked()[1] for name in GLASSES)
+
+
+def test_the_notes_glass_gives_the_notes_numbers(asked):
+    status, out, err = asked("BK7-old", "--height-mm", 38.4, "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert found["phase_index"] == pytest.approx(1.51118682, abs=5e-9)
+    assert found["group_index"] == pytest.approx(1.52746375, abs=5e-9)
+    assert found["group_wavelength"] == pytest.approx(0.130845422, abs=1e-9)
+    own = found["prism"]
+    assert own["notes_group_index_over_air"] == pytest.approx(1.527077, abs=5e-7)
+    assert own["notes_range_constant"] * 1e3 == pytest.approx(-33.4937, abs=5.1e-5)
+    assert (own["notes_range_constant"] - own["range_constant"]) * 1e6 == pytest.approx(23.6, abs=0.1)
+    cost = found["others"]["N-BK7"]
+    assert cost["range_too_long_about_face"] * 1e6 == pytest.approx(0.44, abs=0.005)
+    text = asked("BK7-old", "--height-mm", 38.4)[1]
+    assert "half of it 65.422711 mm" in " ".join(text.split())
+
+
+def test_a_kelvin_changes_the_range_constant_as_told(asked):
+    constants, slope = [], None
+    for temperature in (19.5, 20.0, 20.5):
+        own = json.loads(asked("N-BK7", "--temperature-c", temperature, "--json")[1])["prism"]
+        expanded = own["height"] * (1 + GLASSES["N-BK7"].expansion * (temperature - 20.0))
+        constants.append(float(prism.range_constant(expanded, own["group_index_over_air"])))
+        slope = own["range_constant_per_c"] if temperature == 20.0 else slope
+    assert constants[2] - constants[0] == pytest.approx(slope, rel=1e-4, abs=0.0)
+
+
+def test_the_other_glass_is_reckoned_at_the_wavelength_asked_for(asked):
+    found = json.loads(asked("N-BK7", "--wavelength-um", 1.55, "--json")[1])
+    assert found["others"]["BK7-old"] is None  # the old series ends at 1.014 um
+    difference = float(group_index(1.55, "fused-silica") - group_index(1.55, "N-BK7"))
+    assert found["others"]["fused-silica"]["group_index"] == pytest.approx(difference, abs=1e-15)
+    assert "does not reach" in asked("N-BK7", "--wavelength-um", 1.55)[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (("BK8",), 1, "glass 'BK8' is not known; known are BK7-old, N-BK7, fused-silica, S-LAH79"),
+        (("N-BK7", "--wavelength-um", 10.6), 1, "wavelength 10.6"),
+        (("N-BK7", "--temperature-c", 500), 1, "temperature 500"),
+        (("N-BK7", "--height-mm", 0), 2, "not a prism's height"),
+        (("N-BK7", "--height-mm", "nan"), 2, "not a prism's height"),
+    ],
+)
+def test_what_cannot_be_is_one_line(asked, arguments, status, said):
+    found, out, err = asked(*arguments)
+    assert (found, out) == (status, "")
+    assert said in " ".join(err.split())
+    assert status == 2 or err.count("\n") == 1
+
+
+def test_zero_degrees_is_a_temperature(asked):
+    assert json.loads(asked("N-BK7", "--temperature-c", 0, "--json")[1])["temperature_c"] == 0.0
