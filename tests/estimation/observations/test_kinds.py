@@ -58,6 +58,17 @@ def groups(seed):
         kinds.PointsOnLine("a", np.zeros(8), np.eye(8), at, rng.normal(size=3), rng.normal(size=3), other[4:8]),
         kinds.PointsOnSphere("a", zeros, ones, at, P[[5, 5, 5, 4]], 2.0, missing),
         kinds.RigidBodies("a", np.zeros(9), np.eye(9), P[:3], pose, turns[0]),
+        kinds.RigidTriplets(
+            "a",
+            np.zeros(10),
+            np.tile(np.eye(5), (2, 1, 1)),
+            P[[0, 3]],
+            P[[2, 4]],
+            P[[1, 5]],
+            np.array([[other[0], other[1]], [other[2], -1]]),
+            rng.normal(size=(2, 3)),
+            np.array([[other[8], -1, other[9], -1, other[10]], [-1, other[8], -1, other[11], -1]]),
+        ),
         kinds.FramePoints("a", np.zeros(9), np.ones(9), P[:3], np.tile(pose, (3, 1)), turns, np.array([9, -1, 12])),
         kinds.Linear("a", zeros, ones, other[:5], rng.normal(size=(4, 5))),
     )

@@ -26,6 +26,7 @@ from catseye.estimation.observations.point_on_line import PointsOnLine
 from catseye.estimation.observations.point_on_plane import PointsOnPlane
 from catseye.estimation.observations.point_on_sphere import PointsOnSphere
 from catseye.estimation.observations.rigid_body import RigidBodies
+from catseye.estimation.observations.rigid_triplet import RigidTriplets
 from catseye.estimation.observations.tilt import Tilts
 from catseye.estimation.observations.vector import Vectors
 from catseye.estimation.observations.zenith_angle import ZenithAngles
@@ -52,6 +53,7 @@ __all__ = [
     "PointsOnSphere",
     "Reported",
     "RigidBodies",
+    "RigidTriplets",
     "Tilts",
     "Vectors",
     "ZenithAngles",
