@@ -35,6 +35,14 @@ def test_wet_bulb_and_mercury(catseye):
     assert again["pressure_hpa"] == pytest.approx(929.382, abs=1e-3)
 
 
+def test_the_barometers_own_uncertainty_reaches_the_index(catseye):
+    given = ("--temperature-c", 20, "--humidity-percent", 50, "--barometer-mmhg", 700, "--mercury-c", 20)
+    alone = asked(catseye, *given, "--gravity", 9.79784)["standard_uncertainty"]
+    worse = asked(catseye, *given, "--gravity", 9.79784, "--u-mercury-c", 1)["standard_uncertainty"]
+    # 1 °C of mercury is 1.61e-4 of 929 hPa, 0.150 hPa, and 0.272 ppm a hPa
+    assert (worse**2 - alone**2) ** 0.5 * 1e6 == pytest.approx(0.150 * 0.272, rel=0.02)
+
+
 def test_frost_and_ice_are_asked_for_by_name(catseye):
     cold = ("--temperature-c", -5, "--pressure-hpa", 933)
     frost = asked(catseye, *cold, "--frost-point-c", -5)["vapour_pressure_hpa"]
@@ -127,6 +135,7 @@ def test_what_cannot_be_is_one_line_and_status_1(catseye, arguments, said):
         (*WEATHER, "--humidity-percent", 50, "--gravity", 9.8),
         (*WEATHER, "--humidity-percent", 50, "--u-dew-point-c", 0.2),
         (*WEATHER, "--humidity-percent", 50, "--u-temperature-c", -1),
+        (*WEATHER, "--humidity-percent", 50, "--u-mercury-c", 1),
         (*WEATHER, "--humidity-percent", 50, "--model", "edlen"),
     ],
 )

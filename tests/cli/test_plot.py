@@ -56,9 +56,16 @@ def test_a_move_that_takes_for_ever_is_refused(catseye, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "complaint"),
     [
-        (["clouds", "--out", "a.svg"], 2, "'clouds' is not one of sky, servo"),
+        (["clouds", "--out", "a.svg"], 2, "No such command 'clouds'"),
+        (["air", "--counts", "5", "--out", "a.svg"], 2, "No such option"),
         (["servo"], 2, "Missing option '--out'"),
-        (["sky", "--out", "a.svg"], 2, "sky needs --monument, --mirror and --at"),
+        (["sky", "--out", "a.svg"], 2, "Missing option '--monument'"),
+        (["coating", "--name", "butter", "--out", "a.svg"], 1, "butter"),
+        (["coating", "--incidence-deg", "95", "--out", "a.svg"], 2, "is not within 0 to 90 degrees"),
+        (["aberration", "--beam-radius-mm", "0", "--out", "a.svg"], 1, "beam_radius"),
+        (["polarization", "--glass", "butter", "--out", "a.svg"], 1, "butter"),
+        (["beam", "nothing.toml", "--out", "a.svg"], 1, "nothing.toml"),
+        (["beam", ROOT / "examples/beams/head.toml", "--out", ROOT / "examples/beams/head.toml"], 1, "is an input"),
         ([*SKY, "--from=1,2", "--out", "a.svg"], 2, "go together"),
         ([*SKY, "--from=1", "--to=2,3", "--out", "a.svg"], 2, "is not AZIMUTH,ELEVATION in counts"),
         (["servo", "--counts", "0", "--out", "a.svg"], 2, "greater than or equal to 1"),
@@ -88,3 +95,24 @@ def test_the_airs_figure_says_its_index_and_what_makes_it_uncertain(catseye, tmp
     assert (status, said) == (1, "")
     assert "temperature 120 C is outside" in complaint
     assert not (tmp_path / "none.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        (["return"], None),
+        (["aberration", "--beam-radius-mm", "5"], None),
+        (["coating", "--name", "gold"], "wavelength_um"),
+        (["polarization"], None),
+        (["beam", ROOT / "examples/beams/head.toml"], "power_on_detector"),
+    ],
+)
+def test_figures_of_the_optics_are_drawn_and_told(catseye, tmp_path, arguments, key):
+    out = tmp_path / "figure.svg"
+    status, said, complaint = catseye("plot", *arguments, "--out", out, "--json")
+    assert (status, complaint) == (0, "")
+    found = json.loads(said, parse_constant=pytest.fail)
+    assert found["kind"] == arguments[0]
+    assert len(found) > 2
+    assert key is None or key in found
+    assert ET.fromstring(out.read_text(encoding="utf-8")).tag.endswith("svg")

@@ -124,7 +124,7 @@ def test_every_cause_moves_the_observations_by_its_column(cause):
         even = heard(places, lambda q: np.full(q.shape[:-1], 17.0), lambda q: np.broadcast_to(wind, q.shape), **weather)
         return inverted(even + late, wind=Prior(0.0, 6.0)).tomogram.observations
 
-    base, beta = seen(), np.zeros(31)
+    base, beta = seen(), np.zeros(27 + len(COMMON))
     if cause == "place":
         shift = 1e-3 * rng.standard_normal(STATIONS.shape)
         beta[:27], moved = shift.ravel(), seen(STATIONS + shift)
@@ -156,6 +156,24 @@ def test_a_wrong_time_is_named_and_bad_ones_are_left_out():
     assert field.suspects.tolist() == [10]
     assert [field.status[i] for i in (0, 20, 30, 40)] == [USED, NO_TIME, NO_TIME, OUTSIDE]
     assert len(field.used) == 69
+
+
+def test_a_prior_that_does_not_fit_is_said_to_claim_too_little():
+    assert inverted(heard(STATIONS)).fit == "fits"
+    stiff = Prior(15.0, 8.0, (Scale(0.05, (80.0, 80.0, 40.0)),))
+    said = inverted(heard(STATIONS), temperature=stiff).fit
+    assert said.startswith("chi-square")
+    assert "give larger scales" in said
+
+
+def test_dispersion_and_carbon_dioxide_are_uncertain_too():
+    """At 1 kHz in 17 °C a tenth of 60 ppm is 3.5e-3 °C; 200 ppm of carbon dioxide 0.0096 m/s a hundred, 0.033 °C."""
+    times = heard(STATIONS)
+    plain = inverted(times).along(*LASER).u_temperature_c[0]
+    assert inverted(times, frequency_hz=1e3).along(*LASER).u_temperature_c[0] > plain
+    more = inverted(times, u_co2_ppm=2000.0).along(*LASER).u_temperature_c[0]
+    per_ppm = 0.0096 / 100.0 / 0.6  # °C
+    assert np.sqrt(more**2 - plain**2) == pytest.approx(per_ppm * 2000.0, rel=0.3)
 
 
 def test_still_air_needs_no_wind():

@@ -7,7 +7,7 @@ from catseye.atmosphere import humidity
 from catseye.atmosphere.air import MODELS, air, group_refractivity_of_vapour
 from catseye.atmosphere.psychrometer import vapour_pressure_of_wet_bulb_hpa, wet_bulb_c
 from catseye.errors import ValidityError
-from catseye.reduction.air_routes import HYGROMETERS, Moisture, air_by, station_pressure_hpa, surface_of
+from catseye.reduction.air_routes import HYGROMETERS, Moisture, air_by, station_pressure, surface_of
 
 DEGREE = np.pi / 180
 
@@ -85,9 +85,12 @@ def test_carbon_dioxide_counts_where_the_model_has_it():
 
 def test_the_notes_barometer_and_psychrometer_give_their_air():
     """[PARKER04] eqs. 1.22 (929.37, truncated from 697.09 mm) and the psychrometer of the listing, typed again."""
-    p = station_pressure_hpa(700.0, 20.0, latitude=38.45 * DEGREE, elevation=797.3)
+    p, u = station_pressure(700.0, 20.0, latitude=38.45 * DEGREE, elevation=797.3)
     assert p == pytest.approx(929.382, abs=1e-3)
-    assert station_pressure_hpa(700.0, 20.0, gravity=9.79784) == pytest.approx(p, abs=1e-3)
+    measured, u_measured = station_pressure(700.0, 20.0, gravity=9.79784)
+    assert measured == pytest.approx(p, abs=1e-3)
+    # a formula knows gravity to 3e-4 of 9.8 m/s², a straight expansion of mercury 1e-5: 0.0285 and 0.0093 hPa
+    assert (u, u_measured) == (pytest.approx(0.0299, abs=3e-4), pytest.approx(0.0093, abs=1e-4))
     saturated = (1.0007 + 3.46e-6 * p) * 6.1121 * np.exp(17.502 * 14.0 / (240.97 + 14.0))
     e = saturated - 0.000662 * p * (20.0 - 14.0)
     assert vapour_pressure_of_wet_bulb_hpa(20.0, 14.0, p) == pytest.approx(e, rel=1e-12)

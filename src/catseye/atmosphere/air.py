@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from catseye.atmosphere import barrell_sears1963, ciddor_hill1999, humidity, iag1999_closed, rueger1990
-from catseye.atmosphere.model import Kind, Limit, Model, Partials, Sensitivity
+from catseye.atmosphere.model import Kind, Limit, Model, Partials, Sensitivity, check_spreads
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
 
@@ -75,11 +75,19 @@ class Air:
     ) -> Any:
         """Standard uncertainty of the group index from the formula and from uncorrelated inputs (1 sigma each).
 
+        Raises ValidityError for an uncertainty below zero or no number.
         Source: law of propagation of uncertainty, first order; [JCGM100] eq. 10.
 
         >>> round(float(air(20.0, 933.0, 50.0).combined_uncertainty(0.3)) * 1e6, 2)
         0.27
         """
+        check_spreads(
+            u_temperature_c=u_temperature_c,
+            u_pressure_hpa=u_pressure_hpa,
+            u_humidity_percent=u_humidity_percent,
+            u_co2_ppm=u_co2_ppm,
+            u_wavelength_um=u_wavelength_um,
+        )
         slope = self.sensitivity
         shares = (
             (slope.temperature_c, u_temperature_c),

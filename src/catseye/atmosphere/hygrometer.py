@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catseye.atmosphere import humidity, psychrometer
-from catseye.atmosphere.model import Limit, Partials
+from catseye.atmosphere.model import Limit, Partials, check_spreads
 from catseye.errors import ValidityError
 
 # standard uncertainty of the saturation formulas, of themselves: the span of their disagreement over root three
@@ -50,6 +50,7 @@ class Reading(NamedTuple):
         >>> round(float(of_relative_humidity(20.0, 933.0, 50.0).standard_uncertainty_hpa(2.0)), 3)
         0.469
         """
+        check_spreads(u_reading=u_reading, u_temperature_c=u_temperature_c, u_pressure_hpa=u_pressure_hpa)
         return _root_sum(
             self.per_reading * u_reading,
             self.per_temperature_c * u_temperature_c,
@@ -68,6 +69,9 @@ class Reading(NamedTuple):
 
         Source: [JCGM100] eq. 10, with the chain rule through the vapour pressure.
         """
+        check_spreads(
+            u_reading=u_reading, u_temperature_c=u_temperature_c, u_pressure_hpa=u_pressure_hpa, u_model=u_model
+        )
         by_vapour = partials.vapour_pressure_hpa
         return _root_sum(
             by_vapour * self.per_reading * u_reading,

@@ -14,6 +14,7 @@ import numpy as np
 from catseye.errors import ValidityError
 
 Kind = Literal["group", "phase"]
+GREATEST_SPREAD = 1e4  # standard uncertainties, in each quantity's unit
 
 
 class Sensitivity(NamedTuple):
@@ -168,6 +169,12 @@ class Limit:
             f"{self.quantity} {said} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
             mask,
         )
+
+
+def check_spreads(**spreads) -> None:
+    """Raise ValidityError for a standard uncertainty, by name, that is below zero, no number or without end."""
+    for name, value in spreads.items():
+        Limit(name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty").check(value)
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,8 @@ def air(
     co2_ppm: CarbonDioxide = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
     u_pressure_hpa: Annotated[float, typer.Option(help="Of the pressure, hPa.", **U)] = 0.0,
+    u_barometer_mmhg: Annotated[float, typer.Option(help="Of the mercury as read, mm.", **U)] = 0.0,
+    u_mercury_c: Annotated[float, typer.Option(help="Of the mercury's temperature, °C.", **U)] = 0.0,
     u_humidity_percent: Annotated[float, typer.Option(help="Of the relative humidity, %.", **U)] = 0.0,
     u_dew_point_c: Annotated[float, typer.Option(help="Of the dew or frost point, °C.", **U)] = 0.0,
     u_wet_bulb_c: Annotated[float, typer.Option(help="Of the wet bulb, water or ice, °C.", **U)] = 0.0,
@@ -67,7 +69,7 @@ def air(
 ) -> None:
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
     from catseye.gateways.objects import air_object, json_line
-    from catseye.reduction.air_routes import air_by, station_pressure_hpa, surface_of
+    from catseye.reduction.air_routes import air_by, station_pressure, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -90,7 +92,11 @@ def air(
     if pressure_hpa is None:
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
         where = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
-        pressure_hpa = float(station_pressure_hpa(barometer_mmhg, mercury_c, **where))
+        read = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
+        found_p, u_p = station_pressure(barometer_mmhg, mercury_c, **where, **read)
+        pressure_hpa, u_pressure_hpa = float(found_p), math.hypot(u_pressure_hpa, float(u_p))
+    elif u_barometer_mmhg > 0.0 or u_mercury_c > 0.0:
+        raise typer.BadParameter("belong to --barometer-mmhg.", param_hint="'--u-barometer-mmhg', '--u-mercury-c'")
     state, u = air_by(
         temperature_c,
         pressure_hpa,

@@ -1,5 +1,7 @@
-"""The command of figures that no other command draws."""
+"""The figures that no other command draws: `catseye plot KIND`, each kind a command with its own options."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,16 +10,22 @@ import typer
 from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
 from catseye.cli.point import time_text
 from catseye.cli.terminal import say
+from catseye.constants import DEGREE
 from catseye.errors import InputError
 
-KINDS = ("sky", "servo", "air")
 MARK = "<!-- catseye plot"
 
+plots = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="\b\nExample: catseye plot air --temperature-c 20 --u-temperature-c 0.2 --out air.svg\n"
+    "Example: catseye plot sky --help",
+    help="A figure: of a ranger's sky, a servo's move, the air, retroreflectors, coatings, polarization, a beam.",
+)
+app.add_typer(plots, name="plot")
 
-def _known(kind: str) -> str:
-    if kind not in KINDS:
-        raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
-    return kind
+Out = Annotated[Path, typer.Option("--out", metavar="FIGURE.svg", help="Figure to write: new, or an earlier one.")]
+U = {"callback": uncertainty}
 
 
 def _pair(text: str | None) -> str | None:
@@ -36,83 +44,184 @@ def _counts(text: str) -> tuple[float, float]:
     return azimuth, elevation
 
 
-@app.command(
+@plots.command(
     epilog="\b\nExample: catseye plot sky --monument examples/night-01/monuments/ZY103.toml --mirror "
     "examples/night-01/mirrors/ZP103.toml --at 2003-09-10T18:00:00Z --longitude-deg=-79.84 "
-    "--keep-out examples/keep-out.toml --from=18500,10000 --to=21500,12000 --out sky.svg\n"
-    "Example: catseye plot servo --counts 10000 --out servo.svg\n"
-    "Example: catseye plot air --temperature-c 20 --pressure-hpa 933 --humidity-percent 50 --u-temperature-c 0.2 "
-    "--out air.svg"
+    "--keep-out examples/keep-out.toml --from=18500,10000 --to=21500,12000 --out sky.svg"
 )
-def plot(
-    kind: Annotated[str, typer.Argument(metavar="KIND", callback=_known, help=f"{', '.join(KINDS)}.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FIGURE.svg", help="Figure to write: new, or an earlier one.")],
-    monument: Annotated[Path | None, typer.Option("--monument", metavar="M.toml", help="sky: of the monument.")] = None,
-    mirror: Annotated[
-        Path | None, typer.Option("--mirror", metavar="Z.toml", help="sky: on it; servo: whose settings to take.")
-    ] = None,
-    at: Annotated[str | None, typer.Option("--at", metavar="TIME", callback=time_text, help="sky: UTC or MJD.")] = None,
-    latitude_deg: Annotated[float | None, typer.Option("--latitude-deg", help="sky: if the record has none.")] = None,
-    longitude_deg: Annotated[float | None, typer.Option("--longitude-deg", help="sky: if the record has none.")] = None,
+def sky(
+    out: Out,
+    monument: Annotated[Path, typer.Option("--monument", metavar="M.toml", help="The ranger's monument.")],
+    mirror: Annotated[Path, typer.Option("--mirror", metavar="Z.toml", help="The mirror on it.")],
+    at: Annotated[str, typer.Option("--at", metavar="TIME", callback=time_text, help="UTC or MJD.")],
+    latitude_deg: Annotated[float | None, typer.Option("--latitude-deg", help="If the record has none.")] = None,
+    longitude_deg: Annotated[float | None, typer.Option("--longitude-deg", help="If the record has none.")] = None,
     keep_out: Annotated[
-        Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="sky: boxes that no beam may enter.")
+        Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="Boxes that no beam may enter.")
     ] = None,
     start: Annotated[
-        str | None, typer.Option("--from", metavar="AZ,EL", callback=_pair, help="sky: a slew from these counts ...")
+        str | None, typer.Option("--from", metavar="AZ,EL", callback=_pair, help="A slew from these counts ...")
     ] = None,
     end: Annotated[
-        str | None, typer.Option("--to", metavar="AZ,EL", callback=_pair, help="sky: ... to these, and the way round.")
+        str | None, typer.Option("--to", metavar="AZ,EL", callback=_pair, help="... to these, and the way round.")
     ] = None,
-    counts: Annotated[int, typer.Option("--counts", min=1, max=1_000_000, help="servo: length of the move.")] = 10_000,
-    axis: Annotated[int, typer.Option("--axis", min=0, max=1, help="servo: 0 azimuth, 1 elevation.")] = 0,
-    temperature_c: Annotated[float, typer.Option("--temperature-c", help="air: °C.")] = 20.0,
-    pressure_hpa: Annotated[float, typer.Option("--pressure-hpa", help="air: hPa.")] = 1013.25,
-    humidity_percent: Annotated[float, typer.Option("--humidity-percent", help="air: over liquid water, %.")] = 50.0,
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="air: of vacuum, µm.")] = 0.780,
-    model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="air: formula of the index.")
-    ] = "ciddor_hill1999",
-    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="air: carbon dioxide, ppm.")] = 450.0,
-    u_temperature_c: Annotated[float, typer.Option(callback=uncertainty, help="air: of the temperature, °C.")] = 0.0,
-    u_pressure_hpa: Annotated[float, typer.Option(callback=uncertainty, help="air: of the pressure, hPa.")] = 0.0,
-    u_humidity_percent: Annotated[float, typer.Option(callback=uncertainty, help="air: of the humidity, %.")] = 0.0,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """A figure: a ranger's sky with Sun, boxes and a slew; a move of a mirror's servo; the index of air."""
-    from catseye.gateways.air_figures import air_plot
-    from catseye.gateways.objects import json_line
-    from catseye.gateways.output import whole_file
-    from catseye.gateways.plots import servo_plot, sky_plot
+    """A ranger's sky with Sun, boxes and a slew."""
+    from catseye.gateways.plots import sky_plot
     from catseye.geometry.time_tag import mjd_of
 
-    if kind == "sky":
-        if monument is None or mirror is None or at is None:
-            raise typer.BadParameter("sky needs --monument, --mirror and --at.", param_hint="'KIND'")
-        if (start is None) != (end is None):
-            raise typer.BadParameter("go together: --from and --to.", param_hint="'--from'")
-        way = None if start is None or end is None else (_counts(start), _counts(end))
-        place = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-        drawn, told = sky_plot(monument, mirror, mjd_of(at), way, keep_out, **place)
-    elif kind == "servo":
-        drawn, told = servo_plot(mirror, axis, counts)
-    else:
-        drawn, told = air_plot(
-            temperature_c,
-            pressure_hpa,
-            humidity_percent,
-            wavelength_um=wavelength_um,
-            model=model,
-            co2_ppm=co2_ppm,
-            u_temperature_c=u_temperature_c,
-            u_pressure_hpa=u_pressure_hpa,
-            u_humidity_percent=u_humidity_percent,
-        )
-    for given in (monument, mirror, keep_out):
+    if (start is None) != (end is None):
+        raise typer.BadParameter("go together: --from and --to.", param_hint="'--from'")
+    way = None if start is None or end is None else (_counts(start), _counts(end))
+    place = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
+    drawn = sky_plot(monument, mirror, mjd_of(at), way, keep_out, **place)
+    _finish("sky", drawn, out, json, quiet, inputs=(monument, mirror, keep_out))
+
+
+@plots.command(epilog="\b\nExample: catseye plot servo --counts 10000 --out servo.svg")
+def servo(
+    out: Out,
+    mirror: Annotated[Path | None, typer.Option("--mirror", metavar="Z.toml", help="Whose settings to take.")] = None,
+    counts: Annotated[int, typer.Option("--counts", min=1, max=1_000_000, help="Length of the move.")] = 10_000,
+    axis: Annotated[int, typer.Option("--axis", min=0, max=1, help="0 azimuth, 1 elevation.")] = 0,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A move of a mirror's servo."""
+    from catseye.gateways.plots import servo_plot
+
+    _finish("servo", servo_plot(mirror, axis, counts), out, json, quiet, inputs=(mirror,))
+
+
+@plots.command(
+    epilog="\b\nExample: catseye plot air --temperature-c 20 --pressure-hpa 933 --u-temperature-c 0.2 --out air.svg"
+)
+def air(
+    out: Out,
+    temperature_c: Annotated[float, typer.Option("--temperature-c", help="°C.")] = 20.0,
+    pressure_hpa: Annotated[float, typer.Option("--pressure-hpa", help="hPa.")] = 1013.25,
+    humidity_percent: Annotated[float, typer.Option("--humidity-percent", help="Over liquid water, %.")] = 50.0,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of vacuum, µm.")] = 0.780,
+    model: Annotated[
+        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula of the index.")
+    ] = "ciddor_hill1999",
+    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 450.0,
+    u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
+    u_pressure_hpa: Annotated[float, typer.Option(help="Of the pressure, hPa.", **U)] = 0.0,
+    u_humidity_percent: Annotated[float, typer.Option(help="Of the humidity, %.", **U)] = 0.0,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """The index of air against each variable, with its uncertainty and the other models."""
+    from catseye.gateways.air_figures import air_plot
+
+    drawn = air_plot(
+        temperature_c,
+        pressure_hpa,
+        humidity_percent,
+        wavelength_um=wavelength_um,
+        model=model,
+        co2_ppm=co2_ppm,
+        u_temperature_c=u_temperature_c,
+        u_pressure_hpa=u_pressure_hpa,
+        u_humidity_percent=u_humidity_percent,
+    )
+    _finish("air", drawn, out, json, quiet)
+
+
+@plots.command("return", epilog="\b\nExample: catseye plot return --out return.svg")
+def return_(out: Out, json: Json = False, quiet: Quiet = False) -> None:
+    """What each kind of retroreflector returns against the incidence, and how its range changes."""
+    from catseye.gateways.retroreflector_figures import return_plot
+
+    _finish("return", return_plot(), out, json, quiet)
+
+
+@plots.command(epilog="\b\nExample: catseye plot aberration --beam-radius-mm 10 --out aberration.svg")
+def aberration(
+    out: Out,
+    beam_radius_mm: Annotated[
+        float, typer.Option("--beam-radius-mm", help="Of the beam at the ball, 1/e², mm.")
+    ] = 10.0,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """The ball's spherical aberration: range, deviation and light against the ray's height."""
+    from catseye.gateways.retroreflector_figures import aberration_plot
+
+    _finish("aberration", aberration_plot(beam_radius=beam_radius_mm * 1e-3), out, json, quiet)
+
+
+@plots.command(
+    epilog="\b\nExample: catseye plot coating --name gold --name silver --incidence-deg 45 --out coating.svg"
+)
+def coating(
+    out: Out,
+    names: Annotated[
+        list[str] | None, typer.Option("--name", help="A coating; again for more. Usual ones if none.")
+    ] = None,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of vacuum, µm.")] = 0.780,
+    incidence_deg: Annotated[float, typer.Option("--incidence-deg", help="For which films are made, degrees.")] = 0.0,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Coatings against angle and wavelength: reflectance, and what a range reads too long."""
+    from catseye.gateways.beam_figures import DRAWN, coating_plot
+
+    if not (math.isfinite(incidence_deg) and 0.0 <= incidence_deg < 90.0):
+        raise typer.BadParameter(f"{incidence_deg} is not within 0 to 90 degrees.", param_hint="'--incidence-deg'")
+    chosen = tuple(names) if names else DRAWN
+    _finish("coating", coating_plot(chosen, wavelength_um, incidence_deg * DEGREE), out, json, quiet)
+
+
+@plots.command(epilog="\b\nExample: catseye plot polarization --glass BK7-old --out polarization.svg")
+def polarization(
+    out: Out,
+    glass: Annotated[str, typer.Option("--glass", help="Of the solid corner.")] = "BK7-old",
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="µm.")] = 0.780,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """What cube corners do to polarized light: six sectors, and the return through an analyser."""
+    from catseye.gateways.polarization_figures import polarization_plot
+
+    _finish("polarization", polarization_plot(wavelength_um, glass), out, json, quiet)
+
+
+@plots.command(epilog="\b\nExample: catseye plot beam examples/beams/head.toml --out beam.svg")
+def beam(
+    train: Annotated[Path, typer.Argument(metavar="TRAIN.toml", help="A train of elements: docs/formats/beam.md.")],
+    out: Out,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A beam along its path from the diode to the detector."""
+    from catseye.gateways.beam_figures import beam_plot
+
+    _finish("beam", beam_plot(train), out, json, quiet, inputs=(train,))
+
+
+def _finish(
+    kind: str,
+    drawn: tuple[str, dict[str, Any]],
+    out: Path,
+    json: bool,
+    quiet: bool,
+    *,
+    inputs: Sequence[Path | None] = (),
+) -> None:
+    """Write the figure whole or not at all, and say what it says."""
+    from catseye.gateways.objects import json_line
+    from catseye.gateways.output import whole_file
+
+    text, told = drawn
+    for given in inputs:
         if given is not None and given.resolve() == out.resolve():
             raise InputError(f"--out {out}: is an input of this figure (expected another name)")
     with whole_file(out, "--out", MARK) as pieces:
-        pieces.append(drawn.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
+        pieces.append(text.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
     if json:
         say(json_line({"kind": kind, "written": str(out), **told}))
     elif not quiet:

@@ -120,7 +120,13 @@ def _shots(path: "AcousticPath") -> str:
 
 
 def _inputs(paths: Sequence["AcousticPath"]) -> dict[str, str]:
-    return {name: digest for path in paths for name, digest in path.hashes.items()}
+    """File -> SHA-256; of files of one name in several directories, with their path's name before it."""
+    found: dict[str, str] = {}
+    for path in paths:
+        for name, digest in path.hashes.items():
+            double = found.get(name, digest) != digest
+            found[f"{path.sheet.ranger} to {path.sheet.target}/{name}" if double else name] = digest
+    return found
 
 
 def _provenance(inputs: Mapping[str, str], when: datetime) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from catseye.atmosphere import humidity
 from catseye.atmosphere.air import Air, air
-from catseye.atmosphere.model import Limit
+from catseye.atmosphere.model import Limit, check_spreads
 from catseye.atmosphere.sound import MODELS, THERMOMETRY, model_named, sound, temperatures_c
 from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.atmosphere.sound_path import WIND, bent_ray_excess, pair, straight_line_speed
@@ -26,7 +26,6 @@ NO_WIND = f"wind above {WIND.upper:g} m/s: the two times do not belong together"
 LENGTH = Limit("length of the path", "m", 0.1, 10_000.0, "the notion of a path", places=1)
 DELAY = Limit("delay", "s", -1.0, 1.0, "the notion of a delay")
 GRADIENT = Limit("gradient of the speed", "1/s", -10.0, 10.0, "the notion of a smoothly bent ray")
-GREATEST_SPREAD = 1e4  # in each quantity's unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,9 +258,3 @@ def _check(length, delay, crosswind, speed_gradient, wind, u_wind, one_way) -> N
         )
     WIND.check(wind)
     check_spreads(u_wind=u_wind)
-
-
-def check_spreads(**spreads) -> None:
-    """Raise ValidityError for the first standard uncertainty that is none."""
-    for name, value in spreads.items():
-        Limit(name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty").check(value)

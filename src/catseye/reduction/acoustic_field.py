@@ -12,18 +12,20 @@ from typing import Any
 import numpy as np
 
 from catseye.atmosphere.air import air
-from catseye.atmosphere.model import Limit
+from catseye.atmosphere.model import Limit, check_spreads
 from catseye.atmosphere.sound import THERMOMETRY, model_named, sound, temperatures_c
+from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
-from catseye.reduction.acoustic import LENGTH, NO_TIME, OUTSIDE, USED, check_spreads
+from catseye.reduction.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
 
 PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
 CLOSE_ENOUGH_C = 1e-6
 NOTHING = "no travel time of {} is that of sound in air; check the delay and the places"
 WINDIEST = 60.0  # m/s that a wind and a temperature other than expected may make together
 LINE = Limit("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
-COMMON = ("delay", "pressure", "humidity", "formula")  # after three coordinates a station
+COMMON = ("delay", "pressure", "humidity", "carbon dioxide", "dispersion", "formula")  # after places of stations
+UNLIKELY = 1e-3  # chance of so large a chi-square, below which the priors are said not to fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,19 @@ class SoundField:
     status: tuple[str, ...]
     used: np.ndarray
     weather: tuple[float, float, float]
+
+    @property
+    def fit(self) -> str:
+        """Whether times and priors go together, in words: "fits", or what does not and what to do."""
+        from scipy.special import chdtrc
+
+        chi_square, count = self.tomogram.chi_square, len(self.used)
+        if chdtrc(count, chi_square) >= UNLIKELY:
+            return "fits"
+        return (
+            f"chi-square {chi_square:.0f} of {count} times: field and wind vary more than their priors say, and the "
+            "uncertainties are too small; give larger scales, or leave out the suspects"
+        )
 
     @property
     def suspects(self) -> np.ndarray:
@@ -136,6 +151,7 @@ def sound_field(
     temperature: Prior,
     wind: Prior | None,
     co2_ppm: float = 450.0,
+    u_co2_ppm: float = 20.0,
     frequency_hz: float = 0.0,
     model: str = THERMOMETRY,
 ) -> SoundField:
@@ -150,8 +166,8 @@ def sound_field(
     pressure_hpa, humidity_percent   of the air, with their uncertainties: common to all
     temperature          prior of the field, °C
     wind                 prior of each component of the wind, m/s, expected 0; None for still air
-    co2_ppm              carbon dioxide
-    frequency_hz         of the sound: air's dispersion is taken off
+    co2_ppm, u_co2_ppm   carbon dioxide
+    frequency_hz         of the sound: air's dispersion is taken off, a share of it is uncertain
     model                a name in `atmosphere.sound.MODELS`
 
     Source: exact geometry of `atmosphere.sound_path`, [TARANTOLA05] for the estimate; linearised about each path's own
@@ -166,6 +182,7 @@ def sound_field(
         u_delay=u_delay,
         u_pressure_hpa=u_pressure_hpa,
         u_humidity_percent=u_humidity_percent,
+        u_co2_ppm=u_co2_ppm,
     )
     ray = stations[receiver] - stations[source]
     LENGTH.check(np.linalg.norm(ray, axis=1))
@@ -178,7 +195,7 @@ def sound_field(
     sigmas = np.concatenate(
         [
             np.full(stations.size, u_position),
-            [u_delay, u_pressure_hpa, u_humidity_percent, model_named(model).standard_uncertainty],
+            [u_delay, u_pressure_hpa, u_humidity_percent, u_co2_ppm, 1.0, model_named(model).standard_uncertainty],
         ]
     )
     at, blown = np.full(len(time), temperature.mean), np.zeros((len(time), 3))
@@ -278,6 +295,7 @@ class _Paths:
             at = np.where(outside, at, heard)
             state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
             per_speed = 1.0 / state.sensitivity.temperature_c
+        late = dispersion(at, p, state.vapour_pressure_hpa, frequency_hz).of_a_pulse()[1]  # its u, relative
         by_along = per_speed * (self.speed - along) / speed
         by_length = (by_along / self.time)[:, None] * lines.directions
         rows = np.arange(len(self.time))
@@ -289,6 +307,8 @@ class _Paths:
                 -by_along * self.speed / self.time,
                 per_speed * state.sensitivity.pressure_hpa,
                 per_speed * state.sensitivity.humidity_percent,
+                per_speed * state.sensitivity.co2_ppm,
+                -per_speed * speed * late,
                 per_speed,
             ],
             axis=1,

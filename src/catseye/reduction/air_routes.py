@@ -44,20 +44,40 @@ class Moisture:
     u: Any = 0.0
 
 
-def station_pressure_hpa(reading_mmhg, mercury_c, *, gravity=None, latitude=None, elevation=None):
-    """Station pressure from a mercury barometer; gravity measured, or by latitude and elevation.
+def station_pressure(
+    reading_mmhg,
+    mercury_c,
+    *,
+    gravity=None,
+    latitude=None,
+    elevation=None,
+    u_reading_mmhg=0.0,
+    u_mercury_c=0.0,
+) -> tuple[Any, Any]:
+    """Station pressure from a mercury barometer and its standard uncertainty, hPa.
 
-    reading_mmhg   uncorrected height of the mercury on a brass scale, mm
-    mercury_c      temperature of barometer and mercury, °C
-    gravity        local, m/s²; None: from the two below
-    latitude       rad
-    elevation      m above the sea
+    reading_mmhg     uncorrected height of the mercury on a brass scale, mm
+    mercury_c        temperature of barometer and mercury, °C
+    gravity          local, m/s², measured; None: by the two below, which knows it to 3e-4 m/s²
+    latitude         rad
+    elevation        m above the sea
+    u_reading_mmhg   standard uncertainty of the reading, mm
+    u_mercury_c      of the mercury's temperature, °C
 
     Source: [PARKER04] eqs. 1.8 to 1.20.
     """
+    u_gravity = 0.0
     if gravity is None:
-        gravity = barometer.normal_gravity(latitude, elevation)
-    return barometer.station_pressure_hpa(reading_mmhg, mercury_c, gravity)
+        gravity, u_gravity = barometer.normal_gravity(latitude, elevation), barometer.U_NORMAL_GRAVITY
+    u = barometer.station_pressure_uncertainty_hpa(
+        reading_mmhg,
+        mercury_c,
+        gravity,
+        u_reading_mmhg=u_reading_mmhg,
+        u_mercury_c=u_mercury_c,
+        u_gravity=u_gravity,
+    )
+    return barometer.station_pressure_hpa(reading_mmhg, mercury_c, gravity), u
 
 
 def air_by(

@@ -87,6 +87,8 @@ def site_air(
     """
     readings = site_readings(site, weather, without)
     start = float(weather.mjd_utc.min())
+    if block is not None and not block >= 0.0:
+        raise InputError(f"block = {block} s is below zero (expected 0 for none, or a length)")
     block = _block(readings) if block is None else block
     if block > 0.0:
         readings = readings.averaged(block)
