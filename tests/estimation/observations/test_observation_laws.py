@@ -156,7 +156,8 @@ def test_a_sphere_gives_the_zenith_angle_that_the_curvature_term_claims(seed):
     rng = np.random.default_rng(seed)
     radius, far = rng.uniform(1e5, 1e7), rng.uniform(1.0, 5e3)
     arc = far / radius
-    chord = radius * np.array([0.0, np.sin(arc), np.cos(arc) - 1.0])  # of the target, in the origin's own level axes
+    # of the target, in the origin's own level axes; cos - 1 as a square, which keeps its digits
+    chord = radius * np.array([0.0, np.sin(arc), -2.0 * np.sin(0.5 * arc) ** 2])
     exact = np.arctan2(chord[1], chord[2])
     group = kinds.ZenithAngles("law", np.zeros(1), np.ones(1), np.array([0]), np.array([3]), curved=True, radius=radius)
     value = group.predict(np.array([0.0, 0.0, 0.0, 0.0, far, 0.0]))[0]
