@@ -1,7 +1,6 @@
 """All files of acoustic paths: tables, object, and a report of one HTML page that needs nothing else."""
 
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -13,8 +12,8 @@ from catseye.constants import PPM
 from catseye.gateways.acoustic_figures import acoustic_figures
 from catseye.gateways.acoustic_objects import full_object, mean, path_temperatures_csv, shots_csv, words
 from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE
 from catseye.gateways.page import card, page, paragraph, picture, section, table
+from catseye.gateways.written import Files, origin, write_files
 
 if TYPE_CHECKING:
     from catseye.reduction.acoustic_recording import AcousticPath
@@ -36,27 +35,15 @@ def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
     directory   exists, and is ours to fill: see `output.whole_directory`
     """
     when = datetime.now(UTC)
-    files: dict[str, Callable[[], str]] = {
+    files: Files = {
         "path_temperatures.csv": lambda: path_temperatures_csv(paths),
         "shots.csv": lambda: shots_csv(paths),
         "acoustic.json": lambda: json_page(full_object(paths)),
         "report.html": lambda: acoustic_report(paths, when),
     }
-    outputs = {}
-    for name, text in files.items():
-        raw = text().encode("utf-8")
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-        (directory / name).write_bytes(raw)
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye acoustic",
-        "when_utc": when.isoformat(timespec="seconds"),
-        "versions": versions(),
-        "settings": {"model": paths[0].model, "air_model": paths[0].air_model},
-        "inputs_sha256": _inputs(paths),
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+    settings = {"model": paths[0].model, "air_model": paths[0].air_model}
+    made = {"format": FORMAT, "made_by": "catseye acoustic", "settings": settings}
+    write_files(files, directory, {**made, **origin(when, _inputs(paths))})
 
 
 def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:

@@ -1,6 +1,5 @@
 """All files of an EDM baseline, and the record that keeps its pillars."""
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from datetime import UTC, date, datetime
@@ -9,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from catseye.gateways.baseline_objects import baseline_object
 from catseye.gateways.baseline_tables import distances_csv, observations_csv, pillars_csv
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE, whole_file
+from catseye.gateways.objects import json_page
+from catseye.gateways.output import whole_file
+from catseye.gateways.written import Files, origin, write_files
 from catseye.records.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline import record_values
 
@@ -34,30 +34,15 @@ def write_calibration(
     from catseye.gateways.baseline_report import baseline_report  # matplotlib is heavy
 
     when = datetime.now(UTC)
-    files: dict[str, Callable[[], str]] = {
+    files: Files = {
         "pillars.csv": lambda: pillars_csv(found),
         "distances.csv": lambda: distances_csv(found),
         "observations.csv": lambda: observations_csv(found),
         "baseline.json": lambda: json_page(baseline_object(found)),
         "report.html": lambda: baseline_report(found, when, inputs),
     }
-    outputs = {}
-    for done, (name, text) in enumerate(files.items()):
-        if progress is not None:
-            progress(f"writing {name}", done, len(files))
-        raw = text().encode("utf-8")
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-        (directory / name).write_bytes(raw)
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye baseline",
-        "when_utc": when.isoformat(timespec="seconds"),
-        "versions": versions(),
-        "settings": asdict(found.settings),
-        "inputs_sha256": dict(inputs),
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+    made = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(found.settings)}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
 
 
 def write_record(

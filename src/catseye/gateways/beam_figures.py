@@ -1,9 +1,8 @@
 """A beam train as figures, words, object and files; coatings as curves."""
 
 import csv
-import hashlib
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,8 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE
+from catseye.gateways.objects import json_page
+from catseye.gateways.written import Files, origin, write_files
 from catseye.optics import coating
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import Folder
@@ -235,27 +234,14 @@ def write_beam(found: BeamPath, directory: Path, inputs: dict[str, str]) -> None
     directory   exists, and is ours to fill: see `output.whole_directory`
     inputs      hashes of what was read
     """
-    files: dict[str, Callable[[], str]] = {
+    files: Files = {
         "beam.csv": lambda: _places_csv(found),
         "returned.csv": lambda: _returned_csv(found),
         "beam.json": lambda: json_page(beam_object(found)),
         "beam.svg": lambda: beam_figure(found),
     }
-    outputs = {}
-    for name, text in files.items():
-        raw = text().encode("utf-8")
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-        (directory / name).write_bytes(raw)
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye beam",
-        "when_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": versions(),
-        "settings": {"distance_m": found.train.distance_m},
-        "inputs_sha256": inputs,
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+    made = {"format": FORMAT, "made_by": "catseye beam", "settings": {"distance_m": found.train.distance_m}}
+    write_files(files, directory, {**made, **origin(datetime.now(UTC), inputs)})
 
 
 def _places_csv(found: BeamPath) -> str:

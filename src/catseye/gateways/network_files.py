@@ -1,7 +1,7 @@
 """All files of an adjusted network, or of two epochs compared, written into a directory."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,14 +12,11 @@ from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_objects import FORMAT, network_json
 from catseye.gateways.network_tables import coordinates_csv, observations_csv, parameters_csv
 from catseye.gateways.network_xml import network_xml
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE
+from catseye.gateways.objects import json_page
+from catseye.gateways.written import Files, Progress, origin, write_files
 
 if TYPE_CHECKING:
     from catseye.reduction.networks import Adjusted
-
-Progress = Callable[[str, int, int], None]  # what is being done, steps done, steps in all
-Files = dict[str, Callable[[], Iterable[str]]]  # pieces of text by the file's name
 
 
 def input_hashes(source: Path) -> dict[str, str]:
@@ -49,7 +46,7 @@ def write_network(
     """
     when = datetime.now(UTC)
     made = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(found)}
-    _write(_files(found, when, inputs, treated=treated), directory, {**made, **_origin(when, inputs)}, progress)
+    write_files(_files(found, when, inputs, treated=treated), directory, {**made, **origin(when, inputs)}, progress)
 
 
 def write_comparison(
@@ -81,15 +78,11 @@ def write_comparison(
         "variance_factor": compared.variance_factor.value,
     }
     made = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
-    _write(files, directory, {**made, **_origin(when, inputs)}, progress)
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
 
 
 def _settings(found: Findings) -> dict[str, Any]:
     return {"level": found.level, "scaled": found.scaled, "test": found.test, "datum": found.solution.datum}
-
-
-def _origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
-    return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
 
 
 def _files(
@@ -111,21 +104,3 @@ def _files(
         "report.html": lambda: [network_report(found, when, inputs, prefix=prefix, treated=treated)],
     }
     return {prefix + name: pieces for name, pieces in files.items()}
-
-
-def _write(files: Files, directory: Path, provenance: dict[str, Any], progress: Progress | None) -> None:
-    """Piece by piece, so that a large network needs no more memory than its columns."""
-    outputs: dict[str, str] = {}
-    for done, (name, pieces) in enumerate(files.items()):
-        if progress is not None:
-            progress(f"writing {name}", done, len(files))
-        digest = hashlib.sha256()
-        with (directory / name).open("wb") as stream:
-            for piece in pieces():
-                raw = piece.encode("utf-8")
-                digest.update(raw)
-                stream.write(raw)
-        outputs[name] = digest.hexdigest()
-    (directory / PROVENANCE).write_bytes(json_page({**provenance, "outputs": outputs}).encode("utf-8"))
-    if progress is not None:
-        progress("writing", len(files), len(files))

@@ -1,6 +1,5 @@
 """A planned network as JSON, CSV and a report: what it will be worth, where it is weak, what to measure next."""
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -18,10 +17,10 @@ from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_objects import network_object
 from catseye.gateways.network_summary import direction_words, quantity
 from catseye.gateways.network_tables import coordinates_csv
-from catseye.gateways.objects import json_page, plain, versions
-from catseye.gateways.output import PROVENANCE
+from catseye.gateways.objects import json_page, plain
 from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.summary import Passage
+from catseye.gateways.written import Files, origin, write_files
 
 FORMAT = "catseye-plan-1"
 LISTED = 10  # weakest points, and observations that hold most, in text and report
@@ -313,25 +312,11 @@ def write_plan(
 ) -> None:
     """Report, tables and object of a plan, and last the provenance with the hashes of the others."""
     when = datetime.now(UTC)
-    files: dict[str, Callable[[], str]] = {
+    files: Files = {
         "report.html": lambda: plan_report(told, when, inputs),
         "points.csv": lambda: "".join(coordinates_csv(told.found)),
         "candidates.csv": lambda: "".join(candidates_csv(told)),
         "plan.json": lambda: json_page(plan_object(told)),
     }
-    outputs: dict[str, str] = {}
-    for done, (name, text) in enumerate(files.items()):
-        if progress is not None:
-            progress(f"writing {name}", done, len(files))
-        raw = text().encode("utf-8")
-        (directory / name).write_bytes(raw)
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye plan",
-        "when_utc": when.isoformat(timespec="seconds"),
-        "versions": versions(),
-        "inputs_sha256": dict(inputs),
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+    made = {"format": FORMAT, "made_by": "catseye plan"}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)

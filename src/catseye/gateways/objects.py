@@ -206,11 +206,8 @@ def pose_object(reduction: "Reduction") -> dict[str, Any]:
     }
 
 
-def provenance_object(reduction: "Reduction", when: datetime, outputs: dict[str, str]) -> dict[str, Any]:
-    """What went in, what came out, by which programs, under which assumptions, when.
-
-    outputs   SHA-256 of each file written, by its name
-    """
+def provenance_object(reduction: "Reduction", when: datetime) -> dict[str, Any]:
+    """What went in, by which programs, under which assumptions, when; `written.write_files` adds what came out."""
     campaign = reduction.campaign
     return {
         "format": FORMAT,
@@ -226,7 +223,6 @@ def provenance_object(reduction: "Reduction", when: datetime, outputs: dict[str,
         "settings": asdict(reduction.settings),
         "inputs_sha256": campaign.hashes,
         "certificates": certificates(campaign),
-        "outputs": outputs,
     }
 
 

@@ -1,7 +1,6 @@
 """A refractometer path as objects, text, table, figure and page."""
 
 import csv
-import hashlib
 import io
 from collections import Counter
 from collections.abc import Callable
@@ -15,8 +14,8 @@ import numpy as np
 from catseye.constants import PPM, TWO_PI
 from catseye.gateways.baseline_objects import Passage
 from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE
 from catseye.gateways.page import card, page, paragraph, picture, section, table
+from catseye.gateways.written import Files, origin, write_files
 from catseye.reduction.refractometer import phase_slope
 from catseye.reduction.refractometer_calibration import STATUS
 from catseye.signal.cycles import CycleStatus
@@ -307,26 +306,12 @@ def write_refractometer(
     progress    told of each file
     """
     when = datetime.now(UTC)
-    files: dict[str, Callable[[], str]] = {
+    files: Files = {
         "group_index.csv": lambda: series_csv(found),
         "refractometer.json": lambda: json_page(refractometer_object(found)),
         "night.svg": lambda: refractometer_figures(found)["night"],
         "report.html": lambda: refractometer_report(found, when),
     }
-    outputs = {}
-    for done, (name, text) in enumerate(files.items()):
-        if progress is not None:
-            progress(f"writing {name}", done, len(files))
-        raw = text().encode("utf-8")
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-        (directory / name).write_bytes(raw)
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye refractometer",
-        "when_utc": when.isoformat(timespec="seconds"),
-        "versions": versions(),
-        "sheet": found.readings.sheet.model_dump(mode="json", exclude_none=True),
-        "inputs_sha256": found.readings.hashes,
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+    sheet = found.readings.sheet.model_dump(mode="json", exclude_none=True)
+    made = {"format": FORMAT, "made_by": "catseye refractometer", "sheet": sheet}
+    write_files(files, directory, {**made, **origin(when, found.readings.hashes)}, progress)

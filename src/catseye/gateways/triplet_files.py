@@ -1,20 +1,20 @@
 """All files of the calibration of some triplets: a sheet each as text, page and object, and one table of all."""
 
 import csv
-import hashlib
 import io
 import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
 from catseye.gateways.certificate_record import FORMAT
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import PROVENANCE
+from catseye.gateways.objects import json_page
 from catseye.gateways.triplet_objects import triplet_object
 from catseye.gateways.triplet_sheet import html_sheet, text_sheet
+from catseye.gateways.written import origin, write_files
 from catseye.reduction.triplet import TripletReduction
 
 COLUMNS = (
@@ -41,29 +41,19 @@ def write_triplets(
     """
     refuse_namesakes(list(units))
     when = datetime.now(UTC)
-    outputs = {}
+    files: dict[str, Callable[[], str]] = {}
+    for path, found in units.items():
+        files[f"{path.stem}.txt"] = partial(text_sheet, found, path.name)
+        files[f"{path.stem}.html"] = partial(html_sheet, found, path.name, when, hashes[path])
+        files[f"{path.stem}.json"] = partial(_object_page, found, path.name)
+    files["triplets.csv"] = lambda: triplets_csv({path.name: found for path, found in units.items()})
+    made = {"format": FORMAT, "made_by": "catseye triplet"}
+    inputs = {path.name: hashes[path] for path in units}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
 
-    def write(name: str, text: str) -> None:
-        raw = text.encode("utf-8")
-        outputs[name] = hashlib.sha256(raw).hexdigest()
-        (directory / name).write_bytes(raw)
 
-    for done, (path, found) in enumerate(units.items()):
-        if progress is not None:
-            progress(f"writing {path.stem}", done, len(units))
-        write(f"{path.stem}.txt", text_sheet(found, path.name))
-        write(f"{path.stem}.html", html_sheet(found, path.name, when, hashes[path]))
-        write(f"{path.stem}.json", json_page(triplet_object(found, path.name)))
-    write("triplets.csv", triplets_csv({path.name: found for path, found in units.items()}))
-    provenance = {
-        "format": FORMAT,
-        "made_by": "catseye triplet",
-        "when_utc": when.isoformat(timespec="seconds"),
-        "versions": versions(),
-        "inputs_sha256": {path.name: hashes[path] for path in units},
-        "outputs": outputs,
-    }
-    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
+def _object_page(found: TripletReduction, name: str) -> str:
+    return json_page(triplet_object(found, name))
 
 
 def refuse_namesakes(paths: list[Path]) -> None:

@@ -1,0 +1,47 @@
+"""The files of a result, written one by one, and last the provenance with the hashes of all."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from catseye.gateways.objects import json_page, versions
+from catseye.gateways.output import PROVENANCE
+
+Files = Mapping[str, Callable[[], str | Iterable[str]]]
+Progress = Callable[[str, int, int], None]
+
+
+def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
+    """When and by what a result was made, and from which files.
+
+    when     UTC
+    inputs   SHA-256 of each file read, by its name
+    """
+    return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
+
+
+def write_files(files: Files, directory: Path, provenance: Mapping[str, Any], progress: Progress | None = None) -> None:
+    """Each file as text or piece by piece, so that a large one needs no more memory than its columns.
+
+    files        name -> what gives its text, in the order of writing
+    directory    exists, and is ours to fill: see `output.whole_directory`
+    provenance   what is said of them: at least `format`; their hashes are added
+    progress     told of each file
+    """
+    outputs: dict[str, str] = {}
+    for done, (name, made) in enumerate(files.items()):
+        if progress is not None:
+            progress(f"writing {name}", done, len(files))
+        digest = hashlib.sha256()
+        text = made()
+        with (directory / name).open("wb") as stream:
+            for piece in (text,) if isinstance(text, str) else text:
+                raw = piece.encode("utf-8")
+                digest.update(raw)
+                stream.write(raw)
+        outputs[name] = digest.hexdigest()
+    (directory / PROVENANCE).write_bytes(json_page({**provenance, "outputs": outputs}).encode("utf-8"))
+    if progress is not None:
+        progress("writing", len(files), len(files))
