@@ -41,6 +41,21 @@ def test_several_files_give_a_list_in_their_order(catseye):
     assert [each["accepted"] for each in told(said)] == [False, True]
 
 
+def test_one_file_twice_is_told_twice(catseye):
+    status, said, complaint = catseye(ONE, ONE, "--json")
+    assert (status, complaint) == (0, "")
+    assert [each["triplet"] for each in told(said)] == ["TR99", "TR99"]
+
+
+def test_a_sheet_with_the_name_of_the_provenance_is_refused(catseye, tmp_path):
+    sheet = tmp_path / "provenance.toml"
+    sheet.write_bytes(ONE.read_bytes())
+    status, _, complaint = catseye(sheet, "--out", tmp_path / "sheets")
+    assert status == 1
+    assert "provenance.json" in complaint
+    assert not (tmp_path / "sheets").exists()
+
+
 def test_a_unit_out_of_tolerance_is_an_answer_not_a_failure(catseye):
     status, said, complaint = catseye(BAD)
     assert (status, complaint) == (0, "")

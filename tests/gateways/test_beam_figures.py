@@ -61,3 +61,5 @@ def test_the_coating_figure_tells_reflectance_and_range():
     assert told["dielectric_s_range"] == pytest.approx(0.61e-6, abs=0.01e-6)
     with pytest.raises(ValidityError, match="copper"):
         coating_plot(("copper",))
+    with pytest.raises(ValidityError, match="at most 6"):
+        coating_plot(("gold",) * 7)

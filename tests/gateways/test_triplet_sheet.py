@@ -180,3 +180,29 @@ def test_the_table_of_several_units(found):
     assert float(rows[0]["h_corr_mm"]) == pytest.approx(found.h_corr * 1e3, abs=1e-6)
     assert rows[1]["p"] == ""
     assert rows[0]["accepted"] == "yes"
+
+
+def test_a_text_sheet_of_one_placement_has_no_nan_and_no_word_cut_off():
+    own = document()["placement"][0] | {"phi_bcfp_rad": 3.9}
+    text = text_sheet(reduce_triplet(measurement(placement=[own])), "T.toml")
+    assert not re.search(r"\bnan\b", text)
+    (status,) = re.findall(r"^status +(.+)$", text, re.MULTILINE)
+    assert status == "cycles doubted"
+
+
+def test_a_calibration_phase_of_the_flip_is_on_the_sheet():
+    found = reduce_triplet(measurement(placement__0__phi_cal_flipped_rad=1.25))
+    assert triplet_object(found, "T.toml")["Phi_Cal_fp"] == [1.25, 1.1, 1.1]
+    assert "Φ_Cal fp" in text_sheet(found, "T.toml")
+
+
+def test_a_unit_without_an_answer_says_unknown():
+    """Three metres away and a metre aside, prisms 100 mm apart that seem 93 mm nearer and farther: no triangle."""
+    own = document()["placement"][0] | {"d_toppl_mm": 3000.0, "h_s_mm": 1000.0, "phi_1_rad": 0.318, "phi_2_rad": 0.218}
+    found = reduce_triplet(measurement(placement=[own], d12_mm=100.0))
+    assert found.status == ("no triangle: left out",)
+    text, html = text_sheet(found, "T.toml"), html_sheet(found, "T.toml", datetime.now(UTC), "0" * 64)
+    assert "H_corr      unknown, u –" in text
+    assert not re.search(r"\bnan\b", text)
+    assert not re.search(r"[+>]nan\b", html)
+    assert not found.accepted

@@ -58,6 +58,27 @@ def test_a_spot_is_the_mean_of_drawn_light():
     assert spot_response(90e-6, 40e-6, SLOW) == pytest.approx(mean, abs=2e-3)
 
 
+@pytest.mark.parametrize(("offset", "spot"), [(0.0, 0.2e-3), (0.1e-3, 0.3e-3), (0.0, 1e-3), (0.2e-3, 20e-3)])
+def test_light_that_the_rim_cuts_is_summed_over_the_disc(offset, spot):
+    node, weight = np.polynomial.legendre.leggauss(80)
+    r, turn = 0.5 * SLOW.radius * (node + 1.0)[:, None], (np.arange(128) + 0.5) * TWO_PI / 128
+    square = r**2 + offset**2 - 2.0 * r * offset * np.cos(turn)
+    light = 2.0 / np.pi / spot**2 * np.exp(-2.0 * square / spot**2) * r * place_response(r, SLOW)
+    summed = np.sum(0.5 * SLOW.radius * weight[:, None] * light) * TWO_PI / 128
+    assert spot_response(offset, spot, SLOW) == pytest.approx(summed, rel=1e-8)
+
+
+def test_even_light_on_the_whole_disc_is_late_by_half_of_what_the_middle_is():
+    quick = Photodiode(radius=0.25e-3, sheet_resistance=1.0, capacitance=1e-12)
+    assert spot_range(0.0, 1.0, quick) == pytest.approx(0.5 * spot_range(0.0, 1e-6, quick), rel=1e-3)
+
+
+def test_a_spot_beside_the_disc_has_no_range_and_a_phase_that_goes_round_is_refused():
+    assert np.isnan(spot_range(1e-3, 10e-6, DIODE))
+    with pytest.raises(ValidityError, match="more than half a turn"):
+        spot_range(0.0, 10e-6, Photodiode(radius=0.25e-3, sheet_resistance=1e4, capacitance=1e-11))
+
+
 def test_light_in_the_middle_comes_later_and_light_beside_the_disc_does_not_count():
     ranges = spot_range(np.array([0.0, 50e-6, 100e-6, 150e-6]), 10e-6, DIODE)
     assert np.all(np.diff(ranges) < 0.0)

@@ -164,3 +164,18 @@ def test_a_disc_that_stops_nothing_changes_nothing_not_even_for_cylinders():
     assert three[1] == pytest.approx(three[0], abs=2e-3)  # the edge's rings reach past any disc
     assert three[2] == pytest.approx(two[1], abs=2e-3)
     assert two[1] < 0.8 * two[0]
+
+
+@pytest.mark.parametrize(
+    ("aperture", "ratio"), [(1.0, 30.0), (30.0, 30.0), (100.0, 100.0), (3000.0, 1000.0), (0.5, 3.0)]
+)
+def test_the_share_of_a_very_flat_beam_is_an_integral_over_strips(aperture, ratio):
+    from scipy.special import ndtr
+
+    edge = np.linspace(-min(aperture, 4.0), min(aperture, 4.0), 200_001)
+    middle = 0.5 * (edge[1:] + edge[:-1])
+    strip = np.diff(ndtr(2.0 * edge))  # of the narrow axis, radius 1
+    expected = np.sum(strip * (2.0 * ndtr(2.0 * np.sqrt(aperture**2 - middle**2) / ratio) - 1.0))
+    assert share_within_ellipse(aperture, 1.0, ratio) == pytest.approx(expected, rel=1e-7)
+    assert share_within_ellipse(aperture, ratio, 1.0) == pytest.approx(expected, rel=1e-7)
+    assert share_within_ellipse([0.0, np.inf], 1.0, ratio).tolist() == pytest.approx([0.0, 1.0], abs=1e-12)

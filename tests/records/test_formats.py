@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from catseye.errors import InputError
+from catseye.records.beam import BeamTrain
 from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import Mirror, MirrorGeometry
 from catseye.records.monument import Monument, MonumentGeometry
@@ -42,6 +43,7 @@ RECORDS: dict[str, type[Record]] = {
     "triplet-measurement-1.toml": TripletMeasurement,
     "acoustic-1.toml": AcousticSheet,
     "refractometer-1.toml": PathSheet,
+    "beam-1.toml": BeamTrain,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (Benchmark, 6),

@@ -128,6 +128,13 @@ def test_readings_of_the_flip_repeat_those_before_it_where_there_are_none():
             "humidity_percent = 470.0",
             "placement[0].humidity_percent = 470.0 (expected 0 to 100)",
         ),
+        (
+            "humidity_percent = 47.0",
+            "humidity_percent = 0.47",
+            "placement[0].humidity_percent = 0.47 (expected 0 or 1 to 100 %; it looks like a share of one, which would "
+            "be 47 %)",
+        ),
+        ("serial = 101", "serial = -101", "left_prism.serial = -101 (expected"),
         ("modulation_hz = 1500000000.0", "modulation_hz = 1500.0", "modulation_hz = 1500.0 looks like megahertz"),
         ("wavelength_um = 0.780", "wavelength_um = 780.0", "wavelength_um = 780.0 looks like nanometres"),
         ("u_phase_rad = 0.0008", "u_phase_rad = 0.0", "u_phase_rad = 0.0 (expected above 0 to 1)"),
@@ -157,7 +164,7 @@ def test_readings_of_the_flip_repeat_those_before_it_where_there_are_none():
             "spacer_mm = 1.0",
             "placement[1].spacer_mm = 1.0 with d_toppl_mm = 18124.6 puts the stops -24.4 mm from where the first",
         ),
-        ("spacer_mm = 25.4", "spacer_mm = 1.0", "other stops are another file; the spacer looks like inches)"),
+        ("spacer_mm = 25.4", "spacer_mm = 1.0", "the spacer looks like inches)"),
         ('air_model = "rueger1990"', 'air_model = "edlen"', "air_model = 'edlen' (expected"),
         ("measured_on = 2003-05-14", "", "measured_on is missing"),
         ("[ball]", "[ball]\nr3_mm = 1.0", "ball.r3_mm = 1.0 is not a known key"),

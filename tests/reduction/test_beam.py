@@ -8,6 +8,7 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.optics import coating, gaussian_beam
+from catseye.optics.detector import Photodiode, spot_range
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import read_record
 from catseye.reduction.beam import beam_profile, reduce_beam
@@ -57,7 +58,8 @@ def test_power_is_what_is_left_by_each_place(head):
     mirror = next(p for p in head.places if p.name == "steering mirror, out")
     before = head.places[head.places.index(mirror) - 1]
     made = coating.named("protected-aluminium", 0.78, np.pi / 4)
-    shown = float(coating.response(made, 0.78, np.pi / 4, polarization="p").reflectance)
+    # the isolator's second polarizer stands at 45 degrees: half of the light is s, half p
+    shown = np.mean([coating.response(made, 0.78, np.pi / 4, polarization=p).reflectance for p in "sp"])
     assert mirror.power / before.power == pytest.approx(shown * (1.0 - mirror.clipped))
     isolator = next(p for p in head.places if p.name == "isolator")
     before = head.places[head.places.index(isolator) - 1]
@@ -95,10 +97,21 @@ def test_the_detector_stands_in_the_focus(head):
 
 def test_a_mirror_that_is_met_twice_adds_its_group_path(head):
     made = coating.named("protected-aluminium", 0.78, np.pi / 4)
-    path = float(coating.group_path(made, 0.78, np.pi / 4, polarization="p"))
+    paths = [float(coating.group_path(made, 0.78, np.pi / 4, polarization=p)) for p in "sp"]
+    weights = [float(coating.response(made, 0.78, np.pi / 4, polarization=p).reflectance) for p in "sp"]
+    path = np.average(paths, weights=weights)
     both = [v for name, v in head.range_effects.items() if name.startswith("coating")]
     assert sum(both) == pytest.approx(path)
     assert 0.3e-6 < path < 1e-6
+
+
+def test_without_an_isolator_the_field_stays_where_the_laser_has_it_and_two_turn_it_right_across():
+    mirror = {"kind": "mirror", "coating": "protected-aluminium", "incidence_deg": 45.0, "plane": "x"}
+    made = coating.named("protected-aluminium", 0.78, np.pi / 4)
+    for number, polarization in ((0, "p"), (2, "s")):
+        found = reduce_beam(plain(outward=[{"kind": "isolator"}] * number + [mirror], distances_m=[120.0]))
+        path = float(coating.group_path(made, 0.78, np.pi / 4, polarization=polarization))
+        assert found.range_effects["coating of mirror"] == pytest.approx(0.5 * path, rel=1e-9)
 
 
 def test_the_lens_reads_short_and_more_so_for_a_wider_beam(head):
@@ -117,8 +130,39 @@ def test_the_lens_reads_short_and_more_so_for_a_wider_beam(head):
 def test_an_image_off_the_middle_reads_short(head):
     off = head.range_effects["image off the middle"]
     k = 0.5 * SPEED_OF_LIGHT * 50.0 * 0.5e-12 / (4.0 * np.pi * 1e-4**2)
-    assert off == pytest.approx(-k * 10e-6**2, rel=0.01)
+    # the mean of the squared distance of a place known to u is d^2 + 2 u^2
+    assert off == pytest.approx(-k * (10e-6**2 + 2.0 * 5e-6**2), rel=0.01)
     assert head.u_image == pytest.approx(2.0 * k * 5e-6 * np.hypot(10e-6, 5e-6), rel=1e-9)
+
+
+def test_an_uncertain_place_shifts_the_range_by_what_drawn_places_shift_it(head):
+    diode = Photodiode(radius=1e-4, sheet_resistance=50.0, capacitance=0.5e-12)
+    places = np.hypot(*(np.random.default_rng(6).normal(scale=5e-6, size=(2, 20_000)) + np.array([[10e-6], [0.0]])))
+    spot = float(np.sqrt(np.mean(head.places[-1].radius ** 2)))
+    drawn = np.mean(spot_range(places, spot, diode)) - spot_range(0.0, spot, diode)
+    assert head.range_effects["image off the middle"] == pytest.approx(drawn, rel=0.02)
+
+
+def test_two_isolators_hold_back_what_each_does(head):
+    one, two = (reduce_beam(plain(outward=[{"kind": "isolator", "turn_deg": 44.0}] * n)).laser for n in (1, 2))
+    for key in ("isolation_db", "worst_isolation_db"):
+        assert two[key] == pytest.approx(2.0 * one[key])
+
+
+def test_a_lens_that_stops_most_of_the_light_makes_an_airy_disc_on_the_detector():
+    from scipy.special import j0, j1
+
+    inward = [
+        {"kind": "lens", "focal_length_mm": 200.0, "aperture_radius_mm": 2.0},
+        {"kind": "space", "length_mm": 200.0},
+    ]
+    wide = {"power_mw": 1.0, "waist_x_um": 40_000.0, "waist_y_um": 40_000.0}
+    small = {"radius_mm": 0.02}
+    row = reduce_beam(plain(laser=wide, reflector={"radius_mm": 200.0}, inward=inward, detector=small)).returned[0]
+    x = 2.0 * np.pi / LIGHT * 0.002 * 20e-6 / 0.2
+    lit = -np.expm1(-2.0 * (2.0 / 40.0) ** 2)
+    assert row.status == "ok"
+    assert row.collected == pytest.approx(lit * (1.0 - j0(x) ** 2 - j1(x) ** 2), rel=2e-3)
 
 
 def test_less_isolation_moves_a_range_more(head):
@@ -138,6 +182,10 @@ def test_less_isolation_moves_a_range_more(head):
 def test_what_diffraction_cannot_follow_is_a_status_and_not_an_exception():
     found = reduce_beam(plain(reflector={"radius_mm": 18.0}, distances_m=[2.0, 120.0]))
     near, far = found.returned
+    assert found.status == "ok"
+    here = reduce_beam(plain(reflector={"radius_mm": 18.0}, distance_m=2.0))
+    assert here.status == near.status
+    assert np.isnan(here.places[-1].clipped)
     assert "more than is followed" in near.status
     assert np.isnan(near.power)
     assert far.status == "ok"

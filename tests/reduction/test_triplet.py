@@ -281,3 +281,65 @@ def test_a_random_unit_is_reduced_as_its_truth_within_its_uncertainty():
     sheet, truth = noisy_unit(np.random.default_rng(3))
     found = reduce_triplet(sheet)
     assert abs(found.h_corr - truth) < 4.0 * found.u_h_corr
+
+
+def test_a_placement_written_twice_is_told_and_does_not_break_the_weights():
+    """Nothing but the phases differs between placements here, and they are the same."""
+    own = document()["placement"][0]
+    quiet = {f"u_{key}": 0.0 for key in ("temperature_c", "pressure_hpa", "humidity_percent")}
+    found = reduce_triplet(measurement(placement=[own, own], **quiet))
+    np.testing.assert_allclose(found.weights, 0.5)
+    assert found.h_corr == pytest.approx(-23e-6, abs=2e-9)
+    assert any("placement 2 repeats the phases of placement 1" in note for note in found.notes)
+    assert not any("repeats" in note for note in reduce_triplet(measurement()).notes)
+
+
+def test_equal_digits_are_no_proof_of_one_reading_where_they_are_few():
+    """In steps of 1 mrad with 0.8 mrad of noise a second reading of the reference is often the same."""
+    names = ("phi_1_rad", "phi_2_rad", "phi_bcfp_rad")
+    few = document()["placement"]
+    for each in few:
+        each.update({name: round(each[name], 3) for name in names})
+    fine, coarse = reduced("TR99"), reduce_triplet(measurement(placement=few))
+    # a half each of two prisms and the ball, one reference for the prisms in all, one for the ball in each flip
+    one = 0.0008 / (2 * np.pi) * half_wavelengths(fine.readings)[0][0]
+    assert fine.budget["phases"] == pytest.approx(one * np.sqrt(1.5 / 3), rel=1e-3)
+    assert coarse.budget["phases"] > one * np.sqrt(3.5 / 3)
+    once = [{k: v for k, v in each.items() if k != "phi_zrg_flipped_rad"} for each in few]
+    assert reduce_triplet(measurement(placement=once)).budget["phases"] == pytest.approx(
+        fine.budget["phases"], rel=1e-3
+    )
+
+
+def test_what_the_memos_index_leaves_out_is_told():
+    (note,) = [note for note in reduced("TR99").notes if "as against vacuum" in note]
+    # 4.30e-4 of the ratio times 124.6 and 108.1 mm
+    assert "1.52750" in note
+    assert "H_corr would be -54 µm and the difference -47 µm more" in note
+    told = reduce_triplet(measurement(bk7_group_index=1.527892)).notes
+    assert not any("as against vacuum" in note for note in told)
+
+
+def test_no_index_of_glass_is_offered_for_a_whole_cycle():
+    text = " ".join(reduce_triplet(measurement(placement=document()["placement"][:1], d12_mm=500.0)).notes)
+    assert "ranging and surface plate differ by" in text
+    assert "would join them" not in text
+    near = reduce_triplet(measurement(ball__r1_mm=50.0626, ball__pc_b_mm=-173.741529))  # 50 um: 7e-4 of the ratio
+    assert any("would join them" in note for note in near.notes)
+
+
+def test_a_barometer_in_millimetres_of_mercury_is_suspected():
+    low = measurement(placement__1__pressure_hpa=698.3, placement__1__pressure_flipped_hpa=698.3)
+    assert [note for note in reduce_triplet(low).notes if "931.0 hPa is meant" in note] != []
+    assert not any("mercury" in note for note in reduced("TR99").notes)
+
+
+def test_the_memos_integers_182_182_184():
+    """Section 3.4: all three by INT of a D_TOPPL between 18.209 and 18.249 m; phases above the reference add one."""
+    pc, pc_b, half = 33.493677, 173.715175, 99.905619
+    assert [int((18230.0 + each) / half) for each in (pc, pc_b)] == [182, 184]
+    phases = dict.fromkeys(("phi_zrg_rad", "phi_zrg_flipped_rad", "phi_cal_rad"), 3.0)
+    phases |= dict.fromkeys(("phi_1_rad", "phi_2_rad", "phi_bcfp_rad"), 1.0)
+    own = document()["placement"][0] | {"d_toppl_mm": 18230.0} | phases
+    memo = reduce_triplet(measurement(placement=[own])).memo
+    assert [int(n[0]) for n in (memo.n_1, memo.n_2, memo.n_bc)] == [182, 182, 184]

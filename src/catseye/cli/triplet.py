@@ -12,6 +12,8 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 if TYPE_CHECKING:
     from catseye.reduction.triplet import TripletReduction
 
+    Units = list[tuple[Path, TripletReduction]]
+
 
 @app.command(
     epilog="\b\nExample: catseye triplet examples/triplets/TR99.toml\n"
@@ -44,10 +46,10 @@ def triplet(
         _tell(units, out, blank)
 
 
-def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "dict[Path, TripletReduction]":
-    """Every sheet read and reduced; with an `out`, written whole or not at all."""
+def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
+    """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
     if not files:
-        return {}
+        return []
     from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.triplet_files import refuse_namesakes, write_triplets
     from catseye.records.reading import Folder
@@ -59,17 +61,17 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "dict[Path, Tr
         for path in files:
             refuse_output(out, path)
     progress = ProgressLine(quiet)
-    units: dict[Path, TripletReduction] = {}
+    units: Units = []
     hashes: dict[Path, str] = {}
     try:
         for done, path in enumerate(files):
             progress("reducing", done, len(files))
             folder = Folder(path.parent)
-            units[path] = reduce_triplet(folder.record(path.name, TripletMeasurement))
+            units.append((path, reduce_triplet(folder.record(path.name, TripletMeasurement))))
             hashes[path] = folder.hashes[path.name]
         if out is not None:
             with whole_directory(out, files[0]) as directory:
-                write_triplets(units, directory, hashes, progress)
+                write_triplets(dict(units), directory, hashes, progress)
     finally:
         progress.clear()
     return units
@@ -83,23 +85,23 @@ def _write_blank(path: Path) -> None:
         pieces.append(blank_form())
 
 
-def _say_objects(units: "dict[Path, TripletReduction]") -> None:
+def _say_objects(units: "Units") -> None:
     """One object, or a list of them for several files."""
     from catseye.gateways.objects import json_line
     from catseye.gateways.triplet_objects import triplet_object
 
-    told = [triplet_object(found, path.name) for path, found in units.items()]
+    told = [triplet_object(found, path.name) for path, found in units]
     say(json_line(told[0] if len(told) == 1 else told))
 
 
-def _tell(units: "dict[Path, TripletReduction]", out: Path | None, blank: Path | None) -> None:
+def _tell(units: "Units", out: Path | None, blank: Path | None) -> None:
     """The whole sheet of one unit; of several, what each comes to."""
     from catseye.gateways.triplet_sheet import text_sheet, verdict
 
     if len(units) == 1:
-        ((path, found),) = units.items()
+        ((path, found),) = units
         say(text_sheet(found, path.name).rstrip())
-    for path, found in units.items() if len(units) > 1 else ():
+    for path, found in units if len(units) > 1 else ():
         say(f"{path.name}: triplet {found.measurement.triplet}")
         for title, text in verdict(found):
             say(wrapped(title, text))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.errors import ValidityError
 from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.gateways.objects import json_page
 from catseye.gateways.written import Files, origin, write_files
@@ -147,10 +148,12 @@ def coating_plot(
 ) -> tuple[str, dict[str, Any]]:
     """Coating curves as SVG text, and reflectance and range at the angle that they are made for.
 
-    names           of `coating.named`; one that is not known raises ValidityError
+    names           of `coating.named`, at most 6; one that is not known raises ValidityError
     wavelength_um   um
     incidence       rad
     """
+    if len(names) > len(SERIES):
+        raise ValidityError(f"{len(names)} coatings for one figure (expected at most {len(SERIES)})")
     told: dict[str, Any] = {"wavelength_um": wavelength_um, "incidence": incidence}
     for name in names:
         made = coating.named(name, wavelength_um, incidence)
@@ -185,6 +188,7 @@ def beam_object(found: BeamPath) -> dict[str, Any]:
     return {
         "name": found.train.name,
         "distance": found.train.distance_m,
+        "status": found.status,
         "places": [{key: getattr(place, key) for key in keys} for place in found.places],
         "returned": [{key: getattr(row, key) for key in rows} for row in found.returned],
         "smallest": {"waist": found.smallest_waist[0], "radius": found.smallest_waist[1]},
@@ -212,6 +216,8 @@ def lines(found: BeamPath) -> Iterator[str]:
         edge, lost = _cell(place.aperture / MILLIMETRE, ".2f"), _cell(100.0 * place.clipped, ".3g")
         power = _cell(place.power * 1e3, ".4f")
         yield f"{place.leg:<9} {place.name:<24.24} {place.way:9.3f} {size} {front} {edge:>9} {lost:>9} {power:>9}"
+    if found.status != "ok":
+        yield f"not known behind the reflector: {found.status}"
     yield f"{'distance, m':<12} {'radius x, y, mm':>17} {'hits, %':>10} {'collected, %':>13} {'detector, mW':>13}"
     for row in found.returned:
         size = " ".join(f"{r / MILLIMETRE:8.3f}" for r in row.radius)

@@ -12,6 +12,7 @@ from typing import Any
 from catseye.errors import InputError
 from catseye.gateways.certificate_record import FORMAT
 from catseye.gateways.objects import json_page
+from catseye.gateways.output import PROVENANCE
 from catseye.gateways.triplet_objects import triplet_object
 from catseye.gateways.triplet_sheet import html_sheet, text_sheet
 from catseye.gateways.written import origin, write_files
@@ -37,7 +38,7 @@ def write_triplets(
     hashes      SHA-256 of each file
     progress    told of each file
 
-    Raises InputError where two sheets have one name.
+    Raises InputError where two sheets have one name, or one has the name of the provenance.
     """
     refuse_namesakes(list(units))
     when = datetime.now(UTC)
@@ -57,9 +58,11 @@ def _object_page(found: TripletReduction, name: str) -> str:
 
 
 def refuse_namesakes(paths: list[Path]) -> None:
-    """Two sheets of one name would write over each other, and one sheet twice is a slip."""
+    """Two sheets of one name would write over each other, one sheet twice is a slip; PROVENANCE is ours."""
     seen: dict[str, Path] = {}
     for path in paths:
+        if f"{path.stem}.json" == PROVENANCE:
+            raise InputError(f"{path}: {PROVENANCE} of --out would be written twice (expected a sheet of another name)")
         if path.stem in seen:
             raise InputError(
                 f"{path}: has the name of {seen[path.stem]} (expected sheets of different names for --out)"

@@ -17,11 +17,12 @@ from catseye.gateways.triplet_symbols import (
     point_places,
     symbol_values,
 )
-from catseye.reduction.triplet import TripletReduction
+from catseye.reduction.triplet import NOT_A_TRIANGLE, SLIPPED, TripletReduction
 
 TITLE = "Triplet calibration"
 SIDE_BY_SIDE = 3  # placements in one table
 WHOLE = "<style>.scroll { max-height: none; } td.w { min-width: 12rem; }</style>"  # a sheet is read and printed whole
+SHORT = {NOT_A_TRIANGLE: "no triangle", SLIPPED: "cycles doubted"}  # status in a column of the text
 PLACES = {"mm": 4, "rad": 6, "°C": 2, "hPa": 2, "%": 1}
 FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "HWLA": 6, "HWLA_fp": 6,
         "dPc_1": 7, "dPc_2": 7, "margin": 1}  # fmt: skip
@@ -29,14 +30,17 @@ FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "H
 
 def verdict(found: TripletReduction) -> list[tuple[str, str]]:
     """(title, text) of each paragraph about a calibration, for a terminal or the head of a page."""
-    h, u = found.h_corr * 1e3, found.u_h_corr * 1e3
+    u_h = _plain(found.u_h_corr * 1e3, ".4f")
     low, high = found.plate.paint or (math.nan, math.nan)
     lines = [
-        ("H_corr", f"{h:+.4f} mm, u {u:.4f}: ball's centre above the prisms' mid-point, towards the prism side"),
+        (
+            "H_corr",
+            f"{_signed(found.h_corr)}, u {u_h}: ball's centre above the prisms' mid-point, towards the prism side",
+        ),
         ("L_MPBC", f"{found.l_mpbc * 1e3:+.4f} mm, u {found.u_l_mpbc * 1e3:.4f}: the same from the surface plate"),
         (
             "Difference",
-            f"{found.difference * 1e3:+.4f} mm, u {found.u_difference * 1e3:.4f}; limit 0.15 mm: "
+            f"{_signed(found.difference)}, u {_plain(found.u_difference * 1e3, '.4f')}; limit 0.15 mm: "
             f"{'accepted' if found.accepted else 'NOT ACCEPTED'}, probability of conformity {_probability(found)}",
         ),
         ("Placements", _agreement(found)),
@@ -113,14 +117,18 @@ def text_sheet(found: TripletReduction, file: str) -> str:
         spacers = "".join(f"{p.spacer_mm:>15.3f}" for p in m.placement[rows])
         lines += [f"{'spacer':<14}{'mm':<5}{spacers}  spacer in front of the stops"]
         lines += [
-            f"{'u (H_corr)':<14}{'mm':<5}" + "".join(f"{u * 1e3:>15.4f}" for u in found.u[rows]) + "  of one placement",
-            f"{'w':<14}{'':<5}" + "".join(f"{w:>15.2f}" for w in found.statistics[rows]) + "  standardised residual",
-            f"{'status':<14}{'':<5}" + "".join(f"{s[:14]:>15}" for s in found.status[rows]),
+            f"{'u (H_corr)':<14}{'mm':<5}"
+            + "".join(f"{_plain(u * 1e3, '.4f'):>15}" for u in found.u[rows])
+            + "  of one placement",
+            f"{'w':<14}{'':<5}"
+            + "".join(f"{_plain(w, '.2f'):>15}" for w in found.statistics[rows])
+            + "  standardised residual",
+            f"{'status':<14}{'':<5}" + "".join(f"{SHORT.get(s, s):>15}" for s in found.status[rows]),
         ]
     lines += ["", "POINTS (mm from S: along the prisms, up, towards the ranger)"]
     for name, at in point_places(found).items():
         for k, place in enumerate(at, start=1):
-            shown = "".join(f"{1e3 * x:>15.4f}" for x in place)
+            shown = "".join(f"{_plain(1e3 * x, '.4f'):>15}" for x in place)
             lines.append(f"{name if k == 1 else '':<13}no.{k:>3}{shown}  {POINTS[name] if k == 1 else ''}".rstrip())
     return "\n".join(lines) + "\n"
 
@@ -170,11 +178,11 @@ def html_sheet(found: TripletReduction, file: str, when: datetime, digest: str) 
 
 
 def _cards(found: TripletReduction) -> Iterator[str]:
-    yield card("H_corr", f"{found.h_corr * 1e3:+.4f} mm", f"u = {found.u_h_corr * 1e3:.4f} mm, by ranging")
+    yield card("H_corr", _signed(found.h_corr), f"u = {_plain(found.u_h_corr * 1e3, '.4f')} mm, by ranging")
     yield card("L_MPBC", f"{found.l_mpbc * 1e3:+.4f} mm", f"u = {found.u_l_mpbc * 1e3:.4f} mm, surface plate")
     yield card(
         "accepted" if found.accepted else "NOT ACCEPTED",
-        f"{found.difference * 1e3:+.4f} mm",
+        _signed(found.difference),
         f"limit ± 0.15 mm; conformity {_probability(found)}",
     )
 
@@ -193,7 +201,7 @@ def _placement_tables(found: TripletReduction) -> Iterator[str]:
             values = symbol_values(s, found)
             shown = [cell(s, values[k if len(values) > 1 else 0]) for k in here]
             rows.append((s.shown, s.meaning, s.design or "–", *shown, s.unit or "–"))
-        rows.append(("u(H_corr)", "of one placement", "–", *(f"{found.u[k] * 1e3:.4f}" for k in here), "mm"))
+        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(found.u[k] * 1e3, ".4f") for k in here), "mm"))
         rows.append(("w", "standardised residual", "–", *(_plain(found.statistics[k], ".2f") for k in here), "–"))
         rows.append(("status", "", "", *(found.status[k] for k in here), ""))
         heads = [f"no. {k + 1}" for k in here]
@@ -202,6 +210,10 @@ def _placement_tables(found: TripletReduction) -> Iterator[str]:
 
 def _plain(value: float, form: str) -> str:
     return format(value, form) if math.isfinite(value) else "–"
+
+
+def _signed(value: float) -> str:
+    return f"{value * 1e3:+.4f} mm" if math.isfinite(value) else "unknown"
 
 
 def _paint(found: TripletReduction) -> str:
@@ -220,7 +232,7 @@ def _paint(found: TripletReduction) -> str:
 
 def _points(found: TripletReduction) -> str:
     rows = [
-        (name, POINTS[name], str(k), *(f"{1e3 * x:.4f}" for x in place))
+        (name, POINTS[name], str(k), *(_plain(1e3 * x, ".4f") for x in place))
         for name, at in point_places(found).items()
         for k, place in enumerate(at, start=1)
     ]

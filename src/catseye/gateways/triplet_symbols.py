@@ -87,7 +87,7 @@ UNIT = (
     Symbol("R_2", "R₂", "radius of its large ball-cap", "mm", lambda f: f.measurement.ball.r2_mm * 1e-3, "3.799 in"),
     Symbol("D_12", "D₁₂", "distance from T₁ to T₂", "mm", _reading("d_12"), "635.00"),
     Symbol("Pc_B", "Pc_B", "range constant of the ball's glass", "mm", lambda f: f.measurement.ball.pc_b_mm * 1e-3,
-           "≈ -173.7"),
+           "≈ -173.6"),  # as printed; its own radii and index give -173.7
     Symbol("Pc_T1", "Pc(T₁)", "range constant of the left prism, normal incidence", "mm",
            lambda f: f.measurement.left_prism.pc_mm * 1e-3, "≈ -33.5"),
     Symbol("Pc_T2", "Pc(T₂)", "range constant of the right prism, normal incidence", "mm",
@@ -136,6 +136,7 @@ PLACEMENT = (
     Symbol("Phi_Cal", "Φ_Cal", "phase of zero distance", "rad", _reading("phi_cal")),
     Symbol("Phi_BCfp", "Φ_BCfp", "phase, ball, after the flip", "rad", _reading("phi_bcfp")),
     Symbol("Phi_ZRG_fp", "Φ_ZRG fp", "phase, reference prism, after the flip", "rad", _reading("phi_zrg_fp")),
+    Symbol("Phi_Cal_fp", "Φ_Cal fp", "phase of zero distance, after the flip", "rad", _reading("phi_cal_fp")),
     Symbol("N_1", "N₁", "whole half wavelengths, scan point to T₁", "", _cycles("n_1"), "182"),
     Symbol("N_2", "N₂", "whole half wavelengths, scan point to T₂", "", _cycles("n_2"), "182"),
     Symbol("N_BC", "N_BC", "whole half wavelengths, scan point to BC, after the flip", "", _cycles("n_bc"), "184"),

@@ -19,7 +19,9 @@ from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-RINGS, TURNS = 48, 64  # of the quadrature over a spot
+RINGS = 64  # of the quadrature over a spot
+REACH = 3.5  # radii of a spot: exp(-24) of the light is beyond
+STEEPEST = 24.0  # w R C/pi: up to it the middle's phase is within half a turn of the rim's
 
 
 @dataclass(frozen=True)
@@ -78,20 +80,20 @@ def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, modulation_
     diode           the photodiode
     modulation_hz   Hz, above 0
 
-    Source: `place_response` averaged over the light; Gauss-Legendre along radii of the spot and the trapezium rule
-    around it, some 1e-6 where the rim does not cut the light.
+    Source: `place_response` averaged over the light, whose part on a circle about the middle is 4 r/w^2
+    exp(-2 (r - d)^2/w^2) times the scaled I0 of 4 r d/w^2; Gauss-Legendre from middle to rim, to 1e-9.
     """
     if not 0.0 < spot < np.inf:
         raise ValidityError(f"spot {spot} m is not above 0 and finite")
-    d = np.asarray(offset, dtype=float)[..., None, None]
+    from scipy.special import i0e
+
+    d = np.asarray(offset, dtype=float)[..., None]
+    low, high = np.maximum(d - REACH * spot, 0.0), np.minimum(d + REACH * spot, diode.radius)
+    half = 0.5 * np.maximum(high - low, 0.0)  # nothing where the light passes beside the disc
     node, weight = np.polynomial.legendre.leggauss(RINGS)
-    rho = 1.5 * spot * (node + 1.0)[:, None]  # to 3 radii: exp(-18) is beyond
-    light = 1.5 * weight[:, None] * 4.0 * rho / spot * np.exp(-2.0 * (rho / spot) ** 2) / TURNS
-    around = (np.arange(TURNS) + 0.5) * TWO_PI / TURNS
-    place = np.sqrt(np.maximum(d**2 + rho**2 + 2.0 * d * rho * np.cos(around), 0.0))
-    inside = place <= diode.radius
-    seen = place_response(np.where(inside, place, 0.0), diode, modulation_hz)
-    return np.sum(light * np.where(inside, seen, 0.0), axis=(-2, -1))
+    place = np.minimum(low + half * (node + 1.0), diode.radius)
+    light = 4.0 * place / spot**2 * np.exp(-2.0 * ((place - d) / spot) ** 2) * i0e(4.0 * place * d / spot**2)
+    return np.sum(half * weight * light * place_response(place, diode, modulation_hz), axis=-1)
 
 
 def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz: float = 1500e6) -> Array:
@@ -100,7 +102,8 @@ def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz:
     offset, spot, diode, modulation_hz   as for `spot_response`
 
     Longest in the middle; the difference to the reference's spot counts. For small delays c/2 R C/(4 pi a^2) (a^2 -
-    d^2 - w^2/2).
+    d^2 - w^2/2). NaN where no light falls on the disc. Raises ValidityError for a diode so slow that its phase goes
+    round, w R C/pi above 24.
 
     Source: the phase of `spot_response` by c/(4 pi f).
 
@@ -108,7 +111,14 @@ def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz:
     >>> [round(float(v) * 1e6) for v in spot_range([0.0, 50e-6, 100e-6], 20e-6, diode)]
     [1188, 1141, 997]
     """
-    turn = np.angle(spot_response(offset, spot, diode, modulation_hz))
+    steep = 4.0 * TWO_PI * modulation_hz * diode.delay_per_area * diode.radius**2
+    if not steep <= STEEPEST:
+        raise ValidityError(
+            f"a photodiode of {diode.sheet_resistance:g} ohm per square and {diode.capacitance:g} F turns the phase by "
+            f"more than half a turn at {modulation_hz:g} Hz (expected less resistance or capacitance)"
+        )
+    seen = spot_response(offset, spot, diode, modulation_hz)
+    turn = np.where(seen == 0.0, np.nan, np.angle(seen))
     return -turn * SPEED_OF_LIGHT / (2.0 * TWO_PI * modulation_hz)
 
 

@@ -36,9 +36,9 @@ class Laser(Record):
     power_mw                 mean
     waist_*_um               radius at 1/e^2
     divergence_*_deg         full angle at half maximum, as data sheets of diodes have it; instead of the waist
-    astigmatism_um           waist of x behind that of y, which stands at 0
+    astigmatism_um           by how much the waist of x lies deeper in the laser than that of y, which stands at 0
     quality_*                M^2
-    polarization             along which axis the field lies
+    polarization             along which axis the field lies; behind an isolator it is turned by 45 degrees
     back_reflection          share of the emitted power that comes back to the isolator, from all there is
     regulation_rad           phase for each unit of relative change of the power; see `signal.feedback`
     """
@@ -104,10 +104,11 @@ class Element(Record):
     @model_validator(mode="after")
     def _has_the_keys_of_its_kind(self) -> "Element":
         needed, welcome = KEYS[self.kind]
+        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in needed:
-            if key not in self.model_fields_set:
+            if key not in given:
                 raise broken_rule(f"{key} is missing (expected for kind = '{self.kind}')")
-        for key in sorted(self.model_fields_set - COMMON - set(needed) - set(welcome)):
+        for key in sorted(given - COMMON - set(needed) - set(welcome)):
             raise broken_rule(f"{key} = {getattr(self, key)!r} does not belong to kind = '{self.kind}'")
         for key in ("focal_length_mm", "r1_mm", "r2_mm", "radius_mm"):
             if getattr(self, key) == 0.0:
@@ -147,6 +148,15 @@ class Detector(Record):
     def _has_resistance_with_capacitance(self) -> "Detector":
         if (self.sheet_resistance_ohm is None) != (self.capacitance_pf is None):
             raise broken_rule("sheet_resistance_ohm and capacitance_pf go together (expected both or none)")
+        return self
+
+    @model_validator(mode="after")
+    def _has_its_image_on_it(self) -> "Detector":
+        if self.offset_um > self.radius_mm * 1e3:
+            raise broken_rule(
+                f"offset_um = {self.offset_um:g} is beside the disc (expected up to {self.radius_mm * 1e3:g}, as its "
+                "radius_mm says)"
+            )
         return self
 
 

@@ -20,12 +20,14 @@ KIND = "triplet-measurement"
 CONSTANT_MM = 0.05  # data sheet against its own height and index: a third of the 0.15 mm that the calibration decides
 REACH_MM = 20.0  # of a fiducial from the synthetic plane, and of d_toppl + spacer between placements of one set-up
 
-PRINTED = {"mm": "mm", "c": "°C", "hpa": "hPa", "rad": "rad"}
+A_TURN = 7.0  # rad: a phase somewhat beyond a turn is not in degrees
+PRINTED = {"percent": "%", "mm": "mm", "c": "°C", "hpa": "hPa", "rad": "rad"}
 # what a value outside its range becomes in the unit that the key asks for, if it was written in another
 MISTAKEN = {
     "mm": ((INCH_MM, 0.0, "inches"), (1e3, 0.0, "metres"), (304.8, 0.0, "feet"), (1e-3, 0.0, "micrometres")),
     "c": ((1.0, -273.15, "kelvin"), (5.0 / 9.0, -160.0 / 9.0, "degrees Fahrenheit")),
     "hpa": ((0.01, 0.0, "pascals"), (10.0, 0.0, "kilopascals"), (33.8639, 0.0, "inches of mercury")),
+    "percent": ((100.0, 0.0, "a share of one"),),
     "rad": ((math.pi / 180.0, 0.0, "degrees"),),
 }
 
@@ -34,42 +36,50 @@ MISTAKEN = {
 class Reading:
     """The range of a reading in its unit, and which other units to suspect of a value outside it.
 
-    unit        mm, c, hpa or rad
+    unit        mm, c, hpa, percent or rad
     low, high   both included, but a phase stays below `high`
+    zero        0 is welcome, too, below `low`
     """
 
     unit: str
     low: float
     high: float
+    zero: bool = False
 
     def check(self, value: float) -> float:
         inside = self.low <= value < self.high if self.unit == "rad" else self.low <= value <= self.high
-        if inside:
+        if inside or (self.zero and value == 0.0):
             return value
         unit = PRINTED[self.unit]
-        expected = "0 to below 2 pi rad" if self.unit == "rad" else f"{self.low:g} to {self.high:g} {unit}"
+        expected = (
+            "0 to below 2 pi rad"
+            if self.unit == "rad"
+            else f"{'0 or ' if self.zero else ''}{self.low:g} to {self.high:g} {unit}"
+        )
         for factor, shift, name in MISTAKEN[self.unit]:
             meant = value * factor + shift
+            if self.unit == "rad" and value < A_TURN:
+                continue
             if self.low <= meant <= self.high:
                 text = "expected {expected}; it looks like {name}, which would be {meant} {unit}"
                 words = {"expected": expected, "name": name, "meant": f"{meant:.6g}", "unit": unit}
                 raise PydanticCustomError("reading", text, words)
         if self.unit == "rad":
             raise PydanticCustomError("reading", "expected {expected}", {"expected": expected})
-        raise out_of_range("range", Within(self.low, self.high), size=value, before="")
+        raise out_of_range("range", Within(0.0 if self.zero else self.low, self.high), size=value, before="")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_after_validator_function(self.check, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         high = "exclusiveMaximum" if self.unit == "rad" else "maximum"
-        return {**handler(schema), "minimum": self.low, high: self.high}
+        return {**handler(schema), "minimum": 0.0 if self.zero else self.low, high: self.high}
 
 
 Phase = Annotated[float, Reading("rad", 0.0, TWO_PI)]
 Temperature = Annotated[float, Reading("c", -20.0, 50.0)]
 Pressure = Annotated[float, Reading("hpa", 500.0, 1100.0)]
-Humidity = Annotated[float, Within(0, 100)]
+Humidity = Annotated[float, Reading("percent", 1.0, 100.0, zero=True)]  # 0.47 is a share of one
 Height = Annotated[float, Reading("mm", 15.0, 500.0)]
 Radius = Annotated[float, Reading("mm", 10.0, 1000.0)]
 
@@ -96,7 +106,7 @@ class SurfacePlate(Record):
 class MeasuredPrism(Record):
     """[left_prism] or [right_prism]: from the data sheet of the unit."""
 
-    serial: int
+    serial: Annotated[int, Field(ge=1)]
     height_mm: Annotated[float, Reading("mm", 10.0, 500.0)]
     u_height_mm: Annotated[float, Within(0, 10)] = 0.002
     hrp_mm: Annotated[float, Reading("mm", 5.0, 500.0)]
@@ -235,16 +245,14 @@ class TripletMeasurement(Certificate):
         return self
 
     @model_validator(mode="after")
-    def _has_one_place_of_the_stops(self) -> "TripletMeasurement":
+    def _has_its_spacers_in_millimetres(self) -> "TripletMeasurement":
         first = self.placement[0]
         for number, each in enumerate(self.placement[1:], start=1):
             off = each.d_toppl_mm + each.spacer_mm - first.d_toppl_mm - first.spacer_mm
-            if abs(off) > REACH_MM:
-                inches = abs(off + each.spacer_mm * (INCH_MM - 1.0)) < 1.0
-                hint = "; the spacer looks like inches" if inches else ""
+            if abs(off) > REACH_MM and abs(off + each.spacer_mm * (INCH_MM - 1.0)) < 1.0:
                 raise broken_rule(
                     f"placement[{number}].spacer_mm = {each.spacer_mm} with d_toppl_mm = {each.d_toppl_mm} puts the "
-                    f"stops {off:+.1f} mm from where the first placement has them (expected within {REACH_MM:g} mm: "
-                    f"other stops are another file{hint})"
+                    f"stops {off:+.1f} mm from where the first placement has them (expected mm; the spacer looks like "
+                    "inches)"
                 )
         return self

@@ -2,12 +2,14 @@
 
 Outward the beam is Gaussian in two planes; an aperture takes its share and the rest goes on as if whole: rings behind
 an edge that takes much are not followed. From the reflector on the light is computed by diffraction, except where the
-reflector clips next to nothing: then it stays the Gaussian that it was. Apertures in a row let through what the
-tightest of them does.
+reflector clips next to nothing: then it stays the Gaussian that it was as far as the detector, which is lit by what the
+tightest inward aperture let pass. Apertures in a row let through what the tightest of them does.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,7 @@ from catseye.signal.feedback import fringe_contrast
 
 Array = NDArray[np.float64]
 WIDE = 5.0  # beam radii: what a missing aperture stands for
-UNCLIPPED = 1e-5  # of the power lost at the reflector: the beam then stays Gaussian, to 1e-3 of the share
+UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
 HALF_MAXIMUM = math.sqrt(2.0 / math.log(2.0)) / 2.0  # full angle at half maximum to half angle at 1/e^2
 MICROMETRE = 1e-6
 
@@ -35,7 +37,7 @@ class Place:
     radius      (2,) m at 1/e^2, in x and y; NaN behind a reflector that clips
     curvature   (2,) 1/m, of the wavefront, above zero where it spreads; NaN likewise
     aperture    m, radius; infinite without
-    clipped     share of the arriving power that passes beside it
+    clipped     share of the arriving power that passes beside it; NaN where diffraction could not be followed
     power       W, behind the element; NaN where diffraction could not be followed
     """
 
@@ -74,6 +76,7 @@ class BeamPath:
     """A beam train, computed.
 
     places         along the path at the train's own distance
+    status         "ok", or why there is no number there
     returned       table by distance
     smallest_waist m: waist at the head that would make the spot at that distance smallest, and the spot's radius
     range_effects  name: m that the range reads too long by it; NaN where the light there is not a Gaussian
@@ -83,6 +86,7 @@ class BeamPath:
 
     train: BeamTrain
     places: tuple[Place, ...]
+    status: str
     returned: tuple[Returned, ...]
     smallest_waist: tuple[float, float]
     range_effects: dict[str, float]
@@ -101,7 +105,7 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
     """
     try:
         leaving, outward, power = _outward(train)
-        back = _returned(train, leaving, power, train.distance_m, sum(map(_length, train.outward)))[1]
+        here, back = _returned(train, leaving, power, train.distance_m, sum(map(_length, train.outward)))
         distances = train.distances_m or tuple(train.distance_m * 2.0**k for k in range(-3, 4))
         rows = tuple(_returned(train, leaving, power, distance, 0.0)[0] for distance in distances)
         wavelength = train.wavelength_um * MICROMETRE
@@ -110,6 +114,7 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
         return BeamPath(
             train=train,
             places=(*outward, *back),
+            status=here.status,
             returned=rows,
             smallest_waist=(waist, waist * math.sqrt(2.0)),
             range_effects=range_effects(train, back),
@@ -134,8 +139,7 @@ def range_effects(train: BeamTrain, back: tuple[Place, ...]) -> dict[str, float]
     found: dict[str, float] = {}
     for element in (*train.outward, *train.inward):
         if element.kind == "mirror" and element.coating is not None:
-            made, angle, polarization = _coated(train, element)
-            path = float(coating.group_path(made, train.wavelength_um, angle, polarization=polarization))
+            path = _reflected(train, element)[1]
             found[f"coating of {_called(element)}"] = found.get(f"coating of {_called(element)}", 0.0) + 0.5 * path
     inward = [place for place in back if place.leg == "inward"]
     for element, place in zip((e for e in train.inward if e.kind != "space"), inward, strict=True):
@@ -165,9 +169,10 @@ def _image_effects(train: BeamTrain, image: Place) -> dict[str, float]:
     middle, off = "image in the middle of the detector, against its rim", "image off the middle"
     if not math.isfinite(spot):
         return {middle: math.nan, off: math.nan}
-    places = np.array([0.0, plate.offset_um * MICROMETRE])
-    centre, here = detector.spot_range(places, spot, diode, train.modulation_hz)
-    return {middle: float(centre), off: float(here - centre)}
+    centre = float(detector.spot_range(0.0, spot, diode, train.modulation_hz))
+    wandering = math.hypot(spot, 2.0 * plate.u_offset_um * MICROMETRE)  # a place that is not certain widens the mean
+    here = float(detector.spot_range(plate.offset_um * MICROMETRE, wandering, diode, train.modulation_hz))
+    return {middle: centre, off: here - centre}
 
 
 def _u_image(train: BeamTrain) -> float:
@@ -181,14 +186,13 @@ def _u_image(train: BeamTrain) -> float:
 def _into_laser(train: BeamTrain) -> dict[str, float]:
     """Isolation, what comes back into the laser, and the most that its fringes move a range."""
     found: dict[str, float] = {}
-    share = 1.0
+    share, as_it_left = 1.0, 1.0
     for element in train.outward:
         if element.kind == "isolator":
             made = _isolator(element)
             left = isolator.jones_out(made)[:, 0]
-            found["isolation_db"] = isolator.isolation_db(made, left)
-            found["worst_isolation_db"] = isolator.isolation_db(made)
-            share *= isolator.back_share(made)
+            share, as_it_left = share * isolator.back_share(made), as_it_left * isolator.back_share(made, left)
+            found["isolation_db"], found["worst_isolation_db"] = _decibel(as_it_left), _decibel(share)
     if train.laser.back_reflection is None:
         return found
     share *= train.laser.back_reflection
@@ -200,6 +204,10 @@ def _into_laser(train: BeamTrain) -> dict[str, float]:
     if train.laser.regulation_rad is not None:
         found["range_bound_by_regulation"] = abs(train.laser.regulation_rad) * contrast * half
     return found
+
+
+def _decibel(share: float) -> float:
+    return -10.0 * math.log10(share) if share > 0.0 else math.inf
 
 
 def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[Place, ...], float]:
@@ -250,17 +258,21 @@ def _returned(
                     if whole:
                         share = float(gaussian_beam.share_within_ellipse(edge, *abcd.radius(now, light)))
                         passed = min(kept, share) if not ending else kept * share
+                        if ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
+                            shares = _diffracted(abcd.onward(q, stop[1]), light, [stop[0], edge], [past_stop])
+                            passed = kept * float(shares[1] / shares[0])
                     elif ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
                         shares = _diffracted(q, light, [face, stop[0], edge], [stop[1], past_stop])
                         passed = kept * float(shares[2] / shares[1])
                     else:
                         shares = _diffracted(q, light, [face, edge], [system])
                         passed = min(kept, float(shares[1] / shares[0]))
-                    if passed < kept and not ending:
+                    if kept - passed > (UNCLIPPED if whole else 0.0) and not ending:
                         stop, past_stop = (edge, system), np.broadcast_to(np.eye(2), (2, 2, 2))
                     clipped, kept = 1.0 - passed / kept, passed
                 except ValidityError as problem:
                     status, kept, power = str(problem), math.nan, math.nan
+            clipped = clipped if status == "ok" else math.nan
             power *= (1.0 - clipped) * _transmission(train, element)
             size, bend = (
                 (abcd.radius(now, light), abcd.wavefront_curvature(now)) if whole else (np.full(2, np.nan),) * 2
@@ -348,9 +360,7 @@ def _matrices(train: BeamTrain, element: Element) -> Array:
 def _transmission(train: BeamTrain, element: Element) -> float:
     """Of an element, the reflectance of its coating and an isolator's own angles in it."""
     if element.kind == "mirror" and element.coating is not None:
-        made, angle, polarization = _coated(train, element)
-        shown = coating.response(made, train.wavelength_um, angle, polarization=polarization).reflectance
-        return element.transmission * float(shown)
+        return element.transmission * _reflected(train, element)[0]
     if element.kind == "isolator":
         return isolator.forward_share(_isolator(element))
     return element.transmission
@@ -366,11 +376,27 @@ def _isolator(element: Element) -> isolator.Isolator:
     )
 
 
-def _coated(train: BeamTrain, element: Element) -> tuple[coating.Coating, float, coating.Polarization]:
-    """Coating of a mirror, angle on it, and which polarization the laser's is there."""
+def _reflected(train: BeamTrain, element: Element) -> tuple[float, float]:
+    """Reflectance of a coated mirror, and the group path, m, that it adds, for the polarization that it meets."""
     angle = (element.incidence_deg or 0.0) * DEGREE
-    polarization: coating.Polarization = "p" if train.laser.polarization == (element.plane or "x") else "s"
-    return coating.named(element.coating or "", train.wavelength_um, angle), angle, polarization
+    made = coating.named(element.coating or "", train.wavelength_um, angle)
+    power, path = 0.0, 0.0
+    for polarization, share in _polarization(train, element).items():
+        seen = share * float(coating.response(made, train.wavelength_um, angle, polarization=polarization).reflectance)
+        added = float(coating.group_path(made, train.wavelength_um, angle, polarization=polarization))
+        power, path = power + seen, path + seen * added
+    return power, path / power
+
+
+def _polarization(train: BeamTrain, element: Element) -> Mapping[coating.Polarization, float]:
+    """Shares of s and p on a mirror: each isolator on the way leaves the field turned by half a right angle.
+
+    A retroreflector is taken to keep the polarization.
+    """
+    passed = sum(e.kind == "isolator" for e in takewhile(lambda e: e is not element, train.outward))
+    kept = math.cos(passed * isolator.DESIGN_TURN) ** 2
+    along = train.laser.polarization == (element.plane or "x")
+    return {"p": kept if along else 1.0 - kept, "s": 1.0 - kept if along else kept}
 
 
 def _indices(train: BeamTrain, element: Element) -> tuple[float, float]:

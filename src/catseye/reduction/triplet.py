@@ -26,7 +26,7 @@ LEVEL = 0.05  # of the tests of consistency and of single placements together
 SIGMAS = 5.0  # of D_TOPPL that the margin of the whole cycles must hold
 FAR = 10e-3  # m: ranging and plate differ by more than any triplet's parts could, a tenth of a slip
 REFERENCE_AIR = (20.0, 933.0, 50.0)  # deg C, hPa, %: of the memo's index ratio 1.527077
-NOTABLE = 0.2e-6  # m
+FLOOR = 1e-9  # m, added to each placement: below what phases are written to; keeps repeated ones apart
 GOOD, THIN, SUSPECT, NOT_A_TRIANGLE, SLIPPED = (
     "good", "thin margin", "suspect", "no triangle: left out", "whole cycles doubtful",
 )  # fmt: skip
@@ -284,7 +284,8 @@ def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combin
 
 def _weights(covariance: Array, used: NDArray[np.intp]) -> tuple[Array, Array]:
     """Of least variance, and the inverse of the covariance."""
-    inverse = np.asarray(np.linalg.inv(covariance[np.ix_(used, used)]), dtype=np.float64)
+    apart = covariance[np.ix_(used, used)] + np.eye(len(used)) * FLOOR**2  # placements that share everything
+    inverse = np.asarray(np.linalg.inv(apart), dtype=np.float64)
     return inverse.sum(axis=1) / inverse.sum(), inverse
 
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 class MemoNumbers:
     """What the memo's formulas give, one value a placement; NaN where they do not apply.
 
-    n_1, n_2, n_bc        whole half wavelengths by 3.13 and 3.16; NaN where Phi_ZRG + Phi_Cal breaks its rule 3.4b
+    n_1, n_2, n_bc        whole half wavelengths by 3.13 and 3.16; NaN where Phi - Phi_ZRG - Phi_Cal breaks 3.5
     d_mp                  m, the series 3.19b, with the right whole cycles
     d_0, i_1, i_2, psi    3.20, 3.23, 3.25; psi signed; NaN where a distance comes out shorter than D_0
     delta_range, h_corr   m, 3.28 and 3.29 with the right whole cycles

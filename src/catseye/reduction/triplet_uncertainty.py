@@ -7,6 +7,7 @@ phase that was read once and written down for several flips.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from catseye.reduction.triplet_geometry import TripletCycles, TripletLengths, Tr
 
 Array = NDArray[np.float64]
 Moves = dict[str, Array]
+FEW = 0.1  # of u_phase: in steps coarser than that two readings agree to the last digit more often than one in 35
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +95,20 @@ def _inputs(measurement: TripletMeasurement, r: TripletReadings) -> Iterator[tup
 
 
 def _phases(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
-    """Each phase that was read, once, wherever it is written."""
+    """Each phase that was read, once, wherever it is written.
+
+    Equal digits are one reading, unless they are so few that a second reading would often show the same: there one that
+    is written at the flip counts as read again.
+    """
     count = len(measurement.placement)
+    step = written_step(measurement)
     read: dict[tuple[object, ...], Moves] = {}
+
+    def again(k: int, quantity: str) -> tuple[object, ...]:
+        each = measurement.placement[k]
+        coarse = step > FEW * each.u_phase_rad
+        return ("again", k) if coarse and getattr(each, f"{quantity}_flipped_rad") is not None else ()
+
     for k, each in enumerate(measurement.placement):
         place = (each.spacer_mm, each.d_toppl_mm)
         written = [
@@ -103,15 +116,25 @@ def _phases(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
             ("phi_2", (*place, 2, each.phi_2_rad)),
             ("phi_bcfp", (*place, 3, each.phi_bcfp_rad)),
             ("phi_zrg", ("reference", each.phi_zrg_rad)),
-            ("phi_zrg_fp", ("reference", each.flipped("phi_zrg", "rad"))),
+            ("phi_zrg_fp", ("reference", *again(k, "phi_zrg"), each.flipped("phi_zrg", "rad"))),
             ("phi_cal", ("calibration", each.phi_cal_rad)),
-            ("phi_cal_fp", ("calibration", each.flipped("phi_cal", "rad"))),
+            ("phi_cal_fp", ("calibration", *again(k, "phi_cal"), each.flipped("phi_cal", "rad"))),
         ]
         for name, key in written:
             moves = read.setdefault((*key, each.u_phase_rad), {})
             moves.setdefault(name, np.zeros(count))[k] = each.u_phase_rad
     for moves in read.values():
         yield "phases", moves
+
+
+def written_step(measurement: TripletMeasurement) -> float:
+    """The last digit to which the sheet's measured phases are written, rad: of the finest of them.
+
+    measurement   a measured unit
+    """
+    names = ("phi_1_rad", "phi_2_rad", "phi_bcfp_rad")
+    finest = min(Decimal(repr(getattr(p, name))).as_tuple().exponent for p in measurement.placement for name in names)
+    return float(10.0 ** int(finest))
 
 
 def _air(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
