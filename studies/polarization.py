@@ -80,6 +80,7 @@ def splitter() -> str:
 
 
 def main(directory: str) -> None:
+    Path(directory).mkdir(parents=True, exist_ok=True)
     drawn, told = polarization_plot(WAVELENGTH_UM, GLASS)
     sys.stdout.write("\n\n".join((straight_on(told), phases(told["index"]), tilted(), splitter())) + "\n")
     Path(directory, "polarization.svg").write_text(drawn, encoding="utf-8")

@@ -77,6 +77,7 @@ def balls() -> None:
     ball = replace(Dimensions().targets()[2], aperture=0.03)
     focus = float(focal_radius(ball.r1, ball.phase))
     say(f"paraxial focus {focus / 0.0254:.3f} inch; the memo has {ball.r2 / 0.0254:.3f}")
+    say("stop of 30 mm radius, which no such beam fills")
     say("beam mm   best R2 inch   mean path change µm   blur ″   share back at 18, 50, 120 m")
     for width in (0.005, 0.008, 0.010, 0.0125, 0.015):
         shares = [ball.collected_share(d, beam_radius=width, receiver=0.05) for d in (18.0, 50.0, 120.0)]
@@ -105,6 +106,7 @@ def main(directory: Path) -> None:
         f"{dihedral.pupil_offset(three, **face) * 1e6:.3f} µm without a lens, "
         f"{0.25 * 100.0 * three**2 * 1e9:.0f} nm with one, at 100 m"
     )
+    directory.mkdir(parents=True, exist_ok=True)
     (directory / "retroreflectors-return.svg").write_text(return_plot()[0], encoding="utf-8")
     (directory / "retroreflectors-aberration.svg").write_text(aberration_plot()[0], encoding="utf-8")
 

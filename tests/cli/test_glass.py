@@ -88,3 +88,13 @@ def test_what_cannot_be_is_one_line(asked, arguments, status, said):
 
 def test_zero_degrees_is_a_temperature(asked):
     assert json.loads(asked("N-BK7", "--temperature-c", 0, "--json")[1])["temperature_c"] == 0.0
+
+
+def test_a_glass_beyond_the_notes_air_is_told_in_the_makers_air(catseye):
+    status, out, err = catseye("glass", "fused-silica", "--wavelength-um", 0.25, "--json")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    assert told["prism"]["air"] == "20 °C, 1013.25 hPa, dry"
+    assert told["phase_index"] == pytest.approx(1.50745, abs=2e-5)  # [MALITSON65] at 0.25 um
+    assert told["prism"]["group_index_over_air"] == pytest.approx(told["group_index"], abs=2e-4)
+    assert json.loads(catseye("glass", "N-BK7", "--json")[1])["prism"]["air"] == "20 °C, 933 hPa, 50 %"

@@ -1,6 +1,7 @@
 """`catseye safety`: what it says, what programs get, what it refuses."""
 
 import json
+import math
 
 import pytest
 
@@ -53,6 +54,21 @@ def test_sweep_and_return(catseye):
     assert aided["viewer"] == "7x50 binoculars"
 
 
+def test_what_comes_back_counts_for_the_front_of_the_eye_too(catseye):
+    # at 1390 nm the retina may have 766 W, the front of the eye 10 kW/m2 over 3.5 mm: 96.2 mW
+    infrared = ("safety", "--power-mw", 2000, "--wavelength-um", 1.39, "--diameter-mm", 20, "--divergence-mrad", 0.1)
+    back = json.loads(catseye(*infrared, "--reflector-distance", 20, "--json")[1])["returned"]
+    assert back["limit"] == pytest.approx(1e4 * math.pi / 4 * 3.5e-3**2)
+    assert back["limit_aperture"] == 3.5e-3
+    # 3.5 mm in the middle of a beam 20.2 mm wide 40 m away gets 1 - exp(-2 (3.5/20.2)^2) = 5.9 % of 2 W
+    assert back["times_limit"] == pytest.approx(0.118 / 0.0962, rel=0.03)
+
+
+def test_a_source_that_is_no_point_warns_of_farther_hazard(catseye):
+    assert "farther than that" in " ".join(catseye(*RANGER, "--subtense-mrad", 5)[1].split())
+    assert "farther than that" not in " ".join(catseye(*RANGER)[1].split())
+
+
 def test_the_text_says_class_reasons_distances_and_the_warning(catseye):
     status, out, err = catseye(*RANGER, "--scan-rad-per-s", 0.5, "--reflector-distance", 120)
     assert (status, err) == (0, "")
@@ -101,6 +117,9 @@ def test_a_focused_beam_says_where_the_hazard_begins(catseye):
         (("--divergence-mrad", 0.01), "is no beam of light"),
         (("--duration-s", 1e6), "duration 1e+06 s is outside"),
         (("--scan-rad-per-s", 0), "rate = 0 rad/s is not above 0"),
+        (("--power-mw", 1e-4, "--scan-rad-per-s", -3), "rate = -3 rad/s is not above 0"),
+        (("--power-mw", 1e-4, "--scan-rad-per-s", 3, "--scan-period-s", -1), "period = -1 s is not above 0"),
+        (("--divergence-mrad", 5e4), "divergence = 50 rad is above 1 rad"),
         (("--subtense-mrad", -1), "subtense -0.001 rad is outside"),
         (("--reflector-distance", 0), "distance = 0.0 m is not above 0"),
         (("--reflector-distance", 9, "--waist-distance", 1), "waist 1 m away"),

@@ -16,13 +16,10 @@ from catseye.optics.safety import (
     Viewer,
     classify,
     hazard_zone,
-    repetition_factor,
     returned_power,
-    sweep_hazard_distance,
-    sweep_pulse,
-    sweep_ratio,
 )
 from catseye.optics.safety_limits import CLASSES, class_limit, eye_limits, eye_mpe, factors, skin_limit
+from catseye.optics.safety_sweep import repetition_factor, sweep_hazard_distance, sweep_pulse, sweep_ratio
 
 VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "safety.toml").read_text(encoding="utf-8"))["vector"]
 PUPIL_AREA = np.pi / 4 * 7e-3**2
@@ -41,6 +38,7 @@ def test_the_ranger_s_own_numbers():
     assert class_limit("1", 0.780, 100.0) == pytest.approx(0.5637e-3, abs=5e-8)
     assert class_limit("1", 0.780, 100.0, edition="ansi2014") == pytest.approx(14.4544 * PUPIL_AREA, rel=1e-5)
     assert class_limit("3R", 0.780, 100.0) == pytest.approx(2.891e-3, abs=5e-7)
+    assert skin_limit(0.5, 10.0).irradiance == pytest.approx(1.1e4 * 10**-0.75)  # the lower one at a border
     assert class_limit("3R", 0.780, 100.0, edition="ansi2014") == pytest.approx(5 * 14.4544 * PUPIL_AREA, rel=1e-5)
 
 
@@ -209,6 +207,7 @@ def test_a_wide_beam_s_pulse_lasts_as_the_beam_is_wide():
         (1, 1e-3, 50e-3, 100.0, 1.0),
         (1e6, 1e-3, 1.5e-3, 100.0, 1.0),  # points and long pulses: gone in 2014
         (600, 1e-6, 1.5e-3, 10.0, 1.0),
+        (610, 1e-6, 1.5e-3, 10.0, 1.0),  # 5 * 610^(-1/4) is 1.006: a train is no safer than a pulse
         (1e4, 1e-6, 1.5e-3, 10.0, 0.5),
         (1e6, 1e-6, 1.5e-3, 10.0, 0.4),
         (1e6, 1e-6, 1.5e-3, 0.25, 1.0),
@@ -251,6 +250,36 @@ def test_blue_sweeps_are_a_dose():
     assert found == pytest.approx(energy / 0.01 / (1.0 * PUPIL_AREA), rel=1e-6)
 
 
+def test_a_longer_exposure_to_a_blue_sweep_is_not_safer():
+    # one pass of 77 s: 1.25 times the dose of 100 s; spread over 30 000 s it would seem a sixth of what is allowed
+    beam = LaserBeam(1e-4, 0.42, 0.003, 1e-3)
+    short, long = (sweep_ratio(beam, 10.0, 1e-5, duration=t) for t in (100.0, 3e4))
+    assert short == pytest.approx(1.25, abs=0.01)
+    assert long >= short
+
+
+def test_a_pass_that_began_within_the_exposure_counts_whole():
+    # a dose: passes every 60 s are two within 100 s, not 1.67
+    beam = LaserBeam(0.01, 0.405, 0.005, 2e-4)
+    one, two = (sweep_ratio(beam, 10.0, 5e-5, duration=100.0, period=p) for p in (None, 60.0))
+    assert two == pytest.approx(2.0 * one, rel=1e-9)
+
+
+def test_no_sweep_is_worse_than_the_standing_beam():
+    beam = LaserBeam(0.01, 0.78, 0.003, 1e-3)
+    standing = beam.power_within(7e-3, 10.0) / eye_limits(0.78, 100.0)[0].power
+    for rate in np.geomspace(1e-6, 1e-2, 30):
+        for period in (None, 99.0, 60.0, 20.0):
+            assert sweep_ratio(beam, 10.0, rate, duration=100.0, period=period) <= standing * (1 + 1e-12)
+
+
+def test_at_700_nm_the_tables_of_the_infrared_hold():
+    beam = LaserBeam(0.9e-3, 0.7, 0.002, 1e-3)
+    assert "2" not in classify(beam).limits
+    assert classify(beam).laser_class == "3R"
+    assert class_limit("3R", 0.7, 100.0) == pytest.approx(2.0e-3)
+
+
 def test_the_sweep_s_distance_is_where_it_reaches_its_limit():
     beam = LaserBeam(0.3, 0.78, 0.003, 1e-3)
     far = sweep_hazard_distance(beam, 0.5, duration=100.0)
@@ -283,6 +312,8 @@ def test_what_comes_back_is_what_the_unfolded_beam_would_bring():
         (lambda: class_limit("5", 0.78, 0.25), "class 5 has no limit"),
         (lambda: LaserBeam(0.01, 0.78, 1e-3, 1e-4), "is no beam of light (expected 0.9931 mrad or more"),
         (lambda: LaserBeam(0.01, 0.78, 1e-3, 1e-3, 5.0), "is no beam of light"),
+        (lambda: LaserBeam(0.01, 0.78, 1e-3, 50.0), "divergence = 50 rad is above 1 rad"),
+        (lambda: sweep_hazard_distance(LaserBeam(1e-7, 0.78, 1e-3, 1e-3), -3.0, duration=1.0), "rate = -3 rad/s"),
         (lambda: LaserBeam(0.0, 0.78, 1e-3, 1e-3), "power = 0 W is not above 0"),
         (lambda: LaserBeam(0.01, 0.78, float("inf"), 1e-3), "diameter = inf m"),
         (lambda: LaserBeam(0.01, 0.78, 1e-3, 1e-3, float("nan")), "waist_distance = nan m"),

@@ -47,7 +47,7 @@ def safety(
         float, typer.Option("--reflector-diameter-mm", help="Of its clear face, mm.")
     ] = 50.8,
     subtense_mrad: Annotated[
-        float, typer.Option("--subtense-mrad", help="Angle of the apparent source; up to 1.5 a point.")
+        float, typer.Option("--subtense-mrad", help="Angle of the apparent source where the eye is; up to 1.5 a point.")
     ] = 1.5,
     edition: Annotated[
         str, typer.Option("--edition", metavar=EDITIONS, callback=_known_edition, help="Of the limits.")

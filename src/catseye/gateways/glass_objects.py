@@ -4,6 +4,7 @@ from typing import Any
 
 from catseye.atmosphere.air import air
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.errors import ValidityError
 from catseye.optics import prism
 from catseye.optics.glass import (
     GLASSES,
@@ -36,8 +37,7 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, height_m
     vacuum = absolute_index(wavelength_um, name, temperature_c)
     here = wavelength_um / float(reference_air(wavelength_um, glass.reference_c).phase)
     by_wavelength, by_temperature = slopes(here, name), temperature_slopes(wavelength_um, name, temperature_c)
-    about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
-    air_index = {"air_phase": float(about.phase_index), "air_group": float(about.group_index)}
+    about, air_index = _air_about(wavelength_um)
     true = index_over_air(wavelength_um, name, temperature_c, **air_index)
     over_air = {
         **{f"{key}_index": value for key, value in air_index.items()},
@@ -65,7 +65,7 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, height_m
         "absolute_phase_index_per_c": by_temperature.phase,
         "absolute_group_index_per_c": by_temperature.group,
         "expansion_per_c": glass.expansion,
-        "prism": _prism_object(height, over_air, per_c),
+        "prism": {"air": about, **_prism_object(height, over_air, per_c)},
         "others": {
             other: _other(other, name, wavelength_um, height, air_index["air_group"])
             for other in GLASSES
@@ -74,8 +74,18 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, height_m
     }
 
 
+def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
+    """The air of the notes' example, in words and indices; the makers' where the notes' model does not reach."""
+    try:
+        about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
+    except ValidityError:
+        phase, group = reference_air(wavelength_um, AIR[0])
+        return "20 °C, 1013.25 hPa, dry", {"air_phase": float(phase), "air_group": float(group)}
+    return "20 °C, 933 hPa, 50 %", {"air_phase": float(about.phase_index), "air_group": float(about.group_index)}
+
+
 def _prism_object(height: float, over_air: dict[str, float], per_c: tuple[float, float]) -> dict[str, Any]:
-    """What a prism so high does, in the air of the notes' example; `per_c`: of group index and length, 1/K."""
+    """What a prism so high does, in the air about it; `per_c`: of group index and length, 1/K."""
     group, notes = over_air["group_index_over_air"], over_air["notes_group_index_over_air"]
     constant = float(prism.range_constant(height, group))
     return {
@@ -120,7 +130,7 @@ def glass_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
                    f"at {found['temperature_c']:g} °C; {found['absolute_phase_index_per_c'] * 1e6:+.2f} and "
                    f"{found['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
         ("expansion", f"{found['expansion_per_c'] * 1e6:.1f} ppm per °C"),
-        ("prism", f"{own['height'] * 1e3:g} mm high in air of 20 °C, 933 hPa, 50 %: range constant "
+        ("prism", f"{own['height'] * 1e3:g} mm high in air of {own['air']}: range constant "
                   f"{own['range_constant'] * 1e3:.4f} mm ({own['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
                   f"{own['reference_depth'] * 1e3:.4f} mm below the face, "
                   f"{own['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),

@@ -13,9 +13,9 @@ from catseye.optics.safety import (
     classify,
     hazard_zone,
     returned_power,
-    sweep_hazard_distance,
 )
-from catseye.optics.safety_limits import ALPHA_MIN, EDITIONS, eye_limits, eye_mpe, factors, skin_limit
+from catseye.optics.safety_limits import ALPHA_MIN, EDITIONS, PUPIL, eye_limits, eye_mpe, factors, skin_limit
+from catseye.optics.safety_sweep import sweep_hazard_distance
 
 DURATIONS = (AVERSION, 10.0, 100.0, 3e4)  # s, of the table
 
@@ -48,7 +48,7 @@ class Question:
         """The exposure's duration."""
         if self.duration is not None:
             return self.duration
-        return AVERSION if self.beam.wavelength_um <= 0.7 else TIME_BASE
+        return AVERSION if self.beam.wavelength_um < 0.7 else TIME_BASE
 
 
 def safety_object(asked: Question) -> dict[str, Any]:
@@ -70,6 +70,7 @@ def safety_object(asked: Question) -> dict[str, Any]:
         "divergence": beam.divergence,
         "beam_quality": beam.quality,
         "duration": seconds,
+        "subtense": asked.subtense,
         "factors": {name: getattr(known, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
         "mpe_eye": governing.irradiance,
         "mpe_eye_protects_from": governing.name,
@@ -114,19 +115,25 @@ def _scan(asked: Question) -> dict[str, Any] | None:
 
 
 def _returned(asked: Question) -> dict[str, Any] | None:
-    if asked.reflector_distance is None:
+    distance = asked.reflector_distance
+    if distance is None:
         return None
     viewer = BINOCULARS if asked.aided else NAKED
     size = {"reflector": asked.reflector_diameter, "viewer": viewer}
-    power = returned_power(asked.beam, asked.reflector_distance, **size)  # type: ignore[arg-type]
+
+    def within(aperture: float) -> float:
+        return returned_power(asked.beam, distance, aperture=aperture, **size)  # type: ignore[arg-type]
+
     limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, asked.edition)
-    allowed = min(limit.power for limit in limits if limit.aperture == 7e-3)
+    times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda found: found[0])
     return {
-        "distance": asked.reflector_distance,
+        "distance": distance,
         "diameter": asked.reflector_diameter,
-        "power_into_eye": power,
-        "limit": allowed,
-        "times_limit": power / allowed,
+        "power_into_eye": within(PUPIL),
+        "limit": governing.power,
+        "limit_aperture": governing.aperture,
+        "limit_protects_from": governing.name,
+        "times_limit": times,
     }
 
 
@@ -143,6 +150,11 @@ def safety_passages(told: dict[str, Any]) -> list[tuple[str, str]]:
         passages.append(
             ("", f"class {told['class']}, and yet within that distance more than the limit for this exposure")
         )
+    if told["subtense"] > ALPHA_MIN:
+        seen = f"distances are for a source that looks {told['subtense'] * 1e3:g} mrad wide from everywhere"
+        passages.append(
+            ("", f"{seen}; one of a fixed size looks smaller farther away, and is a hazard farther than that")
+        )
     if told["hazard_from"] > 0.0:
         passages.append(("", f"{told['viewer']}: only from {told['hazard_from']:.3g} m on, about the waist"))
     if scan := told["scan"]:
@@ -153,7 +165,12 @@ def safety_passages(told: dict[str, Any]) -> list[tuple[str, str]]:
     if back := told["returned"]:
         where = f"by {back['diameter'] * 1e3:g} mm at {back['distance']:g} m"
         power = f"{back['power_into_eye'] * 1e3:.3g} mW through the pupil ({told['viewer']})"
-        passages.append(("Sent back", f"{where}: {power}, {back['times_limit']:.3g} times the limit"))
+        passages.append(
+            (
+                "Sent back",
+                f"{where}: {power}, {back['times_limit']:.3g} times the limit ({back['limit_protects_from']})",
+            )
+        )
     return passages
 
 

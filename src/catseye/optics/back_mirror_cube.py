@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from catseye.errors import ValidityError
 from catseye.optics.hollow_cube import HollowCube
-from catseye.optics.retroreflector import RIGHT, Array, incidences
+from catseye.optics.retroreflector import RIGHT, Array, Sectors, incidences
 from catseye.optics.solid_prism import SolidPrism
 
 
@@ -78,3 +78,7 @@ class BackMirrorCube:
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
         """The cube's."""
         return self.cube.return_share(incidence, azimuth)
+
+    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+        """The cube's."""
+        return self.cube.sectors(incidence, azimuth)

@@ -23,6 +23,7 @@ from catseye.errors import ValidityError
 from catseye.optics.retroreflector import (
     RIGHT,
     Array,
+    Sectors,
     fresnel,
     incidences,
     refuse_indices,
@@ -151,6 +152,17 @@ class BallCatsEye:
         lost = bare if self.face_reflectance is None else self.face_reflectance
         share = self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2)
         return share * (1.0 - lost) ** 2 * self.mirror_reflectance
+
+    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+        """One: a mirror straight on, which leaves the polarization as it is, whatever the incidence; as on the axis.
+
+        Raises ValidityError from behind.
+        """
+        area = self.clear_area(incidence, azimuth)
+        if not area > 0.0:
+            raise ValidityError(f"incidence {incidence:.4g} rad: no part of the ball sends light back")
+        amplitude = np.sqrt(self.return_share(incidence, azimuth) / area * np.pi) * self.aperture
+        return Sectors(np.ones(1), np.array([-amplitude * np.eye(2)], dtype=np.complex128))
 
     def deviation(self, height: ArrayLike) -> Array:
         """Angle by which a ray comes back converging, rad; below 0 diverging.

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from catseye.optics.corner_polarization import hollow_corner, sector_jones, sector_shares
 from catseye.optics.prism import clear_share
-from catseye.optics.retroreflector import RIGHT, Array, incidences, refuse_shares, refuse_sizes
+from catseye.optics.retroreflector import RIGHT, Array, Sectors, incidences, refuse_shares, refuse_sizes
 
 
 @dataclass(frozen=True)
@@ -61,3 +62,12 @@ class HollowCube:
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
         """Clear area over the opening's, times three mirrors."""
         return self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2) * self.reflectance**3
+
+    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+        """Six, of mirrors that reflect s and p alike: `corner_polarization.hollow_corner` knows what real metal does.
+
+        Raises ValidityError where no light is left that meets all three mirrors.
+        """
+        corner = hollow_corner(complex("inf"))
+        shares = sector_shares(corner, incidence, azimuth, aperture=self.aperture, height=self.height)
+        return Sectors(shares, self.reflectance**1.5 * sector_jones(corner, incidence, azimuth))

@@ -9,7 +9,7 @@ Each has axes of its own, z along its axis towards the ranger, and is used at an
 about z, of the direction to the ranger. A new kind is one file with these members.
 """
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 RIGHT = 0.5 * np.pi
+
+
+class Sectors(NamedTuple):
+    """What a retroreflector does to polarized light: of each part of its clear area the share and the Jones matrix.
+
+    shares   (k,), summing to 1
+    jones    (k, 2, 2) amplitudes with the losses, in the axes of `corner_polarization`: as the ranger sees them
+    """
+
+    shares: Array
+    jones: Complex
 
 
 class Retroreflector(Protocol):
@@ -29,6 +41,7 @@ class Retroreflector(Protocol):
     acceptance       largest incidence at which it serves as designed, whatever the azimuth
     clear_area       m^2 across the beam: what enters there comes back
     return_share     of the light that falls on the clear face seen straight on, what comes back
+    sectors          the same for polarized light, at one incidence: for `corner_polarization.returned_power`
     """
 
     @property
@@ -40,6 +53,7 @@ class Retroreflector(Protocol):
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
+    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors: ...
 
 
 def fresnel(cosine: ArrayLike, ratio: ArrayLike) -> tuple[Array, Array]:

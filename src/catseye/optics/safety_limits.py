@@ -145,7 +145,7 @@ def skin_limit(wavelength_um: float, duration: float) -> Limit:
     (2891, 2000.0)
     """
     c_a = factors(wavelength_um, duration).c_a
-    if duration >= 10.0:
+    if duration > 10.0:
         return Limit("heat on the skin", 2000.0 * c_a, SKIN_APERTURE)
     energy = 200.0 if duration < 1e-7 else 1.1e4 * duration**0.25
     return Limit("heat on the skin", energy * c_a / duration, SKIN_APERTURE)
@@ -156,7 +156,7 @@ def class_limit(
 ) -> float:
     """Accessible emission limit of a class, W.
 
-    laser_class                         1, 2, 3R or 3B; 2 for 0.4 to 0.7 um only
+    laser_class                         1, 2, 3R or 3B; 2 from 0.4 to below 0.7 um only
     wavelength_um, duration, subtense   as for `factors`; the duration is the class's time base
     edition                             a name in EDITIONS
 
@@ -166,7 +166,7 @@ def class_limit(
     [0.564, 2.891, 500.0]
     """
     _known(edition)
-    visible = _nanometres(wavelength_um) <= 700
+    visible = _nanometres(wavelength_um) < 700
     if laser_class == "3B":
         return CLASS_3B
     if laser_class in ("2", "3R") and visible and duration >= 0.25:
@@ -176,7 +176,7 @@ def class_limit(
         return min(_class_1(wavelength_um, duration, subtense, edition), CLASS_3B)
     if laser_class == "3R":
         return min(_class_3r(wavelength_um, duration, subtense, edition), CLASS_3B)
-    raise ValidityError(f"class {laser_class} has no limit at {wavelength_um:g} um (1, 3R and 3B have; 2 up to 0.7 um)")
+    raise ValidityError(f"class {laser_class} has no limit at {wavelength_um:g} um (1, 3R and 3B have; 2 below 0.7 um)")
 
 
 def _class_1(wavelength_um: float, duration: float, subtense: float, edition: str) -> float:
@@ -196,7 +196,7 @@ def _class_1(wavelength_um: float, duration: float, subtense: float, edition: st
 
 def _class_3r(wavelength_um: float, duration: float, subtense: float, edition: str) -> float:
     """Five times class 1, which IEC rounds for points."""
-    if edition == "iec2014" and subtense <= ALPHA_MIN and duration >= 10.0 and wavelength_um > 0.7:
+    if edition == "iec2014" and subtense <= ALPHA_MIN and duration >= 10.0 and wavelength_um >= 0.7:
         f = factors(wavelength_um, duration, subtense)
         return 2.0e-3 * f.c_a * f.c_c
     return 5.0 * _class_1(wavelength_um, duration, subtense, edition)

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from catseye.optics import prism
+from catseye.optics.corner_polarization import sector_jones, sector_shares, solid_corner
 from catseye.optics.retroreflector import (
     RIGHT,
     Array,
+    Sectors,
     fresnel,
     incidences,
     refuse_indices,
@@ -109,14 +111,26 @@ class SolidPrism:
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
         """Clear area over the face's, times two passages of the face and three reflections, of unpolarized light.
 
-        What polarization does within the six sectors is `optics.polarization`; it does not change the sum where
-        reflection is total.
+        What polarization does within the six sectors is in `sectors`; it does not change the sum where reflection is
+        total.
         """
         angle, turn = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         bare = np.mean(fresnel(np.cos(np.minimum(angle, RIGHT)), self.phase), axis=0)
         lost = bare if self.face_reflectance is None else self.face_reflectance
         area = self.clear_area(angle, turn) / (np.pi * self.aperture**2)
         return area * (1.0 - lost) ** 2 * self._corner(np.minimum(angle, RIGHT), turn)
+
+    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+        """Six; a coated face or corner reflects s and p alike, see `corner_polarization.Corner` for real films.
+
+        Raises ValidityError where no light is left that meets all three faces.
+        """
+        behind = 1.0 if self.corner_reflectance is None else complex("inf")
+        corner = solid_corner(self.phase, behind, bare_face=self.face_reflectance is None)
+        shares = sector_shares(corner, incidence, azimuth, aperture=self.aperture, height=self.height)
+        metal = 1.0 if self.corner_reflectance is None else self.corner_reflectance**1.5
+        kept = 1.0 if self.face_reflectance is None else 1.0 - self.face_reflectance
+        return Sectors(shares, metal * kept * sector_jones(corner, incidence, azimuth))
 
     def _corner(self, incidence: Array, azimuth: Array) -> Array:
         """Product of the three faces' reflectances."""
