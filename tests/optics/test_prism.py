@@ -5,7 +5,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.optics.glass import group_index, phase_index
-from catseye.optics.prism import obliquity_correction, obliquity_slope, range_constant, reference_depth
+from catseye.optics.prism import oblique_change, obliquity_correction, obliquity_slope, range_constant, reference_depth
 
 AIR = 1.000253246815
 H, N = 0.0384, 1.527077
@@ -108,3 +108,16 @@ def test_the_reference_depth_makes_the_range_flat_at_normal_incidence():
 
     assert abs(length(reference_depth(H, N), tilt) - length(reference_depth(H, N), 0.0)) < 1e-10
     assert abs(length(other_depth, tilt) - length(other_depth, 0.0)) > 4e-8  # 0.001 x tilt^2 / 2
+
+
+def test_with_a_phase_index_the_correction_is_the_oblique_change_and_its_slope_the_derivative():
+    angles, given = np.radians([0.0, 5.0, 20.0, 45.0, 80.0]), {"phase": 1.510811}
+    change = oblique_change(0.0381, angles, group=1.527077, phase=1.510811)
+    np.testing.assert_allclose(
+        obliquity_correction(0.0381, 1.527077, np.cos(angles), **given), change, rtol=1e-12, atol=1e-18
+    )
+    step = 1e-5
+    up, down = (oblique_change(0.0381, angles[1:] + s, group=1.527077, phase=1.510811) for s in (step, -step))
+    slope = obliquity_slope(0.0381, 1.527077, np.cos(angles[1:]), **given)
+    np.testing.assert_allclose(slope, (up - down) / (2 * step), rtol=1e-6, atol=1e-11)
+    assert np.isnan(obliquity_correction(0.0381, 1.527077, -0.1, **given))

@@ -9,6 +9,7 @@ from scipy.stats import t as student
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.propagation import agrees, numerical_sensitivity
+from catseye.optics.prism import oblique_change
 from catseye.records.campaign import REFERENCE
 from catseye.records.path_temperature import PathTemperatureTable
 from catseye.reduction.budget import Assumptions, explain_shot, items_of, scene_of
@@ -491,3 +492,40 @@ def test_where_sound_tells_the_temperature_its_uncertainty_takes_the_thermometer
     after = sum(item.slope for item in items if item.key.startswith("thermometer "))
     assert abs(after) < 0.06 * abs(before)
     assert "sound" not in {item.key for item in items_of(plain)}
+
+
+def bent(campaign):
+    """The campaign whose prisms bend light by the phase index, as it is."""
+    return with_site(campaign, "ranging", bk7_to_air_phase_index_ratio=1.510811)
+
+
+def test_a_campaign_that_gives_the_phase_index_is_reduced_with_two_indices(night_01, reduced_night_01, sight):
+    r, campaign = reduced_night_01, bent(night_01)
+    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    x = np.array(network.layout.start)
+    for row, name in enumerate(r.coordinates.points):
+        x[network.layout.columns(name)] = r.coordinates.x[row]
+    group, parts = shot_group(network, "ZY116", x)
+    ratio = night_01.site.ranging.bk7_to_air_group_index_ratio
+    for row, k in enumerate(r.electronics["ZY116"].shots):
+        place = network.places[night_01.shots.target[k]]
+        if place.normal is not None:
+            incidence = float(parts.incidence[row])
+            expected = oblique_change(place.height, incidence, group=ratio, phase=1.510811)
+            assert parts.obliquity[row] == pytest.approx(float(expected), abs=1e-15)
+    distance = (group.observed - group.offset) / group.scale
+    found = explain_shot(campaign, int(night_01.shots.shot[r.electronics["ZY116"].shots[0]]), reduction=r)
+    assert found.budget.value == pytest.approx(distance[0], abs=1e-9)
+
+
+def test_with_two_indices_every_slope_is_the_derivative_of_the_chain(night_01, sight):
+    scene = sight(bent(night_01), PRISM)
+    items = items_of(scene)
+    best = np.array([[item.given.value for item in items]])
+    assert measurement(scene, items)(best)[0] == pytest.approx(scene.range_, abs=1e-9)
+    slopes = numerical_sensitivity(measurement(scene, items), [item.given for item in items])
+    for item, numerical in zip(items, slopes, strict=True):
+        off = abs(item.slope - numerical) * item.given.u
+        assert off < 2e-9, f"{item.key}: {item.slope} by hand, {numerical} by differences"
+    assert abs(scene.range_ - sight(night_01, PRISM).range_) < 1e-6  # and it is not the same
+    assert scene.range_ != sight(night_01, PRISM).range_

@@ -23,6 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
 
+Array = NDArray[np.float64]
+
 COSINE_TOLERANCE = 1e-9  # a dot product of unit vectors may exceed 1 by rounding
 
 
@@ -55,13 +57,16 @@ def range_constant(height: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
     return -(ratio - 1.0 / ratio) * np.asarray(height, dtype=float)
 
 
-def obliquity_correction(height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike) -> NDArray[np.float64]:
+def obliquity_correction(
+    height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike, *, phase: float | None = None
+) -> NDArray[np.float64]:
     """Distance to add to the measured length, beyond the range constant, for oblique incidence; never positive.
 
     height           m, from the entry face to the corner
     n                group index of the glass over that of the air, 1.4 to 2
     cos_incidence    cosine of the angle between the face's outward normal and the direction to the ranger, 0 to 1;
                      below 0 the face looks away and the answer is NaN, one shot at a time
+    phase            phase index of the glass over that of the air, which then refracts (`oblique_change`); None: B.1
 
     Source: [GOLDMAN00] eq. B.1, in the form -(h/n) (1 - 1/n^2) (1 - c)^2 (1 + c) / ((1 + c_r) (c + c_r)), which is the
     same number without its cancellation. See the module for how good B.1 itself is.
@@ -70,23 +75,32 @@ def obliquity_correction(height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLi
     -0.000112581
     """
     h, ratio, c, c_r = _cosines(height, n, cos_incidence)
+    if phase is not None:
+        return _two_index_change(h, ratio, phase, c)
     return -(h / ratio) * (1.0 - ratio**-2) * (1.0 - c) ** 2 * (1.0 + c) / ((1.0 + c_r) * (c + c_r))
 
 
-def obliquity_slope(height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike) -> NDArray[np.float64]:
+def obliquity_slope(
+    height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike, *, phase: float | None = None
+) -> NDArray[np.float64]:
     """Change of the obliquity correction with the angle of incidence, in metres a radian; never positive.
 
     height           m, from the entry face to the corner
     n                group index of the glass over that of the air, 1.4 to 2
     cos_incidence    cosine of the angle of incidence, 0 to 1 (below 0: NaN, the face looks away)
+    phase            phase index of the glass over that of the air, which then refracts; None: B.1
 
-    Source: [GOLDMAN00] eq. B.1, differentiated. As good as B.1.
+    Source: [GOLDMAN00] eq. B.1, or `oblique_change`, differentiated. As good as they.
 
     >>> round(float(obliquity_slope(0.0381, 1.527077, np.cos(0.5))), 6)
     -0.000905
     """
     h, ratio, c, c_r = _cosines(height, n, cos_incidence)
     sine = np.sqrt((1.0 - c) * (1.0 + c))
+    if phase is not None:
+        q = np.sqrt(phase**2 - sine**2)
+        path = h * sine * c * (ratio * phase + sine**2 - 2.0 * phase**2) / q**3  # d group_path / dI
+        return -path - h / ratio * sine
     return -(h / ratio) * (1.0 - ratio**-2) * sine**3 / (c_r * (c + c_r))
 
 
@@ -126,9 +140,8 @@ def oblique_change(
     >>> round(float(oblique_change(0.0381, np.radians(30.0), group=1.527077, phase=1.510811)) * 1e6, 2)
     -135.95
     """
-    h, n_g, n_p, sine, cosine = _two_indices(height, incidence, group, phase)
-    q = np.sqrt(n_p**2 - sine**2)
-    return h * sine**2 * ((1.0 - n_g / (n_p + q)) / q - 1.0 / (n_g * (1.0 + cosine)))
+    h, n_g, n_p, _, cosine = _two_indices(height, incidence, group, phase)
+    return _two_index_change(h, n_g, n_p, cosine)
 
 
 def flat_depth(height: ArrayLike, *, group: ArrayLike, phase: ArrayLike) -> NDArray[np.float64]:
@@ -211,6 +224,12 @@ def clear_share(
     half = np.minimum(apart, 1.0)
     overlap = (np.arccos(half) - half * np.sqrt(1.0 - half**2)) * 2.0 / np.pi
     return overlap * np.maximum(np.cos(angle), 0.0)
+
+
+def _two_index_change(h: Array, n_g: Array, n_p: Array | float, c: Array) -> Array:
+    square = (1.0 - c) * (1.0 + c)
+    q = np.sqrt(n_p**2 - square)
+    return h * square * ((1.0 - n_g / (n_p + q)) / q - 1.0 / (n_g * (1.0 + c)))
 
 
 def _two_indices(

@@ -72,12 +72,17 @@ class Paraboloid(Record):
 
 
 class Ranging(Record):
-    """[ranging]: the modulation, and how quiet electronics and air usually are."""
+    """[ranging]: the modulation, and how quiet electronics and air usually are.
+
+    bk7_to_air_phase_index_ratio   where given, oblique light is bent by it, as it is; without, by the group index as
+                                   appendix B of the triplet memo has it (0.4 um at 30 degrees)
+    """
 
     modulation_hz: Annotated[float, Within(1e6, 1e11)]
     if_hz: Annotated[float, Within(1, 1e8)]
     wavelength_um: Annotated[float, Within(0.2, 20)]
     bk7_to_air_group_index_ratio: Annotated[float, Within(1.3, 2.0)]
+    bk7_to_air_phase_index_ratio: Annotated[float, Within(1.3, 2.0)] | None = None
     electronic_drift_mrad_per_sqrt_hour: Annotated[float, Within(0, 6283)]
     path_index_fluctuation_ppm: Annotated[float, Within(0, 300)]
 

@@ -148,8 +148,10 @@ def _by_direction(scene: Scene, group: int, row: int) -> float:
     place = scene.network.places[part.target[row]]
     if place.normal is None:
         return 0.0
-    ratio = scene.network.campaign.site.ranging.bk7_to_air_group_index_ratio
-    return float(obliquity_slope(place.height, ratio, np.cos(min(float(part.incidence[row]), 0.5 * np.pi))))
+    ranging = scene.network.campaign.site.ranging
+    ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
+    cosine = np.cos(min(float(part.incidence[row]), 0.5 * np.pi))
+    return float(obliquity_slope(place.height, ratio, cosine, phase=bends))
 
 
 def _best_shots(problem: _Problem, left: np.ndarray) -> np.ndarray:

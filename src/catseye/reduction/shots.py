@@ -153,7 +153,8 @@ def _obliquity(
     A shot on anything but a prism gets the first parameter's column with a zero derivative.
     """
     m = len(targets)
-    ratio = network.campaign.site.ranging.bk7_to_air_group_index_ratio
+    ranging = network.campaign.site.ranging
+    ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
     incidence, correction, slopes = np.zeros(m), np.zeros(m), np.zeros((m, 2))
     columns = np.zeros((m, 2), dtype=int)
     for k, target in enumerate(targets):
@@ -165,9 +166,9 @@ def _obliquity(
         incidence[k] = np.arccos(np.clip(normal @ towards[k], -1.0, 1.0))
         # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
         cosine = np.cos(min(incidence[k], 0.5 * np.pi))
-        correction[k] = obliquity_correction(place.height, ratio, cosine)
+        correction[k] = obliquity_correction(place.height, ratio, cosine, phase=bends)
         if incidence[k] > 1e-6:  # at normal incidence the correction is flat
-            by_angle = obliquity_slope(place.height, ratio, cosine)
+            by_angle = obliquity_slope(place.height, ratio, cosine, phase=bends)
             slopes[k] = -by_angle * (across @ towards[k]) / np.sin(incidence[k])
     return incidence, correction, columns, slopes
 

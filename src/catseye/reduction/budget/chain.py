@@ -159,7 +159,9 @@ def _glass(scene: Scene, v: Columns) -> np.ndarray:
     normal = place.normal - lean[:, None] * first + across[:, None] * second  # leaning away from the beam
     cosine = normal @ towards / np.linalg.norm(normal, axis=1)
     height, depth = v("height") * MILLIMETRE, place.height / n0
-    in_glass = np.sqrt(n**2 - (1.0 - cosine**2))  # n cos r
+    bends = scene.campaign.site.ranging.bk7_to_air_phase_index_ratio
+    square = 1.0 - cosine**2
+    in_glass = np.sqrt(n**2 - square) if bends is None else (n * bends - square) / np.sqrt(bends**2 - square)  # n cos r
     typed = place.constant - float(range_constant(place.height, n0))  # Pc as the sheet prints it
     return -height * in_glass + depth * cosine + typed
 

@@ -9,7 +9,8 @@ the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a pr
     coupling k                s ln(A/A_ref)
     frequency                 -l / f
     index                     -l / n
-    height h                  -n_g cos r       (the point h_rp below the face stays where it is)
+    height h                  -n_g cos r       (the point h_rp below the face stays where it is; with two indices the
+                              group path over h)
     index of the glass        -h / cos r       (the same)
     radii of a ball           -(n_g - 1), -n_g
 """
@@ -334,16 +335,19 @@ def _glass(scene: Scene) -> list[Item]:
     if place.normal is None:
         return []
     height = place.height
-    cos_r = float(np.sqrt(1.0 - (np.sin(scene.incidence) / n) ** 2))
+    bends = campaign.site.ranging.bk7_to_air_phase_index_ratio
+    square = float(np.sin(scene.incidence) ** 2)
+    cos_r = float(np.sqrt(1.0 - square / (n if bends is None else bends) ** 2))
+    in_glass = n * cos_r if bends is None else (n * bends - square) / (bends * cos_r)
     in_unit = place.group in campaign.triplets
     file = f"triplets/{place.group}.toml: " if in_unit else "targets.toml: "
     u_normal = scene.settings.u_plate_normal if in_unit else scene.settings.u_normal
-    by_angle = float(obliquity_slope(height, n, np.cos(scene.incidence)))
+    by_angle = float(obliquity_slope(height, n, np.cos(scene.incidence), phase=bends))
     given = Input("height of the prism", height / MILLIMETRE, place.u_constant / n / MILLIMETRE)
     tilt = Input("angle of incidence", scene.incidence / DEGREE, u_normal / DEGREE)
     across = Input("tilt of the face across it", 0.0, u_normal / DEGREE)
     return [
-        Item("height", given, "mm", -n * cos_r * MILLIMETRE, f"{file}u_height_mm"),
+        Item("height", given, "mm", -in_glass * MILLIMETRE, f"{file}u_height_mm"),
         Item("ratio", ratio, "", -height / cos_r, melt),
         Item("incidence", tilt, "°", by_angle * DEGREE, f"{file}normal; u " + ASSUMED + "as the layout's README"),
         Item("across", across, "°", 0.0, "as the angle of incidence; second order only"),

@@ -182,9 +182,10 @@ def scene_of(
         cosine = float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
         if cosine <= 0.0:
             raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
-        ratio = campaign.site.ranging.bk7_to_air_group_index_ratio
+        ranging = campaign.site.ranging
+        ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
         incidence = float(np.arccos(cosine))
-        obliquity = float(obliquity_correction(place.height, ratio, cosine))
+        obliquity = float(obliquity_correction(place.height, ratio, cosine, phase=bends))
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
     phase = float(fraction(phases.phase[row], references.phase))
     index = 1.0 + float(path.refractivity[0])
