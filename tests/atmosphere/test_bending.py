@@ -72,3 +72,10 @@ def test_what_no_air_has_is_refused():
         bending.excess_bound(1.0, 10.0)
     with pytest.raises(ValidityError, match="no chord so long"):
         bending.excess_bound(0.01, 300.0)
+
+
+def test_what_is_no_length_or_excess_is_refused():
+    with pytest.raises(ValidityError, match="excess -1e-06 m is outside"):
+        bending.steepest_gradient(-1e-6, 120.0)
+    with pytest.raises(ValidityError, match="length -1 m is outside"):
+        bending.excess_bound(1e-6, -1.0)

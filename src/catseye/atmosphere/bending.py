@@ -30,6 +30,8 @@ from catseye.atmosphere.path import DRY_AIR_KG_PER_MOL, GAS_CONSTANT, STANDARD_G
 from catseye.constants import ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
+LENGTH = Limit("length", "m", 0.0, 1e5, "a ray in the lower air")
+EXCESS = Limit("excess", "m", 0.0, 1.0, "a small excess", places=1)
 GRADIENT = Limit("gradient of the index", "1/m", -0.01, 0.01, "air", places=2)
 
 
@@ -141,6 +143,7 @@ def excess_bound(gradient, length):
     0.048
     """
     GRADIENT.check(gradient)
+    LENGTH.check(length)
     g, d = np.abs(np.asarray(gradient, float)), np.asarray(length, float)
     half = 0.5 * g * d
     if np.any(half >= 1.0):
@@ -155,12 +158,16 @@ def excess_bound(gradient, length):
 def steepest_gradient(excess, length):
     """Gradient of the index up to which the excess stays below a value over a length, in 1/m.
 
-    excess   m, above zero
-    length   of the chord, m
+    excess   m, 0 to 1
+    length   of the chord, m, above 0
+
+    Raises ValidityError outside.
 
     Source: the first term of `excess_bound`, sqrt(24 excess/d³).
 
     >>> round(float(steepest_gradient(0.2e-6, 120.0)) * 1e6, 3)
     1.667
     """
+    EXCESS.check(excess)
+    LENGTH.check(length)
     return np.sqrt(24.0 * np.asarray(excess, float) / np.asarray(length, float) ** 3)

@@ -60,6 +60,8 @@ def group_index(
     1.00067063
     """
     turns = np.asarray(cycles) - np.asarray(phase, dtype=float) / TWO_PI
+    if np.any(np.isinf(turns)):
+        raise ValidityError("phase or cycles are infinite; give nan where there is none")
     return -TWO_PI * turns / phase_slope(path_length, modulation_hz=modulation_hz)
 
 
