@@ -189,6 +189,7 @@ def _draw_ground(ax) -> None:
 
 def main(directory: str) -> None:
     sys.stdout.write(f"{table()}\n\n{hot_table()}\n")
+    Path(directory).mkdir(parents=True, exist_ok=True)
     Path(directory, "bending.svg").write_text(figure(), encoding="utf-8")
 
 

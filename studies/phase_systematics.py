@@ -150,6 +150,7 @@ def main(figure: str | None) -> None:
     )
     sys.stdout.write(night())
     if figure is not None:
+        Path(figure).parent.mkdir(parents=True, exist_ok=True)
         Path(figure).write_text(draw(rows), encoding="utf-8")
 
 

@@ -237,6 +237,7 @@ def _draw_lean(ax) -> None:
 def main(directory: str) -> None:
     tables = (sensitivity_table(), scatter_table(), use_table(), aim_table(), air_table())
     sys.stdout.write("\n\n".join(tables) + "\n")
+    Path(directory).mkdir(parents=True, exist_ok=True)
     Path(directory, "triplet-tolerances.svg").write_text(figure(), encoding="utf-8")
 
 

@@ -83,8 +83,8 @@ def test_h_corr_of_the_wrong_sign_in_the_sheets_moves_the_dish_as_a_whole(clear,
 
 
 def test_without_obliquity_the_prisms_go_wrong(clear, monkeypatch):
-    monkeypatch.setattr(shots, "obliquity_correction", lambda height, n, c: np.zeros(np.shape(c)))
-    monkeypatch.setattr(shots, "obliquity_slope", lambda height, n, c: np.zeros(np.shape(c)))
+    monkeypatch.setattr(shots, "obliquity_correction", lambda height, n, c, **_: np.zeros(np.shape(c)))
+    monkeypatch.setattr(shots, "obliquity_slope", lambda height, n, c, **_: np.zeros(np.shape(c)))
     wrong = reduce_epoch(clear[0])
     apart = [
         np.linalg.norm(wrong.coordinates.x[wrong.coordinates.index(n)] - clear[1].coordinates.x[k])
