@@ -8,8 +8,6 @@
 A motion is given by terms, or by a table over elevation and temperature; see docs/formats/structural-model.md.
 """
 
-import json
-from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -21,6 +19,7 @@ from catseye.errors import ValidityError
 from catseye.geometry.deformation import factors
 from catseye.records.reading import read_record
 from catseye.records.record import Certificate, Length, Name, Record, Vector, Version, Within, broken_rule
+from catseye.records.toml_text import toml_value
 
 FORMAT = "catseye-structural-model-1"
 MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
@@ -317,21 +316,8 @@ def _table(values: dict[str, Any], *inner: str) -> list[str]:
 
 def _pair(key: str, value: Any) -> str:
     if isinstance(value, tuple) and value and isinstance(value[0], tuple):
-        return f"{key} = [\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
-    return f"{key} = {_value(value)}"
-
-
-def _value(value: Any) -> str:
-    """A value as TOML writes it.
-
-    >>> _value((1.5, 2, "x"))
-    '[1.5, 2, "x"]'
-    """
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, str):  # a JSON string is a basic string of TOML but for one character
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return value.isoformat() if isinstance(value, date) else repr(value)
+        return f"{key} = [\n" + "".join(f"  {toml_value(row)},\n" for row in value) + "]"
+    return f"{key} = {toml_value(value)}"
 
 
 def flattened(values: Any) -> list[float]:
