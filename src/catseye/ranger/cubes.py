@@ -1,0 +1,180 @@
+"""The cubes that a ZY knows, where its mirror must look for them, and what was measured last.
+
+Encoder values are computed when they are asked for, kept, and dropped when the cube's coordinates or the ranger's own
+geometry change. Those of the internal cube, number 0, ZRG, are never computed: they are set.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import InputError
+from catseye.geometry.encoder import choice, prime_counts
+from catseye.geometry.pointing import Station, aim
+from catseye.ranger.values import Value
+
+REFERENCE = "ZRG"
+GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What one measurement gave: V, rad, mm (of a benchmark the group index; None without a reference), ticks."""
+
+    amplitude: float
+    phase: float
+    distance: float | None
+    ticks: int
+
+
+@dataclass(frozen=True)
+class Cube:
+    """One target.
+
+    number, name   0 is ZRG
+    place_mm       ground frame
+    kind           R internal, S standard, B benchmark
+    value_mm       constant of a standard cube's prism, certified distance of a benchmark
+    shot           the last, None before it
+    """
+
+    number: int
+    name: str
+    place_mm: tuple[float, float, float]
+    kind: str = "S"
+    value_mm: float = 0.0
+    shot: Shot | None = None
+
+
+class Cubes:
+    """Table of cubes and the ranger's geometry.
+
+    limits   counts, lowest and highest azimuth
+    """
+
+    def __init__(self, limits: tuple[float, float]):
+        self.limits = limits
+        self.geometry: dict[str, tuple[float, ...]] = {
+            "BP": (0.0, 0.0, 0.0),
+            "ALPHA": (0.0, 0.0, 0.0),
+            "BETA": (0.0, 0.0),
+            "MO": (0.0, 0.0, 0.0),
+            "EZ": (0.0, 0.0),
+        }
+        self.allocated = 0
+        self.by_number: dict[int, Cube] = {0: Cube(0, REFERENCE, (0.0, 0.0, 0.0), "R")}
+        self._counts: dict[int, list[float | None]] = {0: [None, None]}
+        self._station: Station | None = None
+        self.computed = 0  # times that encoder values were computed
+
+    @property
+    def station(self) -> Station:
+        """The mirror on its monument. Source: [PARKER04] section 2.2."""
+        if self._station is None:
+            g = self.geometry
+            self._station = Station(
+                np.array(g["BP"]) * MILLIMETRE,
+                np.array(g["ALPHA"]),
+                np.array(g["MO"]) * MILLIMETRE,
+                np.array(g["BETA"]),
+                np.array(g["EZ"]),
+            )
+        return self._station
+
+    def allocate(self, count: int) -> None:
+        """Room for cubes 1 to count; those there were are dropped, ZRG stays."""
+        self.allocated = count
+        self.by_number = {0: self.by_number[0]}
+        self._counts = {0: self._counts[0]}
+
+    def set_geometry(self, name: str, values: tuple[float, ...]) -> None:
+        """One of `GEOMETRY`; every encoder value but ZRG's is dropped."""
+        self.geometry[name] = values
+        self._station = None
+        self._counts = {0: self._counts[0]}
+
+    def find(self, key: Value) -> Cube:
+        """The cube of a number or a name, whatever its case.
+
+        Raises InputError: no such cube.
+        """
+        if isinstance(key, int):
+            cube = self.by_number.get(key)
+        else:
+            cube = next((c for c in self.by_number.values() if c.name.upper() == str(key).upper()), None)
+        if cube is None:
+            raise InputError(f"cube {key} is not known (expected one of {len(self.by_number)} that COO lists)")
+        return cube
+
+    def place(self, key: Value, place_mm: tuple[float, float, float], name: str | None) -> Cube:
+        """Move a cube, or create or replace it where a name is given.
+
+        Raises InputError: ZRG, not allocated, unknown without a name, or the name of another cube.
+        """
+        if name is None or not isinstance(key, int):
+            old = self.find(key)
+            cube = replace(old, place_mm=place_mm, shot=None, name=old.name if name is None else name)
+        else:
+            cube = Cube(key, name, place_mm)
+        if cube.number == 0:
+            raise InputError("cube 0 is ZRG, inside the instrument (expected 1 or above; its distance is D0)")
+        if not 1 <= cube.number <= self.allocated:
+            raise InputError(f"cube {cube.number} is not allocated (expected 1 to {self.allocated}; INI allocates)")
+        other = next((c for c in self.by_number.values() if c.name.upper() == cube.name.upper()), cube)
+        if other.number != cube.number:
+            raise InputError(f"name {cube.name} is that of cube {other.number} (expected another)")
+        self.put(cube)
+        self._counts.pop(cube.number, None)
+        return cube
+
+    def put(self, cube: Cube) -> None:
+        """The cube instead of the one of its number, its encoder values untouched."""
+        self.by_number[cube.number] = cube
+
+    def counts(self, cube: Cube) -> tuple[float, float]:
+        """Encoder values of a cube.
+
+        Raises InputError: ZRG's were not set, or no setting within the stops looks at the cube.
+        """
+        kept = self._counts.setdefault(cube.number, [None, None])
+        if None in kept:
+            if cube.number == 0:
+                raise InputError("encoder values of ZRG are not set (expected AZM 0, e and ELV 0, e first)")
+            found = self.look(cube.place_mm)
+            kept[:] = [old if old is not None else new for old, new in zip(kept, found.tolist(), strict=True)]
+        return float(kept[0] or 0.0), float(kept[1] or 0.0)
+
+    def set_counts(self, cube: Cube, axis: int, value: float) -> None:
+        """An encoder value given by hand, kept until it would be dropped."""
+        self._counts.setdefault(cube.number, [None, None])[axis] = value
+
+    def one_count(self, cube: Cube, axis: int) -> float:
+        """One encoder value; of ZRG the other need not be set."""
+        kept = self._counts.get(cube.number, [None, None])[axis]
+        return kept if kept is not None else self.counts(cube)[axis]
+
+    def look(self, place_mm: tuple[float, ...], current: tuple[float, float] | None = None) -> NDArray[np.float64]:
+        """(2,) counts for a point, direct pointing where the stops allow it, else the prime one.
+
+        place_mm   ground frame
+        current    counts where the mirror stands: then the nearer of the two pointings
+
+        Raises InputError: neither is allowed. Source: [PARKER04] eq. 2.12 to 2.26, section 2.4.
+        """
+        self.computed += 1
+        found = aim(self.station, np.array(place_mm) * MILLIMETRE)
+        direct = np.array([found.azimuth_counts, found.elevation_counts])
+        prime = np.array(prime_counts(direct[0], direct[1], self.station.zeros[1]))
+        taken = choice(direct, prime, low=self.limits[0], high=self.limits[1], current=current)
+        if not taken.allowed:
+            raise InputError(
+                f"no setting within the stops {self.limits[0]:g} to {self.limits[1]:g} counts looks at "
+                f"{', '.join(f'{v:.3f}' for v in place_mm)} mm"
+            )
+        return np.asarray(taken.counts)
+
+    def coarse_mm(self, cube: Cube) -> float:
+        """Distance from the scan point by coordinates."""
+        return float(np.linalg.norm(np.array(cube.place_mm) - self.station.scan_point / MILLIMETRE))

@@ -1,0 +1,171 @@
+"""What a ZY server asks of hardware: fire and give a buffer, axes, power, temperature, clock.
+
+No call may block: a buffer, a move and a search for the index are started, and asked about later. The server looks at
+each head in its own loop. Axis 0 is azimuth, 1 elevation. A real head is an A/D card, a motion chip for each axis and
+a clock card behind these methods; tests/ranger/head_conformance.py is what all heads must meet.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.time_tag import TimeTag
+
+LARGEST_BUFFER = 65_536  # samples: the converter's DMA buffer
+FASTEST_SAMPLING_HZ = 100_000
+HIGHEST_IF_HZ = 10_000
+FEWEST_SAMPLES = 3  # of a cycle: fewer have no phase
+Homing = Literal["never", "searching", "home", "failed"]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a buffer is taken: `SFQ`, `CYC`, `IFF`.
+
+    samples        of a cycle, at least 3
+    cycles         at least 1; samples times cycles at most 65 536
+    frequency_hz   intermediate frequency, 1 to 10 000; times samples at most 100 000
+
+    Raises ValidityError outside these. Source: [CREAGER02] limits of the converter.
+
+    >>> Sampling().duration
+    0.128
+    """
+
+    samples: int = 64
+    cycles: int = 128
+    frequency_hz: int = 1000
+
+    def __post_init__(self) -> None:
+        n, m, f = self.samples, self.cycles, self.frequency_hz
+        if n < FEWEST_SAMPLES or m < 1 or not 1 <= f <= HIGHEST_IF_HZ:
+            raise ValidityError(
+                f"{n} samples, {m} cycles, {f} Hz (expected at least {FEWEST_SAMPLES}, at least 1, 1 to "
+                f"{HIGHEST_IF_HZ} Hz)"
+            )
+        if n * m > LARGEST_BUFFER:
+            raise ValidityError(f"{m} cycles of {n} samples are {n * m} words (expected at most {LARGEST_BUFFER})")
+        if n * f > FASTEST_SAMPLING_HZ:
+            raise ValidityError(
+                f"{n} samples at {f} Hz are {n * f} samples a second (expected at most {FASTEST_SAMPLING_HZ})"
+            )
+
+    @property
+    def duration(self) -> float:
+        """Of a buffer, s."""
+        return self.cycles / self.frequency_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Buffer:
+    """The samples of one shot.
+
+    samples          (m n,) int16, codes of the converter
+    triggered        when the first was taken
+    sampling         how
+    volts_per_code   V
+    """
+
+    samples: NDArray[np.int16]
+    triggered: TimeTag
+    sampling: Sampling
+    volts_per_code: float
+
+
+class Head(Protocol):
+    """The hardware of one ranger."""
+
+    def now(self) -> TimeTag:
+        """UTC of the head's clock, which does not run backwards unless set."""
+        ...
+
+    def set_clock(self, tag: TimeTag) -> None:
+        """Set the clock."""
+        ...
+
+    def clock_locked(self) -> bool:
+        """Whether the clock follows its time signal."""
+        ...
+
+    def trigger(self, sampling: Sampling) -> None:
+        """Begin to take a buffer; one being taken is given up."""
+        ...
+
+    def buffer(self) -> Buffer | None:
+        """The last buffer whole; None before the first and while one is being taken."""
+        ...
+
+    def enable(self, axis: int, on: bool) -> None:
+        """The amplifier of an axis; off at boot."""
+        ...
+
+    def enabled(self, axis: int) -> bool:
+        """Whether the amplifier is on."""
+        ...
+
+    def actual(self, axis: int) -> int:
+        """Where the encoder says the axis is, counts."""
+        ...
+
+    def desired(self, axis: int) -> int:
+        """Where the profile wants it, counts."""
+        ...
+
+    def start(self, axis: int, position: int, *, velocity: int, acceleration: int) -> bool:
+        """Begin a trapezoidal move in the motion chip's integers; False where it cannot begin."""
+        ...
+
+    def follow(self, counts: tuple[NDArray[np.float64], NDArray[np.float64]], when: tuple[TimeTag, TimeTag]) -> bool:
+        """Follow counts (2,) linearly from the first time to the second, both axes; False where it cannot."""
+        ...
+
+    def moving(self, axis: int) -> bool:
+        """Whether a profile, or a search for the index, is under way."""
+        ...
+
+    def motor_off(self, axis: int) -> bool:
+        """Whether the chip switched the motor off: position error past its limit. The next move clears it."""
+        ...
+
+    def set_filter(self, axis: int, values: tuple[int, int, int, int, int]) -> None:
+        """Filter: kp, ki, kd, integration limit, derivative interval."""
+        ...
+
+    def set_error_limit(self, axis: int, counts: int) -> None:
+        """Position error past which the motor goes off."""
+        ...
+
+    def find_home(self, axis: int) -> None:
+        """Begin to look for the index, which becomes zero."""
+        ...
+
+    def homing(self, axis: int) -> Homing:
+        """How the last search stands."""
+        ...
+
+    def stop(self) -> None:
+        """Both axes stop as they can; what is under way is given up."""
+        ...
+
+    def switch_laser(self, on: bool) -> None:
+        """The laser's power."""
+        ...
+
+    def laser_on(self) -> bool:
+        """Whether the laser shines."""
+        ...
+
+    def supplies(self) -> dict[str, float]:
+        """Power supplies by name, V."""
+        ...
+
+    def enclosure_temperature_c(self) -> float:
+        """Temperature in the enclosure, NaN where it is not known."""
+        ...
+
+    def reset(self) -> None:
+        """As when power comes on: amplifiers off, nothing homed, no buffer, laser as the hardware has it."""
+        ...

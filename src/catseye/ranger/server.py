@@ -1,0 +1,192 @@
+"""A ZY on TCP: two ports, one connection each; both hear everything, each may command.
+
+What one connection may cost is bounded: a line of 1024 bytes, 200 lines a second (what comes faster is left unread, not
+dropped), 64 commands that wait, 4 MiB not yet taken by a slow peer (which is then cut off).
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+from catseye.errors import InputError
+from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
+from catseye.ranger.ranger import Outgoing, Ranger
+
+PORTS = (5240, 5241)
+LOOPBACK = "127.0.0.1"
+KEEP_ALIVE = 60.0  # s
+LINES_A_SECOND = 200.0
+MOST_AT_ONCE = 400.0  # lines
+MOST_WAITING = 64  # commands of one connection
+MOST_UNSENT = 4 * 2**20  # bytes
+TURN = 0.005  # s between two passes while nothing else happens
+LOG = logging.getLogger(__name__)
+
+
+class Connection(asyncio.Protocol):
+    """One client; `number` is its place among the ports."""
+
+    def __init__(self, server: "ZyServer", number: int):
+        self.server, self.number = server, number
+        self.transport: asyncio.Transport | None = None
+        self.unread = bytearray()
+        self.lines_left, self.paused = MOST_AT_ONCE, False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        self.server.joined(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.server.left(self)
+
+    def data_received(self, data: bytes) -> None:
+        self.unread += data
+        self.read_on()
+
+    def read_on(self) -> None:
+        """Hand over whole lines as far as rate and queue allow; otherwise stop reading from the peer."""
+        ranger = self.server.ranger
+        while self.lines_left >= 1.0 and ranger.waiting(self.number) < MOST_WAITING:
+            end = self.unread.find(b"\n", 0, LONGEST_REQUEST + 3)
+            if end < 0:
+                if len(self.unread) > LONGEST_REQUEST + 2:
+                    self.refuse(f"line is longer than {LONGEST_REQUEST} bytes")
+                break
+            line = bytes(self.unread[:end]).removesuffix(b"\r")
+            del self.unread[: end + 1]
+            self.lines_left -= 1.0
+            self.server.send(ranger.receive(self.number, line.decode("ascii", "replace")))
+        full = b"\n" in self.unread
+        if self.transport is not None and full != self.paused and not self.transport.is_closing():
+            (self.transport.pause_reading if full else self.transport.resume_reading)()
+            self.paused = full
+
+    def refuse(self, text: str) -> None:
+        """Say why, and close."""
+        self.unread.clear()
+        self.tell(Reply("LINE", False, (text,), 0, self.server.ranger.now_ticks()))
+        if self.transport is not None:
+            self.transport.close()
+
+    def tell(self, reply: Reply) -> None:
+        self.write(format_reply(reply).encode("ascii") + b"\n")
+
+    def write(self, data: bytes) -> None:
+        """Send; a peer that does not take what it is sent is cut off."""
+        if self.transport is None or self.transport.is_closing():
+            return
+        self.transport.write(data)
+        if self.transport.get_write_buffer_size() > MOST_UNSENT:
+            LOG.warning("%s: port %d cut off: more than %d bytes not taken", *self._named(), MOST_UNSENT)
+            self.transport.abort()
+
+    def _named(self) -> tuple[str, int]:
+        return self.server.ranger.name, self.server.ports[self.number]
+
+
+class ZyServer:
+    """A ranger behind its two ports.
+
+    ranger   with its head
+    host     address to listen at; only this machine unless told otherwise
+    ports    two; 0 takes any free one, `ports` says which after `start`
+    clock    s, never backwards; for keep-alive and rates
+    """
+
+    def __init__(
+        self,
+        ranger: Ranger,
+        host: str = LOOPBACK,
+        ports: tuple[int, int] = PORTS,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.ranger, self.host, self.ports, self.clock = ranger, host, ports, clock
+        self.connections: dict[int, Connection] = {}
+        self._servers: list[asyncio.Server] = []
+        self._last_keep_alive = self._last_rate = clock()
+
+    async def start(self) -> None:
+        """Listen. Raises InputError where a port cannot be had."""
+        loop = asyncio.get_running_loop()
+        taken: list[int] = []
+        for number, port in enumerate(self.ports):
+            try:
+                server = await loop.create_server(lambda number=number: Connection(self, number), self.host, port)  # type: ignore[misc]
+            except OSError as problem:
+                await self.stop()
+                raise InputError(
+                    f"{self.ranger.name}: {self.host} port {port} cannot be had: {problem.strerror}"
+                ) from problem
+            self._servers.append(server)
+            taken.append(server.sockets[0].getsockname()[1])
+        self.ports = (taken[0], taken[1])
+
+    async def stop(self) -> None:
+        """Close the connections and listen no more."""
+        for connection in list(self.connections.values()):
+            if connection.transport is not None:
+                connection.transport.close()
+        for server in self._servers:
+            server.close()
+        for server in self._servers:
+            await server.wait_closed()
+        self._servers.clear()
+
+    async def serve(self, sleep: Callable[[float], Awaitable[None]] = asyncio.sleep) -> None:
+        """Turn until cancelled; `start` first."""
+        while True:
+            self.turn()
+            await sleep(0.0 if self.ranger.has_queued else TURN)
+
+    def turn(self) -> None:
+        """One pass: rates, the ranger's own pass, keep-alive."""
+        now = self.clock()
+        gained, self._last_rate = (now - self._last_rate) * LINES_A_SECOND, now
+        for connection in list(self.connections.values()):
+            connection.lines_left = min(MOST_AT_ONCE, connection.lines_left + gained)
+            if connection.unread:
+                connection.read_on()
+        self.send(self.ranger.turn())
+        if now - self._last_keep_alive >= KEEP_ALIVE:
+            self._last_keep_alive = now
+            for connection in list(self.connections.values()):
+                connection.write(b"\n")
+
+    def send(self, told: list[Outgoing]) -> None:
+        """Give replies to those they are for."""
+        for out in told:
+            reply = out.reply
+            if reply.command == "BYE" and reply.ok and out.client is not None:
+                reply = replace(reply, values=(str(self.ports[out.client]), *reply.values))
+            line = format_reply(reply).encode("ascii") + b"\n"
+            for number, connection in list(self.connections.items()):
+                if out.client in (None, number):
+                    connection.write(line)
+                    if reply.command == "BYE" and reply.ok and connection.transport is not None:
+                        connection.transport.close()
+
+    def joined(self, connection: Connection) -> None:
+        """A connection begins; a second one on a port is turned away."""
+        port = self.ports[connection.number]
+        if connection.number in self.connections:
+            connection.tell(
+                Reply(
+                    "CONNECT", False, (f"port {port} is taken (expected the other port)",), 0, self.ranger.now_ticks()
+                )
+            )
+            if connection.transport is not None:
+                connection.transport.close()
+            return
+        self.connections[connection.number] = connection
+        for out in self.ranger.greeting(port):
+            connection.tell(out.reply)
+
+    def left(self, connection: Connection) -> None:
+        """A connection is over: what it had queued and scheduled is dropped, and its port is free."""
+        if self.connections.get(connection.number) is connection:
+            del self.connections[connection.number]
+            self.ranger.disconnect(connection.number)

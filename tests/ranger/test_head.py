@@ -1,0 +1,35 @@
+"""Limits of the sampling, and the scripted head against the suite that every head must pass."""
+
+import pytest
+
+from catseye.errors import ValidityError
+from catseye.ranger.head import Sampling
+from ranger.head_conformance import HeadConformance
+from ranger.scripted_head import ScriptedHead
+
+
+class TestScriptedHead(HeadConformance):
+    def head(self):
+        return ScriptedHead()
+
+    def pass_time(self, head, seconds):
+        head.advance(seconds)
+
+
+def test_the_default_is_8192_words_in_128_ms():
+    assert Sampling().samples * Sampling().cycles == 8192
+    assert Sampling().duration == 0.128
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [((64, 1200, 1000), "76800 words"), ((64, 128, 2000), "128000 samples a second"), ((64, 0, 1000), "0 cycles")],
+)
+def test_the_quoted_limits(values, said):
+    with pytest.raises(ValidityError, match=said):
+        Sampling(*values)
+
+
+def test_the_limits_themselves_are_legal():
+    assert Sampling(64, 1024, 1562).samples == 64  # 65 536 words, 99 968 samples a second
+    assert Sampling(10, 1, 10_000).duration == pytest.approx(1e-4)

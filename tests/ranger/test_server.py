@@ -1,0 +1,396 @@
+"""Server and client on real loopback sockets; clocks are injected, and nothing sleeps."""
+
+import asyncio
+import random
+import socket
+
+import numpy as np
+import pytest
+
+from catseye.errors import InputError
+from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
+from catseye.ranger.commands import COMMANDS
+from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
+from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, Connection, ZyServer
+from ranger.ranger_scene import ready
+
+
+class Site:
+    """A served ranger, its head's time and the server's clock."""
+
+    def __init__(self, **options):
+        self.told = ready(**options)
+        self.head, self.ranger = self.told.head, self.told.ranger
+        self.now = 0.0
+        self.server = ZyServer(self.ranger, ports=(0, 0), clock=lambda: self.now)
+
+    async def __aenter__(self):
+        await self.server.start()
+        return self
+
+    async def __aexit__(self, *_):
+        await self.server.stop()
+        await asyncio.sleep(0)
+
+    async def turns(self, count, stride=0.02):
+        for _ in range(count):
+            self.server.turn()
+            self.head.advance(stride)
+            await asyncio.sleep(0)
+
+    async def until(self, done, stride=0.02):
+        for _ in range(20_000):
+            if done():
+                return
+            await self.turns(1, stride)
+        raise AssertionError("it never came")
+
+    async def answered(self, waiting):
+        task = asyncio.ensure_future(waiting)
+        await self.until(task.done)
+        return task.result()
+
+    async def client(self, number=0, **options):
+        return await self.answered(
+            ZyClient.connect(LOOPBACK, self.server.ports[number], clock=lambda: self.now, **options)
+        )
+
+    async def typed(self, number=0):
+        return await self.answered(asyncio.open_connection(LOOPBACK, self.server.ports[number]))
+
+
+def run(story):
+    asyncio.run(story())
+
+
+def test_a_person_on_nc_can_drive_a_ranger():
+    async def story():
+        async with Site() as site:
+            site.ranger.name = "ZY11"
+            reader, writer = await site.typed()
+            port = site.server.ports[0]
+            greeting = [(await site.answered(reader.readline())).decode().split("\t") for _ in range(3)]
+            assert [g[0] for g in greeting] == ["0"] * 3
+            assert [g[2] for g in greeting] == [
+                "HELLO This is ZY11 ver. 2.20\n",
+                f"CONNECT 1, {port}\n",
+                "STW 1, 0x00013007\n",
+            ]
+            writer.write(b"\r\ncmeas 1, zrg\r\nxyz\nbye\n")
+            said = [(await site.answered(reader.readline())).decode() for _ in range(3)]
+            assert said[0].split("\t")[2].startswith("CMEAS 1, 1, 0, ZRG, ")
+            assert said[1].endswith("UNKNOWN command XYZ\n")
+            assert said[2].startswith("0\t52889.")
+            assert said[2].endswith(f"\tBYE 1, {port}, Closing Connection\n")
+            assert await site.answered(reader.read()) == b""
+            writer.close()
+
+    run(story)
+
+
+def test_two_clients_hear_everything_but_a_buffer_goes_to_who_asked_and_a_third_is_turned_away():
+    async def story():
+        async with Site() as site:
+            heard = []
+            one = await site.client(0)
+            two = await site.client(1, first_tid=SECOND_CLIENT_TID, heard=heard.append)
+            await site.until(lambda: len(heard) >= 3)
+            reply = await site.answered(one.ask("CMEAS", 1, "ZG11"))
+            await site.until(lambda: any(r.command == "CMEAS" for r in heard))
+            assert reply in heard
+            buffer = await site.answered(one.ask("BUF"))
+            assert len(buffer.values[-1]) == 21_848  # 16 384 bytes in base64
+            assert (await site.answered(two.ask("D0"))).text == "181.2000"
+            await site.turns(5)
+            assert not any(r.command == "BUF" for r in heard)
+            reader, writer = await site.typed(0)
+            line = (await site.answered(reader.readline())).decode()
+            assert f"CONNECT 0, port {site.server.ports[0]} is taken" in line
+            assert await site.answered(reader.read()) == b""
+            writer.close()
+            one.close()
+            two.close()
+
+    run(story)
+
+
+def test_keep_alives_come_each_60_s_and_not_before():
+    async def story():
+        async with Site() as site:
+            reader, writer = await site.typed()
+            for _ in range(3):
+                await site.answered(reader.readline())
+            for site.now, due in ((59.9, False), (60.0, True), (119.0, False), (120.0, True)):
+                line = asyncio.ensure_future(reader.readline())
+                await site.turns(20)
+                assert line.done() == due
+                if due:
+                    assert line.result() == b"\n"
+                else:
+                    line.cancel()
+                    await site.turns(1)
+            writer.close()
+
+    run(story)
+
+
+def test_a_client_keeps_alive_and_gives_up_a_silent_ranger():
+    async def story():
+        async with Site() as site:
+            client = await site.client()
+            await site.turns(10)
+            sent = []
+            client._write = sent.append
+            for site.now in (59.0, 60.0):
+                client.check()
+            assert sent == [""]
+            site.now = 151.0
+            client.check()
+            assert client.closed.result() == "nothing heard for 150 s"
+            assert (await site.answered(client.ask("VER"))).ok is False
+
+    run(story)
+
+
+def test_many_requests_are_outstanding_and_each_gets_its_own_answer():
+    async def story():
+        async with Site() as site:
+            client = await site.client(first_tid=LAST_TID - 1)
+            called = []
+            asked = [client.request("COO", 1 + k % 2) for k in range(150)]
+            tid, future = client.request("SEQ", then=called.append)
+            assert [t for t, _ in asked[:4]] == [LAST_TID - 1, LAST_TID, 1000, 1001]
+            assert client.outstanding == 151
+            await site.until(lambda: all(f.done() for _, f in asked) and future.done(), 0.001)
+            assert [f.result().values[0] for _, f in asked] == ["1", "2"] * 75
+            assert all(f.result().tid == t for t, f in asked)
+            assert called[0].ok is False  # no buffer yet
+            client.forget(tid)
+            assert client.outstanding == 0
+            assert [r.values[1] for r in await site.answered(client.ask_all("COO"))] == ["ZRG", "ZG11", "ZG12"]
+            assert (await site.answered(client.ask("XYZ"))).command == "UNKNOWN"
+            client.close()
+
+    run(story)
+
+
+def test_a_lost_connection_answers_what_is_outstanding_and_frees_port_and_schedule():
+    async def story():
+        async with Site() as site:
+            client = await site.client()
+            assert (await site.answered(client.ask("AT", "60000", 5, 1, "TRG"))).ok
+            _, waiting = client.request("CMEAS", 1, 1)
+            next(iter(site.server.connections.values())).transport.abort()
+            reply = await site.answered(waiting)
+            assert reply.ok is False
+            assert reply.text.startswith("connection lost")
+            assert site.ranger.scheduler.entries == []
+            again = await site.client()
+            assert (await site.answered(again.ask("VER"))).values == ("ZY101", "2.20")
+            again.close()
+
+    run(story)
+
+
+def test_a_flood_is_slowed_not_lost_and_memory_stays_bounded():
+    async def story():
+        async with Site() as site:
+            flood = socket.create_connection((LOOPBACK, site.server.ports[0]))
+            flood.setblocking(False)
+            other = await site.client(1, first_tid=SECOND_CLIENT_TID)
+            await site.until(lambda: 0 in site.server.connections)
+            sent = flood.send(b"D0\n" * 2000)
+            assert sent == 6000
+            await site.turns(int(MOST_AT_ONCE) + 50)
+            connection = site.server.connections[0]
+            assert connection.paused
+            assert len(connection.unread) == 3 * (2000 - int(MOST_AT_ONCE))
+            assert site.ranger.waiting(0) <= MOST_WAITING
+            assert (await site.answered(other.ask("VER"))).ok
+            heard = 0
+            for _ in range(400):
+                site.now += 0.05
+                await site.turns(10)
+                try:
+                    heard += flood.recv(2**20).count(b"D0 1, ")
+                except BlockingIOError:
+                    continue
+                if heard == 2000:
+                    break
+            assert heard == 2000
+            flood.close()
+            other.close()
+
+    run(story)
+
+
+@pytest.mark.parametrize("junk", [b"A" * (LONGEST_REQUEST + 10), b"\x00" * 5000, b"A" * 3000 + b"\n"])
+def test_a_line_without_end_is_refused_and_only_its_connection_closed(junk):
+    async def story():
+        async with Site() as site:
+            reader, writer = await site.typed(0)
+            other = await site.client(1)
+            writer.write(junk)
+            rest = (await site.answered(reader.read())).decode()
+            assert "LINE 0, line is longer than 1024 bytes" in rest
+            assert (await site.answered(other.ask("VER"))).ok
+            writer.close()
+            other.close()
+
+    run(story)
+
+
+class FullTransport(asyncio.Transport):
+    """A peer that takes nothing: how much a kernel takes on its behalf differs from machine to machine."""
+
+    def __init__(self):
+        super().__init__()
+        self.kept, self.cut = 0, False
+
+    def write(self, data):
+        self.kept += len(data)
+
+    def get_write_buffer_size(self):
+        return self.kept
+
+    def is_closing(self):
+        return self.cut
+
+    def close(self):
+        self.cut = True
+
+    abort = close
+
+
+def test_a_client_that_does_not_read_is_cut_off_and_costs_the_other_nothing():
+    async def story():
+        async with Site() as site:
+            other = await site.client(1)
+            slow, full = Connection(site.server, 0), FullTransport()
+            slow.connection_made(full)
+            assert (await site.answered(other.ask("CYC", 1024))).ok
+            assert (await site.answered(other.ask("TRG"))).ok
+            asked = 0
+            while not full.cut and asked < 100:
+                slow.data_received(b"BUF\n")
+                await site.turns(2)
+                asked += 1
+            assert full.cut
+            assert full.kept <= MOST_UNSENT + LONGEST_REPLY
+            slow.connection_lost(None)
+            assert (await site.answered(other.ask("VER"))).ok
+            other.close()
+
+    run(story)
+
+
+def fuzzed(rng):
+    """A line: bytes, a mangled command, or a command with odd values."""
+    kind = rng.random()
+    if kind < 0.3:
+        return bytes(rng.randrange(256) for _ in range(rng.randrange(60))).replace(b"\n", b" ") + b"\n"
+    name = rng.choice([n for n in COMMANDS if n not in ("BYE", "SCN")])
+    values = [
+        rng.choice(["0", "1", "2", "-1", "1e300", "nan", "ZG11", "", "65536", "0.5", "x" * 40, "52889.5", "1\t2", ";"])
+        for _ in range(rng.randrange(6))
+    ]
+    line = f"{rng.choice(['', '7	', '1000	52889.0	', 'x	'])}{name} {', '.join(values)}".encode()
+    if kind < 0.5:
+        at = rng.randrange(len(line) + 1)
+        line = line[:at] + bytes([rng.randrange(256)]).replace(b"\n", b"?") + line[at + 1 :]
+    return line + b"\n"
+
+
+def fuzz(lines, seed):
+    async def story():
+        async with Site() as site:
+            rng = random.Random(seed)
+            reader, writer = await site.typed(0)
+            other = await site.client(1, first_tid=SECOND_CLIENT_TID)
+            heard = bytearray()
+
+            async def listen():
+                while data := await reader.read(2**16):
+                    heard.extend(data)
+
+            task = asyncio.ensure_future(listen())
+            for k in range(lines):
+                writer.write(fuzzed(rng))
+                site.now += 0.02
+                if k % 20 == 0:
+                    await site.turns(30, 0.5)
+            await site.until(lambda: site.ranger.idle and not site.server.connections[0].unread, 0.5)
+            assert (await site.answered(other.ask("VER"))).values == ("ZY101", "2.20")
+            assert other.bad_lines == 0, other.last_bad
+            await site.turns(20)
+            for line in heard.decode("ascii").splitlines():
+                parse_reply(line)
+            assert heard.count(b"\n") > lines // 4
+            writer.close()
+            other.close()
+            task.cancel()
+            await site.turns(2)
+
+    asyncio.run(story())
+
+
+def test_2000_fuzzed_lines_neither_crash_nor_hang_the_ranger():
+    fuzz(2000, 8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_many_fuzzed_lines_neither_crash_nor_hang_the_ranger(seed):
+    fuzz(10_000, seed)
+
+
+def test_it_listens_on_this_machine_only_and_says_when_a_port_is_taken():
+    async def story():
+        async with Site() as site:
+            assert ZyServer(site.ranger).host == "127.0.0.1"
+            assert ZyServer(site.ranger).ports == (5240, 5241)
+            twin = ZyServer(site.ranger, ports=site.server.ports)
+            with pytest.raises(InputError, match="cannot be had"):
+                await twin.start()
+            with pytest.raises(InputError, match="no ranger answers at"):
+                await ZyClient.connect(LOOPBACK, 1)
+
+    run(story)
+
+
+def test_a_client_counts_lines_that_it_cannot_read_and_goes_on():
+    async def story():
+        async with Site() as site:
+            client = await site.client()
+            await site.turns(5)
+            client.data_received(b"what\xff\n0\t52889.0\tSTW 1, 0x0")
+            client.data_received(b"0000007\n")
+            assert client.bad_lines == 1
+            assert (await site.answered(client.ask("VER"))).ok
+            client.data_received(b"1" * 300_000)
+            assert "longer than" in client.closed.result()
+
+    run(story)
+
+
+def test_serve_turns_until_it_is_cancelled():
+    async def story():
+        async with Site() as site:
+            slept = []
+
+            async def sleep(seconds):
+                slept.append(seconds)
+                site.head.advance(0.01)
+                await asyncio.sleep(0)
+
+            task = asyncio.ensure_future(site.server.serve(sleep))
+            client = await ZyClient.connect(LOOPBACK, site.server.ports[0])
+            reply = await client.ask("CMEAS", 1, 1)
+            assert np.isfinite(float(reply.values[3]))
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert set(slept) == {0.005}
+            client.close()
+
+    run(story)
