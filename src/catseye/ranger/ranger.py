@@ -31,7 +31,10 @@ MOST_QUEUED = 256  # commands of all connections
 REPLIES_A_TURN = 64
 UPDATE_NS = PER_SECOND // 2
 NEEDED = ("BP", "ALPHA", "BETA", "MO", "EZ", "D0")
-DURING_SCAN_REFUSED = frozenset("STT FHM CIL CMEAS CWT TRG TRK RST INI INITZY CYC SFQ IFF ABP ORD NUM".split())
+REFUSED_IN_A_SCAN = (
+    *("STT", "FHM", "CIL", "CMEAS", "CWT", "TRG", "TRK", "RST"),
+    *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
+)
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
 WATCHED = (
     ("ACP", "0"),
@@ -256,11 +259,7 @@ class Ranger:
             self.scheduler.add(client, replace(later, tid=request.tid), start * TICK_NS, repeats, interval)
             return (str(len(self.scheduler.entries)),)
         values = COMMANDS[request.command].read(request)
-        if (
-            self.scanning
-            and request.command in DURING_SCAN_REFUSED
-            and not COMMANDS[request.command].only_asks(request)
-        ):
+        if self.scanning and request.command in REFUSED_IN_A_SCAN and not COMMANDS[request.command].only_asks(request):
             raise InputError("a scan is under way (expected SCN 0 first)")
         return self._handlers[request.command](self, client, *values)
 
