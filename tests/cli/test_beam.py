@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from catseye.cli import beam  # noqa: F401  its command joins the app
-
 EXAMPLE = Path(__file__).parents[2] / "examples" / "beams" / "head.toml"
 
 

@@ -5,7 +5,6 @@ import json
 import pytest
 import typer
 
-from catseye.cli import glass  # noqa: F401  its command joins the app
 from catseye.cli.commands import app
 from catseye.cli.terminal import attempt
 from catseye.optics import prism

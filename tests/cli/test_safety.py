@@ -5,8 +5,6 @@ import math
 
 import pytest
 
-from catseye.cli import safety  # noqa: F401  its command joins the app
-
 RANGER = (
     "safety", "--power-mw", 10, "--wavelength-um", 0.78, "--diameter-mm", 20, "--divergence-mrad", 0.05,
 )  # fmt: skip

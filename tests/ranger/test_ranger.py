@@ -259,7 +259,7 @@ def test_a_request_with_a_stamp_to_come_waits_for_it_and_a_disconnect_clears():
     told = Told()
     later = stamp_text(told.ranger.now_ticks() + round(2e9 / TICK_NS))
     assert told.say(f"1000\t{later}\tACP 0") == []
-    assert told.one("LST").values[0] == "1"
+    assert told.one("LST").values == ("1", f"{later} 1 ACP")
     assert [o.reply.tid for o in told.turns(60) if o.reply.command == "ACP"] == [1000]
     told.say(f"1000\t{stamp_text(told.ranger.now_ticks() + 10**6)}\tACP 0")
     told.ranger.disconnect(1)

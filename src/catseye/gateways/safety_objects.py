@@ -109,8 +109,13 @@ def _what_if(asked: Question, seconds: float) -> dict[str, float]:
 def _scan(asked: Question) -> dict[str, Any] | None:
     if asked.scan is None:
         return None
-    given = {"duration": asked.seconds, "period": asked.period, "subtense": asked.subtense, "edition": asked.edition}
-    far = sweep_hazard_distance(asked.beam, asked.scan, viewer=BINOCULARS if asked.aided else NAKED, **given)  # type: ignore[arg-type]
+    given: dict[str, Any] = {
+        "duration": asked.seconds,
+        "period": asked.period,
+        "subtense": asked.subtense,
+        "edition": asked.edition,
+    }
+    far = sweep_hazard_distance(asked.beam, asked.scan, viewer=BINOCULARS if asked.aided else NAKED, **given)
     return {"rate": asked.scan, "period": asked.period, "hazard_distance": far}
 
 
@@ -119,10 +124,10 @@ def _returned(asked: Question) -> dict[str, Any] | None:
     if distance is None:
         return None
     viewer = BINOCULARS if asked.aided else NAKED
-    size = {"reflector": asked.reflector_diameter, "viewer": viewer}
+    size: dict[str, Any] = {"reflector": asked.reflector_diameter, "viewer": viewer}
 
     def within(aperture: float) -> float:
-        return returned_power(asked.beam, distance, aperture=aperture, **size)  # type: ignore[arg-type]
+        return returned_power(asked.beam, distance, aperture=aperture, **size)
 
     limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, asked.edition)
     times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda found: found[0])

@@ -3,6 +3,8 @@
 As `safety`: a warning for planning, never a certificate.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,8 +104,8 @@ def sweep_ratio(
     _refuse_sweep(rate, period)
     found = []
     if duration > TIME_BASE:
-        given = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
-        found.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))  # type: ignore[arg-type]
+        given: dict[str, Any] = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
+        found.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))
     for limit in eye_limits(beam.wavelength_um, duration, subtense, edition):
         aperture = viewer.collecting(limit.aperture)
         standing = viewer.transmission * beam.power_within(aperture, distance) / limit.power
@@ -147,8 +149,14 @@ def sweep_hazard_distance(
     from scipy.optimize import brentq
 
     def over(log_distance: float) -> float:
-        given = {"duration": duration, "period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
-        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **given) - 1.0  # type: ignore[arg-type]
+        given: dict[str, Any] = {
+            "duration": duration,
+            "period": period,
+            "viewer": viewer,
+            "subtense": subtense,
+            "edition": edition,
+        }
+        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **given) - 1.0
 
     tried: NDArray[np.float64] = np.linspace(np.log(NEAREST), np.log(far), SEARCH)
     for k in range(SEARCH - 1, -1, -1):

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from catseye.errors import CatseyeError, InputError
-from catseye.geometry.time_tag import TimeTag
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.handlers_axes import AXES, Handler
 from catseye.ranger.handlers_cubes import CUBES
 from catseye.ranger.handlers_shots import SHOTS, scan_rounds
-from catseye.ranger.line import Reply, Request, commands_of_file, tag_of
+from catseye.ranger.line import Reply, Request, commands_of_file, nanoseconds_to_ticks, tag_of
 from catseye.ranger.line import stamp_text as stamp
 from catseye.ranger.ranger import VERSION, Ranger, Values, Work
 from catseye.ranger.status import word_text
@@ -59,8 +58,9 @@ def _sun(z: Ranger, _: int, *vector: float) -> Values:
 
 def _lst(z: Ranger, client: int) -> Values:
     mine = [e for e in z.scheduler.entries if e.client == client]
-    whole = lambda e: TimeTag(0, e.due_ns)  # type: ignore[arg-type]  # noqa: E731
-    return str(len(mine)), *(f"{whole(e).text(8)} {e.repeats} {e.request.command}" for e in mine[:24])
+    return str(len(mine)), *(
+        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in mine[:24]
+    )
 
 
 def _clr(z: Ranger, client: int) -> Values:

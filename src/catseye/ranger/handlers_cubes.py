@@ -97,7 +97,10 @@ def illuminate(z: Ranger, cube: Cube, counts: tuple[float, float]) -> Generator[
     refuse_unready(z)
     z.aimed = None
     start_moves(z, {0: round(counts[0]), 1: round(counts[1])})
-    arrived = lambda: not (z.head.moving(0) or z.head.moving(1))  # noqa: E731
+
+    def arrived() -> bool:
+        return not (z.head.moving(0) or z.head.moving(1))
+
     yield from wait_until(z, arrived, MOVE_TIME, f"cube {cube.name}: axes have not arrived")
     refuse_motors_off(z, (0, 1))
     yield from settle(z, counts)

@@ -12,6 +12,8 @@ included, carries TID and stamp; a greeting without them is read, too.
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from catseye.errors import InputError, ValidityError
 from catseye.geometry.time_tag import PER_DAY, TimeTag
 
@@ -81,7 +83,7 @@ def nanoseconds_to_ticks(nanoseconds: int) -> int:
 def tag_of(ticks: int) -> TimeTag:
     """The instant of a stamp, exact: a tick is 864 000 ns."""
     day, rest = divmod(ticks, TICKS_PER_DAY)
-    return TimeTag(day, rest * TICK_NS)  # type: ignore[arg-type]
+    return TimeTag(np.asarray(day), np.asarray(rest * TICK_NS))
 
 
 def stamp_text(ticks: int) -> str:

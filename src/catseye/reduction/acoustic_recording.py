@@ -293,6 +293,7 @@ def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
     def column(values: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate(values, axis=-1)[..., order]
 
+    temperature, pressure, humidity = (column([part.weather[i] for part in parts]) for i in range(3))
     texts, files = ([item for part in parts for item in getattr(part, name)] for name in ("texts", "file"))
     return Shots(
         column([part.mjd for part in parts]),
@@ -301,7 +302,7 @@ def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
         column([part.u_time for part in parts]),
         column([part.snr for part in parts]),
         tuple(texts[i] for i in order),
-        tuple(column([part.weather[i] for part in parts]) for i in range(3)),  # type: ignore[arg-type]
+        (temperature, pressure, humidity),
         tuple(files[i] for i in order),
         parts[0].traces,
     )
