@@ -64,13 +64,21 @@ def beam(counts):
 
 
 def astropy_sun(mjd):
-    """The Sun (n, 3) by astropy's own route: ICRS to AltAz, with polar motion and its Earth rotation tables."""
+    """The Sun (n, 3) by astropy's own route: ICRS to AltAz, with polar motion and its Earth rotation tables.
+
+    The installed tables, whatever the day it is run and whatever table another test had set.
+    """
     import astropy.units as u
     from astropy.coordinates import AltAz, EarthLocation, get_body
     from astropy.time import Time
     from astropy.utils import iers
 
-    with iers.conf.set_temp("auto_download", False), iers.conf.set_temp("iers_degraded_accuracy", "ignore"):
+    with (
+        iers.conf.set_temp("auto_download", False),
+        iers.conf.set_temp("auto_max_age", None),
+        iers.conf.set_temp("iers_degraded_accuracy", "ignore"),
+        iers.earth_orientation_table.set(iers.IERS_Auto.open()),
+    ):
         place = EarthLocation.from_geodetic(LONGITUDE_DEG * u.deg, LATITUDE_DEG * u.deg, HEIGHT * u.m)
         time = Time(mjd, format="mjd", scale="utc")
         seen = get_body("sun", time, place, ephemeris="builtin").transform_to(AltAz(obstime=time, location=place))

@@ -23,10 +23,9 @@ def test_polaris_is_where_astropy_has_it():
     from astropy.time import Time
     from astropy.utils import iers
 
-    with iers.conf.set_temp("auto_download", False):
-        table = iers.IERS_B.open()
+    table = iers.IERS_B.open()
+    with iers.conf.set_temp("auto_download", False), iers.earth_orientation_table.set(table):
         mjd = np.array([54_000.1, 55_217.37, 57_204.9])
-        iers.earth_orientation_table.set(table)
         when = Time(mjd, format="mjd", scale="utc")
         ut1 = table.ut1_utc(when).to_value(u.s)
         poles = np.column_stack([v.to_value(u.rad) for v in table.pm_xy(when)])

@@ -223,8 +223,7 @@ def polaris(mjd, deflection=(0.0, 0.0), ut1=0.0):
 def test_polaris_gives_the_frame_s_north_not_the_star_s():
     from astropy.utils import iers
 
-    with iers.conf.set_temp("auto_download", False):
-        iers.earth_orientation_table.set(iers.IERS_B.open())
+    with iers.conf.set_temp("auto_download", False), iers.earth_orientation_table.set(iers.IERS_B.open()):
         mjd = 57_204.9
         deflection = (4 * ARCSECOND, -9 * ARCSECOND)
         pole = [float(v.to_value("arcsec")) for v in iers.IERS_B.open().pm_xy(2_400_000.5, mjd)]
