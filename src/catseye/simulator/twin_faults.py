@@ -1,0 +1,119 @@
+"""Faults on command: what goes wrong on the twin, where, and when. Read by the world, the heads and the servers.
+
+kind             whom                what it does                                            size
+blocked-beam     ranger[:target]     nothing returns
+dead-ranger      ranger              its ports close, its connections break
+hung-ranger      ranger              it takes lines and answers nothing
+drifting-clock   ranger              its clock runs away, no time signal                     s a second
+stuck-axis       ranger:axis         the mirror does not turn (0 azimuth, 1 elevation)
+lost-index       ranger:axis         the search for the index finds none
+wrong-target     ranger[:target]     the light comes back from another retroreflector        m, nearer or farther
+saturated-adc    ranger              the return is beyond the converter's ends               factor
+network-cut      ranger              its connections break, new ones are refused
+network-slow     ranger              every line is late                                      s
+lying-station    station             its thermometer reads too high                          deg C
+silent-station   station             it says nothing
+silent-telescope telescope           no posture is told
+dew              target or *         the return is weak                                      factor of amplitude
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from catseye.errors import InputError
+
+Kind = Literal[
+    "blocked-beam",
+    "dead-ranger",
+    "hung-ranger",
+    "drifting-clock",
+    "stuck-axis",
+    "lost-index",
+    "wrong-target",
+    "saturated-adc",
+    "network-cut",
+    "network-slow",
+    "lying-station",
+    "silent-station",
+    "silent-telescope",
+    "dew",
+]
+SIZES: dict[str, float] = {  # where none is given
+    "drifting-clock": 1e-3,
+    "wrong-target": 0.031,
+    "saturated-adc": 4.0,
+    "network-slow": 0.5,
+    "lying-station": 5.0,
+    "dew": 0.02,
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of the twin.
+
+    kind         see above
+    whom         a ranger, ranger:target, ranger:axis, station, target, or * for all
+    start, end   s since the twin's start; the end is not in it
+    size         as above; 0 where the kind has none
+
+    >>> Fault.parse("lying-station WX2 60 600 3.5")
+    Fault(kind='lying-station', whom='WX2', start=60.0, end=600.0, size=3.5)
+    """
+
+    kind: Kind
+    whom: str
+    start: float = 0.0
+    end: float = float("inf")
+    size: float = 0.0
+
+    @staticmethod
+    def parse(text: str) -> "Fault":
+        """A fault as people type it: KIND WHOM [START [END [SIZE]]].
+
+        Raises InputError with what was wrong and what was expected.
+        """
+        words = text.split()
+        if not 2 <= len(words) <= 5 or words[0] not in get_args(Kind):
+            raise InputError(
+                f"fault {text!r}: expected KIND WHOM [START [END [SIZE]]], KIND one of {', '.join(get_args(Kind))}"
+            )
+        try:
+            start, end, size = (float(w) for w in (words[2:] + ["0", "inf", "nan"][len(words) - 2 :]))
+        except ValueError:
+            raise InputError(f"fault {text!r}: start, end or size is no number") from None
+        if size != size:
+            size = SIZES.get(words[0], 0.0)
+        if not 0.0 <= start < end:
+            raise InputError(f"fault {text!r}: start {start:g} s, end {end:g} s (expected 0 or above, end after start)")
+        return Fault(words[0], words[1], start, end, size)  # type: ignore[arg-type]
+
+
+class FaultBoard:
+    """The faults of a twin; more can be added and taken off while it runs."""
+
+    def __init__(self, faults: Iterable[Fault] = ()):
+        self.faults: list[Fault] = list(faults)
+
+    def add(self, fault: Fault) -> None:
+        """One more."""
+        self.faults.append(fault)
+
+    def clear(self, kind: str = "*", whom: str = "*") -> int:
+        """Take off those of a kind and of whom; how many they were."""
+        gone = [f for f in self.faults if kind in ("*", f.kind) and whom in ("*", f.whom)]
+        self.faults = [f for f in self.faults if f not in gone]
+        return len(gone)
+
+    def active(self, kind: Kind, whom: str, part: str | int | None = None, *, at: float) -> Fault | None:
+        """The first fault of a kind that touches someone at a time, s since the twin's start; None where none does.
+
+        whom   a ranger, station or target
+        part   its target or axis: a fault on whom alone, or on *, touches every part
+        """
+        names = {whom, "*"} | (set() if part is None else {f"{whom}:{part}", f"*:{part}"})
+        for fault in self.faults:
+            if fault.kind == kind and fault.whom in names and fault.start <= at < fault.end:
+                return fault
+        return None
