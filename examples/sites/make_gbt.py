@@ -1,4 +1,4 @@
-"""Writes gbt/targets.toml and gbt/site.toml, and copies the rest of the site from night-01.
+"""Writes gbt/targets.toml, feedarm.toml and site.toml, and copies the rest of the site from night-01.
 
     python examples/sites/make_gbt.py
 
@@ -10,13 +10,15 @@ looks; its glass. With these choices the panels whose middle is in the aperture 
 """
 
 import math
+import re
+import tomllib
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from catseye.records.record import Record
-from catseye.records.target import Target, Targets
+from catseye.records.target import FeedArm, Target, Targets
 from catseye.records.toml_text import record_toml
 
 HERE = Path(__file__).parent
@@ -29,8 +31,11 @@ WIDER = (18, 12, 5, 3, 2)  # in the first so many tiers the ribs are 3/2 as far 
 AIM_MM = np.array([10.2, -5985.2, 55_949.2])  # point A of night-01's feedarm.toml: every prism looks there; chosen
 INDEX = 1.527077  # group index of BK 7 over that of air, as in site.toml
 HEIGHT_MM, HEIGHT_SCATTER_MM = 38.1, 0.09  # of a prism, much as the sixty of night-01; chosen
+DISH_MIDDLE_MM = np.array([0.0, 54_000.0, 12_150.0])  # the middle of the aperture, on the paraboloid
+AZIMUTH_DEG = 145.3  # of night-01's posture
+ON_THE_ALIDADE = re.compile(r'(name = "ZAG\w+"\ntype = "hollow"\nframe = )"ground"\nposition_mm = \[([^]]*)\]')
 FIRST_OF_THE_REST = '[[target]]\nname = "ZEG41040L"'
-COPIED = ("feedarm.toml", "benchmarks.csv", "monuments/*.toml", "mirrors/*.toml", "triplets/*.toml")
+COPIED = ("benchmarks.csv", "monuments/*.toml", "mirrors/*.toml", "triplets/*.toml")
 
 
 def arc(r: np.ndarray) -> np.ndarray:
@@ -108,6 +113,33 @@ def prisms() -> list[Target]:
     return made
 
 
+def rest_of_targets() -> str:
+    """The single targets of night-01; those of the alidade, there in the ground frame of its posture, in their own."""
+    text = (NIGHT / "targets.toml").read_text("utf-8")
+    angle = math.radians(AZIMUTH_DEG)
+
+    def turned(found: re.Match[str]) -> str:
+        x, y, z = (float(v) for v in found[2].split(","))
+        own = (x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle), z)
+        return f'{found[1]}"alidade"\nposition_mm = [{own[0]:.1f}, {own[1]:.1f}, {own[2]:.1f}]'
+
+    return ON_THE_ALIDADE.sub(turned, text[text.index(FIRST_OF_THE_REST) :])
+
+
+def feed_arm() -> FeedArm:
+    """night-01's feed arm with how its mounts are turned, which is chosen: y^ at the dish's middle, z^ across it."""
+    arm = FeedArm.model_validate(tomllib.loads((NIGHT / "feedarm.toml").read_text("utf-8")))
+    turned = []
+    for ranger in arm.ranger:
+        y = DISH_MIDDLE_MM - np.array(ranger.nominal_scan_point_mm)
+        y /= np.linalg.norm(y)
+        z = np.array([1.0, 0.0, 0.0]) - y * y[0]
+        z /= np.linalg.norm(z)
+        axes = {"mount_z": tuple(np.round(z, 6).tolist()), "mount_y": tuple(np.round(y, 6).tolist())}
+        turned.append(ranger.model_copy(update=axes))
+    return arm.model_copy(update={"ranger": tuple(turned)})
+
+
 def main() -> None:
     for pattern in COPIED:
         for file in NIGHT.glob(pattern):
@@ -118,10 +150,13 @@ def main() -> None:
     body = site.partition("\n")[2].replace('name = "night-01"', 'name = "gbt"')
     (GBT / "site.toml").write_text("# The Green Bank site: posture for a start, frames, constants.\n" + body, "utf-8")
     dish: Record = Targets(target=tuple(prisms()))
-    rest = (NIGHT / "targets.toml").read_text("utf-8")
     head = "# All prisms of the dish on the design paraboloid (make_gbt.py), then the single targets of night-01.\n"
-    text = head + record_toml(dish) + "\n" + rest[rest.index(FIRST_OF_THE_REST) :]
+    text = head + record_toml(dish) + "\n" + rest_of_targets()
     (GBT / "targets.toml").write_text(text, "utf-8")
+    note = (
+        "# Rangers on the feed arm: scan points of night-01, reflector frame; how their mounts are turned is chosen.\n"
+    )
+    (GBT / "feedarm.toml").write_text(note + record_toml(feed_arm()), "utf-8")
 
 
 if __name__ == "__main__":

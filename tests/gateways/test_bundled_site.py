@@ -12,6 +12,7 @@ from catseye.errors import InputError
 from catseye.gateways import example
 from catseye.gateways.example import bundled_site, example_campaign, site_directory
 from catseye.records.site_folder import read_site, site_files
+from catseye.reduction.places import places_of
 
 SITES = Path(__file__).parents[2] / "examples" / "sites"
 TARGETS_OF_NIGHT = {"ZEG41040L", "ZEG20440L", "ZAG731P", "ZAG731D", *(f"ZBM{n:02d}" for n in range(1, 7))}
@@ -73,13 +74,30 @@ def test_the_site_holds_all_rangers_triplets_and_prisms(gbt, dish):
 
 
 def test_what_is_not_on_the_dish_is_that_of_night_01(gbt, night_01):
-    for name in ("monuments", "mirrors", "feedarm", "triplets", "benchmarks"):
+    for name in ("monuments", "mirrors", "triplets", "benchmarks"):
         assert getattr(gbt, name) == getattr(night_01, name)
-    assert {name: gbt.targets[name] for name in TARGETS_OF_NIGHT} == {
-        name: night_01.targets[name] for name in TARGETS_OF_NIGHT
-    }
+    still = {name for name in TARGETS_OF_NIGHT if not name.startswith("ZAG")}
+    assert {name: gbt.targets[name] for name in still} == {name: night_01.targets[name] for name in still}
+    bare = tuple(r.model_copy(update={"mount_z": None, "mount_y": None}) for r in gbt.feedarm.ranger)
+    assert gbt.feedarm.model_copy(update={"ranger": bare}) == night_01.feedarm
     posture = night_01.site.campaign.model_copy(update={"name": "gbt"})
     assert gbt.site == night_01.site.model_copy(update={"campaign": posture})
+
+
+def test_targets_of_the_alidade_are_where_night_01_has_them_in_its_posture(gbt, night_01):
+    here, there = places_of(gbt), places_of(night_01)
+    for name in ("ZAG731P", "ZAG731D"):
+        assert gbt.targets[name].frame == "alidade"
+        assert gbt.targets[name].position_mm[0] == pytest.approx({"P": -22_320, "D": 22_360}[name[-1]], abs=25)
+        np.testing.assert_allclose(here[name].start, there[name].start, rtol=0, atol=1e-4)  # both written to 0.1 mm
+
+
+def test_mounts_of_the_feed_arm_look_at_the_dish(gbt):
+    middle = np.array([0.0, 54.0, 54.0**2 / (4 * 60.0)]) * 1e3
+    for ranger in gbt.feedarm.ranger:
+        way = middle - np.array(ranger.nominal_scan_point_mm)
+        assert np.dot(ranger.mount_y, way / np.linalg.norm(way)) > 0.9999
+        assert abs(np.dot(ranger.mount_y, ranger.mount_z)) < 1e-5
 
 
 def test_the_site_lies_where_the_observatory_says(gbt):

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from catseye.records.record import Name, Position, Record, Uncertainty, UnitVector, Version, Within, broken_rule
 
-FrameName = Literal["ground", "reflector"]
+FrameName = Literal["ground", "alidade", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
 GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink

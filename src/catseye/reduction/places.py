@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.geometry.antenna import ground_from_reflector
+from catseye.geometry.antenna import ground_from_alidade, ground_from_reflector
 from catseye.geometry.frame import Transform
 from catseye.geometry.mount import gamma, scan_point
 from catseye.optics import cats_eye, prism
-from catseye.records.campaign import Campaign
+from catseye.records.site_folder import SiteFolder
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 
@@ -46,7 +46,7 @@ class Place:
         return usual if self.u_start is None else self.u_start
 
 
-def nominal_frame(campaign: Campaign) -> Transform:
+def nominal_frame(campaign: SiteFolder) -> Transform:
     """Reflector to ground at the campaign's posture, if the telescope were rigid and perfectly placed."""
     reflector = campaign.site.frames.reflector
     return ground_from_reflector(
@@ -57,7 +57,7 @@ def nominal_frame(campaign: Campaign) -> Transform:
     )
 
 
-def places_of(campaign: Campaign) -> dict[str, Place]:
+def places_of(campaign: SiteFolder) -> dict[str, Place]:
     """Everything that can be ranged to, by name, at its approximate position in the ground frame.
 
     Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
@@ -65,7 +65,11 @@ def places_of(campaign: Campaign) -> dict[str, Place]:
     constants' uncertainties are the derivatives of 3.8 (n u_height at a fixed reference point) and 3.14.
     """
     n = campaign.site.ranging.bk7_to_air_group_index_ratio
-    to_ground = {"reflector": nominal_frame(campaign), "ground": Transform("ground", "ground", np.eye(3), np.zeros(3))}
+    to_ground = {
+        "reflector": nominal_frame(campaign),
+        "alidade": ground_from_alidade(np.radians(campaign.site.campaign.azimuth_deg)),
+        "ground": Transform("ground", "ground", np.eye(3), np.zeros(3)),
+    }
     places: dict[str, Place] = {}
     for name, monument in campaign.monuments.items():
         mirror = campaign.mirror_of(name)
@@ -132,7 +136,7 @@ def _metres(value_mm: float | None) -> float | None:
     return None if value_mm is None else value_mm * MILLIMETRE
 
 
-def sheet_notes(campaign: Campaign) -> list[str]:
+def sheet_notes(campaign: SiteFolder) -> list[str]:
     """Glass constants that do not follow from the dimensions beside them, one line each.
 
     Every shot on a target shares its constant, so that no residual shows a typing error in it.

@@ -21,9 +21,9 @@ from catseye.geometry.imperfect import (
     imperfect_face_counts,
 )
 from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
-from catseye.records.campaign import Campaign
 from catseye.records.mirror import MirrorGeometry
 from catseye.records.monument import MonumentGeometry
+from catseye.records.site_folder import SiteFolder
 from catseye.records.target import FeedArmRanger
 from catseye.reduction.places import nominal_frame
 
@@ -75,7 +75,7 @@ def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_
     )
 
 
-def station_in(campaign: Campaign, name: str) -> Station | None:
+def station_in(campaign: SiteFolder, name: str) -> Station | None:
     """A campaign's ranger, the telescope in its nominal posture; None where no record says how its mount is turned."""
     mirror = campaign.mirror_of(name)
     if name in campaign.monuments:
