@@ -8,7 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.adjustment import Fit, Solution, adjust
-from catseye.estimation.observations import Distances, Linear, Observations
+from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.robust import CHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
 from catseye.reduction.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
@@ -28,7 +28,7 @@ from catseye.reduction.network import (
 from catseye.reduction.places import Place
 from catseye.reduction.ranges import Electronics, Phases, Progress
 from catseye.reduction.settings import Settings
-from catseye.reduction.shots import ShotParts, shot_group
+from catseye.reduction.shots import ShotGroup, ShotParts, shot_group
 
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
 TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
@@ -215,7 +215,7 @@ def adjust_coordinates(
 
 
 def _coordinates(
-    network: Network, solution: Solution, shots: list[tuple[Distances, ShotParts]], resolved: Resolved
+    network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]], resolved: Resolved
 ) -> Coordinates:
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
@@ -270,7 +270,7 @@ def _coordinates(
     )
 
 
-def _ranges(network: Network, solution: Solution, shots: list[tuple[Distances, ShotParts]]) -> RangeShots:
+def _ranges(network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]]) -> RangeShots:
     x, layout, parts = solution.x, network.layout, [p for _, p in shots]
     fits = solution.fits[: len(parts)]
     zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []

@@ -7,11 +7,10 @@ import numpy as np
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.adjustment import Solution
 from catseye.estimation.ambiguity import AmbiguityStatus, Located, locate
-from catseye.estimation.observations import Distances
 from catseye.estimation.rows import full_jacobian
 from catseye.optics.prism import obliquity_slope
 from catseye.reduction.network import Network
-from catseye.reduction.shots import ShotParts, shot_group
+from catseye.reduction.shots import ShotGroup, ShotParts, other_ends, shot_group
 
 RANGES = 8  # shots a search takes part with at most: more say little new, and bring wrong ones
 WRONG = 0.01  # share of shots with light from elsewhere in their return: in night-01 seven of seven hundred
@@ -29,7 +28,7 @@ class Scene:
     """
 
     network: Network
-    groups: list[Distances]
+    groups: list[ShotGroup]
     parts: list[ShotParts]
     solution: Solution
 
@@ -121,9 +120,7 @@ def _problem(scene: Scene, name: str, rows: list[tuple[int, int]], x: np.ndarray
         start = end
     covariance = noise / np.outer(n, n) + slopes @ solution.covariance @ slopes.T
     misses = np.concatenate([(scene.groups[i].observed - scene.groups[i].predict(x)[0])[at[i]] for i in groups]) / n
-    ends = np.array([[scene.groups[i].origin[r], scene.groups[i].target[r]] for i, r in order])
-    other = np.where(ends[:, 0] == own[0], ends[:, 1], ends[:, 0])
-    stations = x[other[:, None] + np.arange(3)]
+    stations = np.array([other_ends(scene.groups[i], r, int(own[0]), x) for i, r in order])
     distance = np.linalg.norm(stations - x[own], axis=1)
     prior = spread(scene, name)
     u_place = float(np.sqrt(np.linalg.eigvalsh(prior)[-1]))

@@ -13,15 +13,16 @@ import numpy as np
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
 from catseye.estimation.ambiguity import AmbiguityStatus, Located
-from catseye.estimation.observations import Distances, Observations
+from catseye.estimation.observations import Observations
 from catseye.estimation.robust import adjust_robustly
 from catseye.estimation.rows import full_jacobian
 from catseye.records.campaign import Campaign
 from catseye.reduction.cycle_search import Scene, search, spread
+from catseye.reduction.motion import Motion
 from catseye.reduction.network import THERMOMETERS, ZEROS, Network, build_network
 from catseye.reduction.ranges import Electronics, Phases, Progress
 from catseye.reduction.settings import Settings
-from catseye.reduction.shots import shot_group
+from catseye.reduction.shots import ShotGroup, shot_group
 
 KEPT = 5.0  # standard uncertainties of misfit that the margin must be worth
 ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
@@ -49,10 +50,12 @@ def resolve_cycles(
     electronics: dict[str, Electronics],
     settings: Settings,
     progress: Progress | None = None,
+    *,
+    motion: Motion | None = None,
 ) -> Resolved:
     """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
 
-    campaign, phases, electronics, settings   as for `adjust_coordinates`
+    campaign, phases, electronics, settings, motion   as for `adjust_coordinates`
     progress                                  called with (what, done, of how many)
 
     Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
@@ -60,7 +63,7 @@ def resolve_cycles(
 
     Source: the law of `signal.cycles`; search by [TEUNISSEN95], see `estimation.ambiguity`.
     """
-    network = build_network(campaign, phases, electronics, settings)
+    network = build_network(campaign, phases, electronics, settings, motion=motion)
     doubtful = doubtful_points(network)
     ends = {int(k): {name, campaign.shots.target[k]} for name, e in electronics.items() for k in e.shots}
     waiting = {k for k, both in ends.items() if both & doubtful}
@@ -136,7 +139,7 @@ def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[st
 
 
 def line_errors(
-    group: Distances, targets: tuple[str, ...], fit: Fit, solution: Solution
+    group: ShotGroup, targets: tuple[str, ...], fit: Fit, solution: Solution
 ) -> tuple[np.ndarray, np.ndarray]:
     """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
 
@@ -168,7 +171,7 @@ def _adjusted(network: Network, x: np.ndarray, waiting: set[int]) -> Scene:
     """The network adjusted without the shots that wait, wrong ones left out; all parameters with covariance."""
     electronics = without_shots(network.electronics, waiting)
     used: set[int] = set()
-    part = build_network(network.campaign, network.phases, electronics, network.settings)
+    part = build_network(network.campaign, network.phases, electronics, network.settings, motion=network.motion)
     if part.rangers:
         column = {name: i for i, name in enumerate(network.layout.names)}
         at = np.array([column[name] for name in part.layout.names])

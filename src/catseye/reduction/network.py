@@ -1,6 +1,6 @@
 """The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from catseye.records.campaign import REFERENCE, Campaign
 from catseye.records.triplet import Triplet
 from catseye.reduction.air import AirField
 from catseye.reduction.head import head_unknowns
+from catseye.reduction.motion import Motion
 from catseye.reduction.places import Place, places_of, unit
 from catseye.reduction.ranges import Electronics, Phases
 from catseye.reduction.settings import Settings
@@ -59,6 +60,7 @@ class Network:
     layout: Layout
     field: AirField
     priors: list[Observations]
+    motion: Motion | None = None
 
     @property
     def rangers(self) -> list[str]:
@@ -77,9 +79,18 @@ class Network:
 
 
 def build_network(
-    campaign: Campaign, phases: Phases, electronics: dict[str, Electronics], settings: Settings
+    campaign: Campaign,
+    phases: Phases,
+    electronics: dict[str, Electronics],
+    settings: Settings,
+    *,
+    motion: Motion | None = None,
+    also: Collection[str] = (),
 ) -> Network:
     """The unknowns and priors of a campaign.
+
+    motion   where the telescope moves between the shots; its points are then those of the motion's epoch
+    also     rangers and targets that take part as if they had fired or been fired at
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
     points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
@@ -87,8 +98,9 @@ def build_network(
     """
     places = places_of(campaign)
     fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
+    fired |= set(also) & set(places)
     fired |= {t for triplet in campaign.triplets.values() if fired & set(triplet.targets) for t in triplet.targets}
-    shooting = {name for name, e in electronics.items() if len(e.shots)}
+    shooting = {name for name, e in electronics.items() if len(e.shots)} | (set(also) & set(campaign.rangers))
     seen = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
 
     layout = Layout()
@@ -111,7 +123,7 @@ def build_network(
         if seen[name].u_constant > 0.0:
             layout.add(f"glass {name}", [""], [0.0])
     priors = _priors(campaign, settings, seen, layout, air)
-    return Network(campaign, settings, phases, electronics, seen, layout, air, priors)
+    return Network(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
 
 
 def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:

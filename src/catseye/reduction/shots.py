@@ -6,13 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations import Distances, MovingDistances
 from catseye.optics.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.head import HeadCorrections, head_corrections
 from catseye.reduction.network import AIR, Network
 from catseye.reduction.places import unit
 from catseye.reduction.ranges import Electronics
 from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
+
+ShotGroup = Distances | MovingDistances
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,11 @@ class ShotParts:
     head: HeadCorrections
 
 
-def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, ShotParts]:
-    """One ranger's shots as distances in optical metres, with everything that depends on where things are."""
+def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
+    """One ranger's shots as distances in optical metres, with everything that depends on where things are.
+
+    Where the network moves, x are the points at its epoch, and each shot finds them where the telescope carried them.
+    """
     campaign, layout, places = network.campaign, network.layout, network.places
     electronics, phases = network.electronics[name], network.phases
     rows = electronics.shots
@@ -55,6 +60,11 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
     target = np.array([layout.at[t] for t in targets])
     a = x[origin[:, None] + np.arange(3)]
     b = x[target[:, None] + np.arange(3)]
+    turns = None
+    if network.motion is not None:
+        times = campaign.shots.mjd_utc[rows]
+        turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
+        a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
     towards = a - b
     distance = np.linalg.norm(towards, axis=1)
     towards = towards / distance[:, None]
@@ -66,7 +76,8 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
     glass = np.array([places[t].constant for t in targets])
     has_rest = np.array([f"glass {t}" in layout.at for t in targets])
     rest_columns = np.array([layout.at.get(f"glass {t}", 0) for t in targets])  # column 0 with derivative 0: none
-    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, towards, x)
+    seen = towards if turns is None else np.einsum("mji,mj->mi", turns[2], towards)  # by a target that stands still
+    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, seen, x)
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
@@ -75,7 +86,7 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
         campaign,
         name,
         layout.at,
-        sight=b - a,
+        sight=b - a if turns is None else np.einsum("mji,mj->mi", turns[0], b - a),
         phase=phase,
         amplitude=np.abs(lit),
         reference_amplitude=np.abs(cube),
@@ -95,39 +106,40 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
     same = np.array(targets)[:, None] == np.array(targets)
     covariance += same * np.outer(path, path)
 
-    group = Distances(
-        name=name,
-        observed=observed,
-        covariance=covariance,
-        origin=origin,
-        target=target,
-        scale=n,
-        offset=-n * (glass + obliquity + d0 + head.value)
+    offset = (
+        -n * (glass + obliquity + d0 + head.value)
         - distance * (air.slopes @ x[air_columns])
-        + n * np.sum(normal_slopes * x[normal_columns], axis=1),
-        nuisance=np.concatenate(
-            [
-                np.full((m, 1), layout.at[f"zero {name}"]),
-                np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
-                np.broadcast_to(air_columns, (m, len(air_columns))),
-                normal_columns,
-                rest_columns[:, None],
-                head.columns,
-            ],
-            axis=1,
-        ),
-        coefficient=np.concatenate(
-            [
-                -n[:, None],
-                leakage_slope,
-                distance[:, None] * air.slopes,
-                -n[:, None] * normal_slopes,
-                (-n * has_rest)[:, None],
-                -n[:, None] * head.slopes,
-            ],
-            axis=1,
-        ),
+        + n * np.sum(normal_slopes * x[normal_columns], axis=1)
     )
+    nuisance = np.concatenate(
+        [
+            np.full((m, 1), layout.at[f"zero {name}"]),
+            np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
+            np.broadcast_to(air_columns, (m, len(air_columns))),
+            normal_columns,
+            rest_columns[:, None],
+            head.columns,
+        ],
+        axis=1,
+    )
+    coefficient = np.concatenate(
+        [
+            -n[:, None],
+            leakage_slope,
+            distance[:, None] * air.slopes,
+            -n[:, None] * normal_slopes,
+            (-n * has_rest)[:, None],
+            -n[:, None] * head.slopes,
+        ],
+        axis=1,
+    )
+    group: ShotGroup
+    if turns is None:
+        group = Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient)
+    else:
+        group = MovingDistances(
+            name, observed, covariance, origin, target, *turns, n, offset, nuisance=nuisance, coefficient=coefficient
+        )
     parts = ShotParts(
         name=name,
         electronics=electronics,
@@ -143,6 +155,20 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[Distances, S
         head=head,
     )
     return group, parts
+
+
+def other_ends(group: ShotGroup, row: int, own: int, x: np.ndarray) -> np.ndarray:
+    """(3,) m, ground: from where a shot's other end looks at the point whose x is in column `own`, that point standing.
+
+    A moving point stands, and what it is ranged from moves the other way: |B p + b - a| = |p - B'(a - b)|.
+    """
+    origin, target = int(group.origin[row]), int(group.target[row])
+    other = x[(target if origin == own else origin) + np.arange(3)]
+    if isinstance(group, Distances):
+        return np.asarray(other)
+    ends = (group.origin_turn[row], group.origin_shift[row]), (group.target_turn[row], group.target_shift[row])
+    (turn, shift), (own_turn, own_shift) = ends[::-1] if origin == own else ends
+    return np.asarray(own_turn.T @ (turn @ other + shift - own_shift))
 
 
 def _obliquity(

@@ -22,6 +22,7 @@ from catseye.estimation.observations.joint import Joint
 from catseye.estimation.observations.kind import Kind, Observations, Reported
 from catseye.estimation.observations.level_plane import LevelPlanes
 from catseye.estimation.observations.linear import Linear
+from catseye.estimation.observations.moving_distance import MovingDistances
 from catseye.estimation.observations.point_on_line import PointsOnLine
 from catseye.estimation.observations.point_on_plane import PointsOnPlane
 from catseye.estimation.observations.point_on_sphere import PointsOnSphere
@@ -47,6 +48,7 @@ __all__ = [
     "Kind",
     "LevelPlanes",
     "Linear",
+    "MovingDistances",
     "Observations",
     "PointsOnLine",
     "PointsOnPlane",

@@ -1,0 +1,79 @@
+"""Distances between points that are carried: each shot finds both ends turned and shifted."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.reading import reading, reading_columns
+from catseye.estimation.observations.sight import length, triples
+
+
+@dataclass(frozen=True, eq=False)
+class MovingDistances(Kind):
+    """observed = scale |B target + b - A origin - a| + offset + sum c_q x[nuisance_q] + error.
+
+    The parameters are the points at one instant, the epoch; A, a and B, b carry them to the instant of each shot, as a
+    rigid telescope would. `Distances` otherwise.
+
+    name                       what the group is, for reports
+    observed                   (m,) metres
+    covariance                 of the observed values, see `Observations`
+    origin, target             (m,) columns of the x of both points
+    origin_turn, target_turn   (m, 3, 3) A, B: rotations
+    origin_shift, target_shift (m, 3) a, b, m
+    scale, offset              (m,) or one
+    nuisance, coefficient      (m, q) columns that act linearly, and their derivatives
+    """
+
+    kind: ClassVar[str] = "moving_distance"
+    unit: ClassVar[str] = "m"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    origin: np.ndarray
+    target: np.ndarray
+    origin_turn: np.ndarray
+    origin_shift: np.ndarray
+    target_turn: np.ndarray
+    target_shift: np.ndarray
+    scale: np.ndarray | float = 1.0
+    offset: np.ndarray | float = 0.0
+    nuisance: np.ndarray | None = None
+    coefficient: np.ndarray | float = 1.0
+    scaling: np.ndarray | None = None
+    scaling_coefficient: np.ndarray | float = 1.0
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """(m, 6 + q + s): origin, target, nuisance, scaling."""
+        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target), *reading_columns(self))
+
+    @property
+    def ends(self) -> tuple[np.ndarray, ...]:
+        return self.origin, self.target
+
+    def ends_at_shots(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origins and targets (m, 3) where each shot found them."""
+        a = np.einsum("mij,mj->mi", self.origin_turn, x[triples(self.origin)]) + self.origin_shift
+        b = np.einsum("mij,mj->mi", self.target_turn, x[triples(self.target)]) + self.target_shift
+        return a, b
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian (m, 6 + q + s) at the parameters x; nan where two points coincide.
+
+        >>> turn = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+        >>> still = np.eye(3)[None], np.zeros((1, 3))
+        >>> one, ends = np.ones(1), (np.array([0]), np.array([3]))
+        >>> d = MovingDistances("d", one, one, *ends, *still, turn, np.zeros((1, 3)))
+        >>> d.predict(np.array([0.0, 4.0, 0.0, 1.0, 0.0, 0.0]))[0]
+        array([3.])
+        """
+        a, b = self.ends_at_shots(x)
+        size, unit = length(b - a)
+        by_origin = -np.einsum("mij,mi->mj", self.origin_turn, unit)
+        by_target = np.einsum("mij,mi->mj", self.target_turn, unit)
+        return reading(self, x, size, np.concatenate([by_origin, by_target], axis=1))

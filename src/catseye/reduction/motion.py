@@ -1,0 +1,164 @@
+"""Where a telescope that is told in postures carries its points: between two readings, and from an epoch to a shot.
+
+A rigid telescope on a perfect track, [PARKER04] eq. 2.44; what the real one does besides is the solution's to find, and
+its rate of change an uncertainty of the carried state.
+"""
+
+from bisect import bisect_right, insort
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import MILLIMETRE, SECONDS_PER_DAY
+from catseye.errors import InputError
+from catseye.geometry.antenna import ground_from_alidade_at, ground_from_reflector_at
+from catseye.geometry.frame import Transforms
+from catseye.records.live import TICKS_PER_DAY, LivePosture
+from catseye.records.site_folder import SiteFolder
+
+Array = NDArray[np.float64]
+KEPT = 3600.0  # s of postures that are kept
+LONGEST_GAP = 2.0  # s between readings, or after the last, over which rates are trusted
+GROUND, ALIDADE, REFLECTOR = "ground", "alidade", "reflector"
+
+
+class PostureTrack:
+    """Azimuth and elevation of the telescope in time, from readings that may come late or out of order."""
+
+    def __init__(self) -> None:
+        self._ticks: list[int] = []
+        self._reads: dict[int, LivePosture] = {}
+        self._table: Array | None = None
+
+    def add(self, read: LivePosture) -> None:
+        """One more reading; a second one of an instant replaces the first. Old ones are forgotten."""
+        if read.ticks not in self._reads:
+            insort(self._ticks, read.ticks)
+        self._reads[read.ticks] = read
+        self._table = None
+        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * KEPT / SECONDS_PER_DAY * TICKS_PER_DAY:
+            first = bisect_right(self._ticks, self._ticks[-1] - round(KEPT / SECONDS_PER_DAY * TICKS_PER_DAY))
+            for gone in self._ticks[:first]:
+                del self._reads[gone]
+            del self._ticks[:first]
+
+    def __len__(self) -> int:
+        return len(self._ticks)
+
+    @property
+    def latest(self) -> LivePosture | None:
+        """The reading of the latest instant."""
+        return self._reads[self._ticks[-1]] if self._ticks else None
+
+    def at(self, mjd: ArrayLike) -> tuple[Array, Array]:
+        """Azimuth and elevation (...), rad, at times (...): cubic between readings, by the last rates beyond.
+
+        Raises InputError: no reading at all. Between readings the cubic has their angles and rates; for an acceleration
+        of 0.2 deg/s^2 that begins half-way between two readings 0.1 s apart it is off by 0.01". Azimuth is unwrapped.
+        """
+        if not self._ticks:
+            raise InputError(
+                "the telescope has told no posture (expected at least one before anything on it is solved)"
+            )
+        table = self._columns()
+        t = (np.asarray(mjd, dtype=float) * TICKS_PER_DAY - self._ticks[0]) * SECONDS_PER_DAY / TICKS_PER_DAY
+        i = np.clip(np.searchsorted(table[0], t, side="right") - 1, 0, max(len(self._ticks) - 2, 0))
+        return self._angle(table, i, t, 1, 3), self._angle(table, i, t, 2, 4)
+
+    def age(self, mjd: ArrayLike) -> Array:
+        """s from the nearest reading (...)."""
+        if not self._ticks:
+            return np.full(np.shape(mjd), np.inf)
+        times = self._columns()[0]
+        t = (np.asarray(mjd, dtype=float) * TICKS_PER_DAY - self._ticks[0]) * SECONDS_PER_DAY / TICKS_PER_DAY
+        i = np.clip(np.searchsorted(times, t), 1, max(len(times) - 1, 1))
+        near = np.minimum(np.abs(t - times[i - 1]), np.abs(t - times[np.minimum(i, len(times) - 1)]))
+        return np.asarray(near)
+
+    def _columns(self) -> Array:
+        if self._table is None:
+            reads = [self._reads[k] for k in self._ticks]
+            seconds = np.array([k - self._ticks[0] for k in self._ticks]) * SECONDS_PER_DAY / TICKS_PER_DAY
+            azimuth = np.unwrap([r.azimuth for r in reads])
+            rest = [[r.elevation for r in reads], [r.azimuth_rate for r in reads], [r.elevation_rate for r in reads]]
+            self._table = np.array([seconds, azimuth, *rest])
+        return self._table
+
+    def _angle(self, table: Array, i: NDArray[np.int64], t: Array, angle: int, rate: int) -> Array:
+        """[Hermite] cubic in each interval, straight with the end's rate outside of all."""
+        if table.shape[1] == 1:
+            return np.asarray(table[angle, 0] + table[rate, 0] * (t - table[0, 0]))
+        t0, t1 = table[0, i], table[0, i + 1]
+        h = t1 - t0
+        u = np.clip((t - t0) / h, 0.0, 1.0)
+        y0, y1, v0, v1 = table[angle, i], table[angle, i + 1], table[rate, i], table[rate, i + 1]
+        cubic = (
+            y0 * (1 + 2 * u) * (1 - u) ** 2
+            + y1 * u**2 * (3 - 2 * u)
+            + h * (v0 * u * (1 - u) ** 2 - v1 * u**2 * (1 - u))
+        )
+        return np.asarray(cubic + np.where(t > t1, v1 * (t - t1), np.where(t < t0, v0 * (t - t0), 0.0)))
+
+
+def ground_from(site: SiteFolder, frame: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+    """Ground from a frame at postures (...), rad; the ground itself stands.
+
+    Source: [PARKER04] eq. 2.40-2.44 with the site's constants.
+    """
+    if frame == REFLECTOR:
+        reflector = site.site.frames.reflector
+        return ground_from_reflector_at(
+            azimuth,
+            elevation,
+            elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
+            reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
+        )
+    if frame == ALIDADE:
+        return ground_from_alidade_at(azimuth)
+    return Transforms(GROUND, GROUND, np.eye(3), np.zeros((*np.shape(azimuth), 3)))
+
+
+def frames_of(site: SiteFolder) -> dict[str, str]:
+    """The frame in which each point of a site stands: rangers, fixed points, targets."""
+    on_ground = [*site.monuments, *(f"{name}-F" for name in site.monuments)]
+    return {
+        **dict.fromkeys(on_ground, GROUND),
+        **{ranger.name: REFLECTOR for ranger in site.feedarm.ranger},
+        **{target.name: target.frame for target in site.targets.values()},
+        **{name: triplet.frame for triplet in site.triplets.values() for name in triplet.targets},
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How the telescope carries points from an epoch to other instants.
+
+    site      its constants
+    track     postures
+    frames    name: frame
+    epoch     MJD
+    """
+
+    site: SiteFolder
+    track: PostureTrack
+    frames: Mapping[str, str]
+    epoch: float
+
+    def carried(self, names: tuple[str, ...], mjd: Array) -> tuple[Array, Array]:
+        """Turn (m, 3, 3) and shift (m, 3), m, of each named point, ground axes, from the epoch to its time (m,).
+
+        Source: x(t) = M(t) M(epoch)^-1 x(epoch), M ground from the point's frame.
+        """
+        turn, shift = np.broadcast_to(np.eye(3), (len(names), 3, 3)).copy(), np.zeros((len(names), 3))
+        frame = np.array([self.frames[name] for name in names])
+        for moving in (ALIDADE, REFLECTOR):
+            rows = np.flatnonzero(frame == moving)
+            if not len(rows):
+                continue
+            azimuth, elevation = self.track.at(np.append(mjd[rows], self.epoch))
+            there = ground_from(self.site, moving, azimuth, elevation)
+            turn[rows] = there.rotation[:-1] @ there.rotation[-1].T
+            shift[rows] = there.translation[:-1] - turn[rows] @ there.translation[-1]
+        return turn, shift
