@@ -37,7 +37,7 @@ class Campaign(SiteFolder):
 
     weather: Weather
     shots: Shots
-    frames: np.memmap
+    frames: np.ndarray
     path_temperatures: PathTemperatureTable | None = None
 
 

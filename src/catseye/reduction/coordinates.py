@@ -1,6 +1,6 @@
 """From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -162,11 +162,26 @@ def adjust_coordinates(
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
-    layout = network.layout
+    solution, shots = settle_network(network, resolved.starts, progress)
+    return coordinates_of(network, solution, shots, resolved)
+
+
+def settle_network(
+    network: Network, starts: Mapping[str, np.ndarray], progress: Progress | None = None, *, keep: float = 0.0
+) -> tuple[Solution, list[tuple[ShotGroup, ShotParts]]]:
+    """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
+
+    network   with priors for whatever its shots do not hold
+    starts    point: (3,) m, or parameters by the name in `layout.at`, where to begin instead of the layout's start
+    keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
+
+    Raises EstimationError where it finds no answer.
+    """
+    layout, settings = network.layout, network.settings
     x = np.array(layout.start)
-    for name, where in resolved.starts.items():
+    for name, where in starts.items():
         if name in layout.at:
-            x[layout.columns(name)] = where
+            x[layout.columns(name, len(where))] = where
     free = np.array(layout.free)
     points = [layout.columns(name) for name in network.places if name in layout.at]
     coordinates = np.concatenate(points)
@@ -201,7 +216,7 @@ def adjust_coordinates(
             advice = dish_advice(network, x, solution.covariance)
         moved = np.abs(x - before)[coordinates]
         u = np.sqrt(np.diag(solution.covariance)[coordinates])
-        if turn and np.all(moved < np.maximum(SETTLED, SETTLED_U * u)):
+        if turn and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
             break
     else:
         raise EstimationError(
@@ -211,12 +226,17 @@ def adjust_coordinates(
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
-    return _coordinates(network, solution, shots, resolved)
+    return solution, shots
 
 
-def _coordinates(
+def coordinates_of(
     network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]], resolved: Resolved
 ) -> Coordinates:
+    """What an adjusted network says of points, ranges, heads and air.
+
+    network, solution, shots   as `settle_network` took and gave them
+    resolved                   what was known of whole cycles before
+    """
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
     columns = np.concatenate([layout.columns(n) for n in names])

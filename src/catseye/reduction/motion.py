@@ -6,7 +6,7 @@ its rate of change an uncertainty of the carried state.
 
 from bisect import bisect_right, insort
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -135,16 +135,27 @@ def frames_of(site: SiteFolder) -> dict[str, str]:
 class Motion:
     """How the telescope carries points from an epoch to other instants.
 
-    site      its constants
-    track     postures
-    frames    name: frame
-    epoch     MJD
+    site        its constants
+    track       postures
+    frames      name: frame
+    epoch       MJD
+    bodies      name: what it moves with, where that is not the ground
+    jitter_mm   body: how far its points are at a shot from where they are on average
     """
 
     site: SiteFolder
     track: PostureTrack
     frames: Mapping[str, str]
     epoch: float
+    bodies: Mapping[str, str] = field(default_factory=dict)
+    jitter_mm: Mapping[str, float] = field(default_factory=dict)
+
+    def jitter(self, ranger: str, targets: tuple[str, ...]) -> Array:
+        """Variance (m,), m^2, of ranges to targets by what shakes; none where both ends shake together."""
+        own = self.bodies.get(ranger, "")
+        pairs = [(own, self.bodies.get(target, "")) for target in targets]
+        u = [0.0 if a == b else np.hypot(self.jitter_mm.get(a, 0.0), self.jitter_mm.get(b, 0.0)) for a, b in pairs]
+        return (np.array(u) * MILLIMETRE) ** 2
 
     def carried(self, names: tuple[str, ...], mjd: Array) -> tuple[Array, Array]:
         """Turn (m, 3, 3) and shift (m, 3), m, of each named point, ground axes, from the epoch to its time (m,).

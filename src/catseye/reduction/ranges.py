@@ -1,6 +1,6 @@
 """From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.mirror import Mirror
 from catseye.reduction.settings import Settings
 from catseye.signal.buffers import BufferStatus, inspect_buffers
 from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
@@ -91,11 +92,7 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
     volts_per_code = adc.full_scale_volt / 2 ** (adc.bits - 1)
-    ends = (-(2 ** (adc.bits - 1)), 2 ** (adc.bits - 1) - 1)
-    raw = np.zeros(n, dtype=complex)
-    u_phasor, offset, largest, clipped = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=int)
-    harmonics, total, between = np.zeros((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
-    wrong = [""] * n
+    detected = Detected.empty(n)
     shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
     done = 0
     for cycles, samples_per_cycle in shapes:
@@ -103,30 +100,92 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
         for start in range(0, len(alike), 64):
             rows = alike[start : start + 64]
             samples = campaign.frames[shots.frame[rows], : cycles * samples_per_cycle]
-            seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
-            found = seen.detection
-            for k, row in enumerate(rows):
-                if seen.status[k] in (BufferStatus.DROPOUT, BufferStatus.STUCK):
-                    wrong[row] = seen.text(k)
-            total[rows], between[rows] = found.scatter.total, found.scatter.between
-            raw[rows], u_phasor[rows], offset[rows] = found.phasor, found.u_phasor, found.offset
-            harmonics[rows], largest[rows], clipped[rows] = found.harmonics, found.largest, found.clipped
+            detected.put(rows, samples, samples_per_cycle, volts_per_code, adc.bits)
             done += len(rows)
             if progress is not None:
                 progress("samples to phases", done, n)
-
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
+    return judged_phases(
+        detected, shots.cycles, shots.samples_per_cycle, mirrors, settings, lambda a: _usual_amplitude(campaign, a)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Detected:
+    """What synchronous detection found in n buffers, leakage still in it; fields as in `signal.phase.Detection`.
+
+    wrong   why a buffer's samples cannot be believed, "" where they can
+    """
+
+    raw: np.ndarray
+    u_phasor: np.ndarray
+    offset: np.ndarray
+    harmonics: np.ndarray
+    largest: np.ndarray
+    clipped: np.ndarray
+    total: np.ndarray
+    between: np.ndarray
+    wrong: list[str]
+
+    @staticmethod
+    def empty(n: int) -> "Detected":
+        """Room for n buffers."""
+        one, three = np.zeros(n), np.zeros((n, 3))
+        return Detected(
+            np.zeros(n, dtype=complex),
+            one,
+            one.copy(),
+            np.zeros((n, 2)),
+            one.copy(),
+            np.zeros(n, dtype=int),
+            three,
+            three.copy(),
+            [""] * n,
+        )
+
+    def put(
+        self, rows: np.ndarray, samples: np.ndarray, samples_per_cycle: int, volts_per_code: float, bits: int
+    ) -> None:
+        """Detect buffers (b, cycles samples_per_cycle) of one shape into rows (b,)."""
+        ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+        found = seen.detection
+        for k, row in enumerate(rows):
+            if seen.status[k] in (BufferStatus.DROPOUT, BufferStatus.STUCK):
+                self.wrong[row] = seen.text(k)
+        self.total[rows], self.between[rows] = found.scatter.total, found.scatter.between
+        self.raw[rows], self.u_phasor[rows], self.offset[rows] = found.phasor, found.u_phasor, found.offset
+        self.harmonics[rows], self.largest[rows], self.clipped[rows] = found.harmonics, found.largest, found.clipped
+
+
+def judged_phases(
+    detected: Detected,
+    cycles: np.ndarray,
+    samples_per_cycle: np.ndarray,
+    mirrors: Sequence[Mirror],
+    settings: Settings,
+    usual_of: Callable[[np.ndarray], np.ndarray],
+) -> Phases:
+    """Phasors free of leakage, their uncertainties, and why a shot cannot be used.
+
+    detected                     n buffers
+    cycles, samples_per_cycle    (n,)
+    mirrors                      n, the sheets of the heads
+    usual_of                     from amplitudes (n,), V, to what is usual for each; for the text of a blocked one
+    """
+    raw, u_phasor, clipped, largest = detected.raw, detected.u_phasor, detected.clipped, detected.largest
+    n = len(raw)
     phasor = subtract_leakage(
         raw,
         np.array([m.leakage_amplitude_volt for m in mirrors]),
         np.array([m.leakage_phase_rad for m in mirrors]),
     )
-    scatter = CycleScatter(shots.cycles, total, between, np.zeros(n, dtype=np.int64))
-    enough = shots.cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
+    scatter = CycleScatter(cycles, detected.total, detected.between, np.zeros(n, dtype=np.int64))
+    enough = cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
     u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), u_phasor)
     u_dark = np.hypot(u_phasor, [m.u_leakage_volt for m in mirrors])
     amplitude = np.abs(phasor)
-    usual = _usual_amplitude(campaign, amplitude)
+    usual = usual_of(amplitude)
     reason = []
     for k in range(n):
         limit = settings.smallest_return * u_dark[k]
@@ -134,7 +193,7 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
             reason.append(f"clipped: {clipped[k]} samples at the converter's end ({largest[k]:.2f} V)")
         elif not np.isfinite(limit):
             reason.append(
-                f"noise unknown: {shots.cycles[k]} cycles of {shots.samples_per_cycle[k]} samples show no scatter "
+                f"noise unknown: {cycles[k]} cycles of {samples_per_cycle[k]} samples show no scatter "
                 "(expected at least 2 cycles, or 8 samples)"
             )
         elif amplitude[k] < limit:
@@ -147,8 +206,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
                 f"{mirrors[k].leakage_amplitude_volt:.4f} V: converter or cable"
             )
         else:
-            reason.append(wrong[k])
-    return Phases(phasor, u_phasor, u_across, offset, harmonics, largest, tuple(reason))
+            reason.append(detected.wrong[k])
+    return Phases(phasor, u_phasor, u_across, detected.offset, detected.harmonics, largest, tuple(reason))
 
 
 def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:

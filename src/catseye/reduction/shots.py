@@ -105,6 +105,8 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, S
     path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance
     same = np.array(targets)[:, None] == np.array(targets)
     covariance += same * np.outer(path, path)
+    if network.motion is not None:
+        covariance += np.diag(n**2 * network.motion.jitter(name, targets))
 
     offset = (
         -n * (glass + obliquity + d0 + head.value)

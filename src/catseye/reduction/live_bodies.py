@@ -1,0 +1,41 @@
+"""Which points of a site move together: dish, feed arm, alidade; and which last from epoch to epoch."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.records.site_folder import SiteFolder
+
+ABOVE_THE_DISH = 5.0  # m over the paraboloid: what is higher is on the arm
+
+
+def bodies_of(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, str]:
+    """Point: "dish", "arm" or "alidade"; what stands on the ground is not in it.
+
+    Of the reflector's frame the rangers are on the arm, and so are single targets far above the paraboloid or outside
+    the aperture.
+    """
+    bodies = {name: "alidade" for name, frame in frames.items() if frame == "alidade"}
+    bodies |= {ranger.name: "arm" for ranger in site.feedarm.ranger}
+    shape = site.site.paraboloid
+    centre = np.array(shape.aperture_centre_mm)
+    for target in site.targets.values():
+        if target.frame == "reflector":
+            x, y, z = target.position_mm
+            high = (z - (x * x + y * y) / (4.0 * shape.focal_length_mm)) * MILLIMETRE > ABOVE_THE_DISH
+            outside = float(np.hypot(*(np.array([x, y]) - centre))) > 1.05 * shape.aperture_radius_mm
+            bodies[target.name] = "arm" if high or outside else "dish"
+    for triplet in site.triplets.values():
+        if triplet.frame == "reflector":
+            bodies |= dict.fromkeys(triplet.targets, "dish")
+        elif triplet.frame == "alidade":
+            bodies |= dict.fromkeys(triplet.targets, "alidade")
+    return bodies
+
+
+def lasting_names(site: SiteFolder) -> tuple[str, ...]:
+    """Rangers, triplets and single targets but the prisms of the dish, of which there are too many to carry along."""
+    single = [n for n, t in site.targets.items() if not (t.type == "prism" and t.frame == "reflector")]
+    triplets = [name for triplet in site.triplets.values() for name in triplet.targets]
+    return tuple(sorted([*site.rangers, *single, *triplets]))

@@ -1,0 +1,151 @@
+"""How far dish and feed arm have moved since the reference epoch, and what that does to beam and focus.
+
+All in the reflector frame: x to the right of who looks along the beam (along rising azimuth), z along the beam, y away
+from the feed arm, downwards at low elevation. A small turn w of the dish moves the beam by w x z = (w_y, -w_x, 0);
+elevation rises along -y, so that the beam's elevation changes by w_x and its azimuth, times cos E, by w_y.
+
+A feed that moves by d against the dish moves the beam the other way, by -K d / f across the axis: azimuth times cos E by
+-K d_x / f, elevation by +K d_y / f. Prime focus; K is the beam deviation factor, 1 on the plate scale of geometry.
+Corrections are offsets with their sign changed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.estimation.datum import motions
+from catseye.records.site_folder import SiteFolder
+from catseye.reduction.live_state import REFERENCE_EPOCH, XYZ, Carried
+
+Array = NDArray[np.float64]
+FEWEST = 3  # points of a body
+OFFSETS = ("azimuth times cos E", "elevation", "focus")
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Rigid motion of a body since the reference epoch, reflector frame, small angles.
+
+    body          "dish" or "arm"
+    pivot         (3,) m, about which it turns: the vertex, or the focus
+    translation   (3,) m, of the pivot
+    rotation      (3,) rad, right-hand rule
+    covariance    (6, 6), translation then rotation
+    chi2, degrees_of_freedom   of the points against a rigid motion
+    points        how many
+    """
+
+    body: str
+    pivot: Array
+    translation: Array
+    rotation: Array
+    covariance: Array
+    chi2: float
+    degrees_of_freedom: int
+    points: int
+
+
+@dataclass(frozen=True, eq=False)
+class LivePose:
+    """Pose of dish and feed since the reference epoch, and the beam.
+
+    dish, feed    motions; None with fewer than three points, see `missing`
+    offset        (3,) rad, rad, m: of the beam in azimuth times cos E and elevation, of the feed along the axis
+                  (positive: too far from the dish); NaN where it is not known
+    covariance    (3, 3)
+    missing       why something is not known, "" where all is
+    """
+
+    dish: BodyMotion | None
+    feed: BodyMotion | None
+    offset: Array
+    covariance: Array
+    missing: str
+
+    @property
+    def correction(self) -> Array:
+        """(3,) what takes the offset away: its opposite."""
+        return -self.offset
+
+
+def live_pose(
+    carried: Carried, bodies: Mapping[str, str], site: SiteFolder, *, beam_deviation: float = 1.0
+) -> LivePose:
+    """Dish and feed since the reference epoch, from the carried state with its reference places.
+
+    bodies           point: "dish", "arm", ...
+    beam_deviation   K
+    """
+    focal_length = site.site.paraboloid.focal_length_mm * MILLIMETRE
+    vertex, focus = np.zeros(3), np.array([0.0, 0.0, focal_length])
+    names = {b: _referenced(carried, [n for n in bodies if bodies[n] == b]) for b in ("dish", "arm")}
+    both = [*names["dish"], *names["arm"]]
+    few = [f"{b} has {len(n)} points with a reference" for b, n in names.items() if len(n) < FEWEST]
+    nothing = np.full(3, np.nan), np.full((3, 3), np.nan)
+    if few:
+        return LivePose(None, None, *nothing, f"{', '.join(few)} (expected {FEWEST} or more)")
+    change, covariance, places = _change(carried, both)
+    k = len(names["dish"])
+    try:
+        dish, by_dish = _rigid("dish", places[:k], change[: 3 * k], covariance[: 3 * k, : 3 * k], vertex)
+        feed, by_feed = _rigid("arm", places[k:], change[3 * k :], covariance[3 * k :, 3 * k :], focus)
+    except EstimationError as problem:
+        return LivePose(None, None, *nothing, str(problem))
+    to_motion = np.zeros((12, len(change)))
+    to_motion[:6, : 3 * k], to_motion[6:, 3 * k :] = by_dish, by_feed
+    joint = to_motion @ covariance @ to_motion.T
+    # offset = pointing by the dish's turn, and the feed at the focus less where the dish takes the focus
+    by = np.zeros((3, 12))
+    at_focus = np.hstack([np.eye(3), motions(focus[None], vertex, 1.0)[:, 3:6]])  # the dish's, of the focus
+    relative = np.hstack([-at_focus, np.eye(3), np.zeros((3, 3))])
+    by[0] = -beam_deviation / focal_length * relative[0]
+    by[0, 4] += 1.0
+    by[1] = beam_deviation / focal_length * relative[1]
+    by[1, 3] += 1.0
+    by[2] = relative[2]
+    motion = np.concatenate([dish.translation, dish.rotation, feed.translation, feed.rotation])
+    return LivePose(dish, feed, by @ motion, by @ joint @ by.T, "")
+
+
+def _referenced(carried: Carried, names: Sequence[str]) -> list[str]:
+    known = set(carried.names)
+    return [n for n in names if f"{n} x" in known and f"{n}{REFERENCE_EPOCH} x" in known]
+
+
+def _change(carried: Carried, names: Sequence[str]) -> tuple[Array, Array, Array]:
+    """Now less reference (3k,), its covariance, and the reference places (k, 3)."""
+    now = carried.columns([f"{n} {a}" for n in names for a in XYZ])
+    then = carried.columns([f"{n}{REFERENCE_EPOCH} {a}" for n in names for a in XYZ])
+    p = carried.covariance
+    cross = p[np.ix_(now, then)]
+    covariance = p[np.ix_(now, now)] + p[np.ix_(then, then)] - cross - cross.T
+    return carried.x[now] - carried.x[then], covariance, carried.x[then].reshape(-1, 3)
+
+
+def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Array) -> tuple[BodyMotion, Array]:
+    """The weighted rigid motion (6,), and the matrix (6, 3k) that takes changes to it.
+
+    In the reference epoch itself nothing has changed, and nothing is uncertain: then all points count alike.
+    """
+    design = motions(places, pivot, 1.0)[:, :6]
+    scale = float(np.trace(covariance)) / len(covariance)
+    weight = np.eye(len(change)) if scale < 1e-16 else np.linalg.pinv(covariance + 1e-6 * scale * np.eye(len(change)))
+    normal = design.T @ weight @ design
+    size = np.sqrt(np.diag(normal))
+    if np.linalg.cond(normal / np.outer(size, size)) > 1e12:
+        raise EstimationError(
+            f"{body}: its points lie on a line and do not hold its turn (expected points aside of it)"
+        )
+    to_motion = np.linalg.solve(normal, design.T @ weight)
+    found = to_motion @ change
+    rest = change - design @ found
+    degrees = len(change) - 6
+    chi2 = float(rest @ weight @ rest) if scale >= 1e-16 else 0.0
+    motion = BodyMotion(
+        body, pivot, found[:3], found[3:], to_motion @ covariance @ to_motion.T, chi2, degrees, len(places)
+    )
+    return motion, to_motion

@@ -1,0 +1,101 @@
+"""Weather as it comes in: kept for a while, and a station that jumps away from the others is not believed."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catseye.constants import SECONDS_PER_DAY
+from catseye.records.live import TICKS_PER_DAY, LiveWeather
+
+KEPT = 7200.0  # s
+SILENT = 1800.0  # s after its last reading, when a station counts no more
+JUMP_C = 1.5  # air changes by up to 0.5 °C in a minute
+RECENT = 300.0  # s, whose median a reading is held against
+ALONE = 600.0  # s, after which a single station is believed again: nobody says otherwise
+
+
+@dataclass
+class _Station:
+    good: deque[LiveWeather] = field(default_factory=deque)
+    doubted_since: int | None = None
+    doubt: str = ""
+
+
+class StationWatch:
+    """Readings of all stations, in the order in which they came."""
+
+    def __init__(self, names: tuple[str, ...]):
+        self._stations = {name: _Station() for name in names}
+
+    def add(self, read: LiveWeather) -> str:
+        """One reading; why it is not believed, "" where it is.
+
+        Not believed: a value that is missing or impossible, a time before the last, a temperature that has left the
+        station's own median of five minutes by 1.5 °C more than the other stations have left theirs.
+        """
+        station = self._stations.get(read.station)
+        if station is None:
+            return f"station {read.station} is not in site.toml (expected one of {', '.join(self._stations)})"
+        said = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
+        if not all(math.isfinite(v) for v in said):
+            return f"{read.station}: a sensor says nothing"
+        if not (-60 <= said[0] <= 60 and 500 <= said[1] <= 1100 and 0 <= said[2] <= 100):
+            return f"{read.station}: {said[0]:g} C, {said[1]:g} hPa, {said[2]:g} % cannot be"
+        if station.good and read.ticks <= station.good[-1].ticks:
+            return f"{read.station}: a reading of an earlier time came late"
+        station.doubt = self._jump(read, station)
+        if station.doubt:
+            station.doubted_since = station.doubted_since or read.ticks
+            return station.doubt
+        station.doubted_since = None
+        station.good.append(read)
+        while _seconds(read.ticks - station.good[0].ticks) > KEPT:
+            station.good.popleft()
+        return ""
+
+    def believed(self, ticks: int) -> list[LiveWeather]:
+        """Readings of the stations that speak and are believed, in order of station and time."""
+        found: list[LiveWeather] = []
+        for station in self._stations.values():
+            fresh = station.good and _seconds(ticks - station.good[-1].ticks) <= SILENT
+            if fresh and station.doubted_since is None:
+                found += station.good
+        if found:
+            return found
+        return [read for station in self._stations.values() for read in station.good]  # better old than none
+
+    def notes(self) -> tuple[str, ...]:
+        """What is wrong with stations now."""
+        return tuple(s.doubt for s in self._stations.values() if s.doubted_since is not None)
+
+    def _jump(self, read: LiveWeather, station: _Station) -> str:
+        own = _median(station, read.ticks)
+        if math.isnan(own):
+            return ""
+        left = read.temperature_c - own
+        others = [s for s in self._stations.values() if s is not station and s.good]
+        if not others and station.doubted_since and _seconds(read.ticks - station.doubted_since) > ALONE:
+            station.good.clear()  # nobody to ask: the air has changed
+            return ""
+        went = [s.good[-1].temperature_c - _median(s, s.good[-1].ticks) for s in others]
+        by_others = float(np.median(went)) if went else 0.0
+        since = _seconds(read.ticks - station.good[-1].ticks)
+        allowed = JUMP_C + 0.002 * since  # °C, and 7 °C an hour while nothing came or nothing was believed
+        if abs(left - by_others) <= allowed:
+            return ""
+        return (
+            f"{read.station} reads {read.temperature_c:.1f} C, {left:+.1f} C off its last five minutes while the "
+            f"others changed by {by_others:+.1f} C (allowed {allowed:.1f}): not believed"
+        )
+
+
+def _median(station: _Station, ticks: int) -> float:
+    """°C, of the last good readings; NaN of fewer than three."""
+    recent = [w.temperature_c for w in station.good if _seconds(station.good[-1].ticks - w.ticks) <= RECENT]
+    return float(np.median(recent)) if len(recent) >= 3 else math.nan
+
+
+def _seconds(ticks: int) -> float:
+    return ticks / TICKS_PER_DAY * SECONDS_PER_DAY
