@@ -7,6 +7,7 @@ journal replayed in its order gives the same answers bit for bit.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import median
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeath
 from catseye.records.site_folder import REFERENCE, SiteFolder
 from catseye.reduction.live_bodies import bodies_of, lasting_names
 from catseye.reduction.live_epoch import Epoch, campaign_of, frames_of_points, solve_epoch
+from catseye.reduction.live_jitter import Jitter
 from catseye.reduction.live_pose import LivePose, live_pose
 from catseye.reduction.live_shots import Line, RangerNow, ShotAnswer, Taken, answer, taken
 from catseye.reduction.live_state import (
@@ -30,7 +32,7 @@ from catseye.reduction.live_state import (
     with_velocities,
 )
 from catseye.reduction.live_weather import StationWatch
-from catseye.reduction.motion import LONGEST_GAP, Motion, PostureTrack, frames_of, ground_from
+from catseye.reduction.motion import LONGEST_GAP, Motion, PostureTrack, carried_point, frames_of, ground_from
 from catseye.reduction.places import places_of
 from catseye.reduction.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.settings import Settings
@@ -113,6 +115,45 @@ class EpochAnswer:
         return self.x[k // 3], self.covariance[k : k + 3, k : k + 3]
 
 
+@dataclass(frozen=True, eq=False)
+class EpochJob:
+    """An epoch to be solved, by itself: another process may do it."""
+
+    rows: list[Taken]
+    weather: list[LiveWeather]
+    motion: Motion
+    azimuth: float
+    elevation: float
+    carried: Carried | None
+    lasting: tuple[str, ...]
+    ticks: int
+    rules: Settings
+
+    def solve(self) -> Epoch | str:
+        """The epoch, or why there is none."""
+        with threadpool_limits(limits=1, user_api="blas"):
+            try:
+                campaign = campaign_of(
+                    self.motion.site,
+                    self.rows,
+                    self.weather,
+                    azimuth=self.azimuth,
+                    elevation=self.elevation,
+                    mjd=self.motion.epoch,
+                )
+                return solve_epoch(
+                    campaign,
+                    self.rows,
+                    self.motion,
+                    self.rules,
+                    carried=self.carried,
+                    lasting=self.lasting,
+                    ticks=self.ticks,
+                )
+            except CatseyeError as problem:
+                return str(problem)
+
+
 class Live:
     """A living site's reduction; see the module."""
 
@@ -124,6 +165,7 @@ class Live:
         self.lasting = lasting_names(site)
         self.track = PostureTrack()
         self.stations = StationWatch(tuple(s.name for s in site.site.weather_station))
+        self.jitter = Jitter(self.settings.jitter_mm)
         self.rangers = {name: RangerNow() for name in site.rangers}
         self.carried: Carried | None = None
         self.number = 0
@@ -159,7 +201,7 @@ class Live:
             mirror,
             adc,
             rules,
-            usual=float(np.median(usual)) if usual else math.nan,
+            usual=median(usual) if usual else math.nan,
             run=run if abs(run) < 0.5 * math.pi else 0.0,
         )
         said = answer(
@@ -199,12 +241,13 @@ class Live:
 
     # What it answers -------------------------------------------------------------------------------------------------
 
-    def solve(self, ticks: int) -> EpochAnswer | None:
-        """The epoch of all shots since the last one, for an instant; None where nothing can be solved.
+    def begin(self, ticks: int) -> "EpochJob | None":
+        """The epoch of all shots since the last one, for an instant, ready to be solved; None where there is nothing.
 
         ticks   the middle of the round, or its end: points are carried there
 
-        Shots stay for the next epoch where there is no weather or posture yet.
+        `failed` says why there is nothing. Shots stay for the next epoch where weather or posture is missing. Between
+        `begin` and `take_in` more shots may be fed; they belong to the next epoch.
         """
         weather = self.stations.believed(ticks)
         self.failed = self._unready(weather)
@@ -213,24 +256,22 @@ class Live:
         rows, self._pending = self._rows(ticks), []
         mjd = ticks / TICKS_PER_DAY
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
-        motion = Motion(self.site, self.track, self.frames, mjd, self.bodies, self.settings.jitter_mm)
+        motion = Motion(self.site, self.track.copy(), self.frames, mjd, self.bodies, self.jitter.mm)
         carried = self._carried_to(ticks, elevation)
-        with threadpool_limits(limits=1, user_api="blas"):
-            try:
-                campaign = campaign_of(self.site, rows, weather, azimuth=azimuth, elevation=elevation, mjd=mjd)
-                epoch = solve_epoch(
-                    campaign,
-                    rows,
-                    motion,
-                    self.settings.reduction,
-                    carried=carried,
-                    lasting=self.lasting,
-                    ticks=ticks,
-                )
-            except CatseyeError as problem:
-                self.failed = str(problem)
-                return None
-            return self._take_in(epoch, rows, motion, azimuth, elevation)
+        rules = self.settings.reduction
+        return EpochJob(rows, weather, motion, azimuth, elevation, carried, self.lasting, ticks, rules)
+
+    def take_in(self, job: "EpochJob", found: "Epoch | str") -> EpochAnswer | None:
+        """What `job.solve()` found becomes what is known; None where it found nothing, `failed` says why."""
+        if isinstance(found, str):
+            self.failed = found
+            return None
+        return self._take_in(found, job.rows, job.motion, job.azimuth, job.elevation)
+
+    def solve(self, ticks: int) -> EpochAnswer | None:
+        """`begin`, `EpochJob.solve` and `take_in` in one."""
+        job = self.begin(ticks)
+        return None if job is None else self.take_in(job, job.solve())
 
     def set_reference(self) -> None:
         """Poses count from the last epoch on."""
@@ -244,6 +285,7 @@ class Live:
     ) -> EpochAnswer:
         found = epoch.coordinates
         self.number += 1
+        self.jitter.learn(found.ranges, self.bodies)
         self.carried, self.last_ticks = epoch.carried, epoch.carried.ticks
         frames = frames_of_points(motion, found.points)
         for name, x in zip(found.points, found.x, strict=True):
@@ -336,13 +378,19 @@ class Live:
             {self.frames[shot.ranger], self.frames[shot.target]} != {"ground"} and not len(self.track)
         ):
             return math.nan, 0.0
-        half = 0.5 * shot.duration / SECONDS_PER_DAY
-        times = shot.middle_mjd + np.array([-half, 0.0, half])
-        along = self.place(shot.target, times) - self.place(shot.ranger, times)
         if self.frames[shot.ranger] == self.frames[shot.target]:
-            return float(np.linalg.norm(along[1])), 0.0
-        length = np.sqrt(np.einsum("ij,ij->i", along, along))
-        return float(length[1]), float(length[2] - length[0]) / shot.duration
+            return float(np.linalg.norm(self._own[shot.target] - self._own[shot.ranger])), 0.0
+        half = 0.5 * shot.duration / SECONDS_PER_DAY
+        first, middle, last = (self._length(shot, shot.middle_mjd + dt) for dt in (-half, 0.0, half))
+        return middle, (last - first) / shot.duration
+
+    def _length(self, shot: LiveShot, mjd: float) -> float:
+        azimuth, elevation = self.track.angles(mjd)
+        a, b = (
+            carried_point(self.site, self.frames[n], self._own[n], azimuth, elevation)
+            for n in (shot.ranger, shot.target)
+        )
+        return math.dist(a, b)
 
     def _line(self, ranger: str, target: str) -> Line:
         known = self._lines.get((ranger, target))

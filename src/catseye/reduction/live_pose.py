@@ -4,8 +4,8 @@ All in the reflector frame: x to the right of who looks along the beam (along ri
 from the feed arm, downwards at low elevation. A small turn w of the dish moves the beam by w x z = (w_y, -w_x, 0);
 elevation rises along -y, so that the beam's elevation changes by w_x and its azimuth, times cos E, by w_y.
 
-A feed that moves by d against the dish moves the beam the other way, by -K d / f across the axis: azimuth times cos E by
--K d_x / f, elevation by +K d_y / f. Prime focus; K is the beam deviation factor, 1 on the plate scale of geometry.
+A feed that moves by d against the dish moves the beam the other way, by -K d / f across the axis: azimuth times cos E
+by -K d_x / f, elevation by +K d_y / f. Prime focus; K is the beam deviation factor, 1 on the plate scale of geometry.
 Corrections are offsets with their sign changed.
 """
 

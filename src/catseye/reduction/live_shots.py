@@ -9,6 +9,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from catseye.records.site import Adc
 from catseye.records.site_folder import REFERENCE
 from catseye.reduction.ranges import Detected, Phases, judged_phases
 from catseye.reduction.settings import Settings
-from catseye.signal.running import running_phasor
+from catseye.signal.buffers import shortest_run
 
 USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
 U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
@@ -96,13 +97,8 @@ def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual
     detected = Detected.empty(1)
     cycles, samples = np.array([shot.cycles]), np.array([shot.samples_per_cycle])
     if shot.samples is not None:
-        row = np.zeros(1, dtype=np.int64)
-        detected.put(row, shot.samples[None], shot.samples_per_cycle, shot.volts_per_code, adc.bits)
-        if run:
-            leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
-            still = running_phasor(shot.samples, shot.samples_per_cycle, shot.volts_per_code, run=run, leaked=leaked)
-            detected.raw[0], detected.u_phasor[0] = still.phasor + leaked, still.u_phasor
-            detected.total[0], detected.between[0] = still.total, still.between
+        leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+        _detect(shot, shot.samples, detected, adc.bits, run, leaked)
     elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
         detected.wrong[0] = "no samples: neither the buffer came nor what the ranger made of it"
     else:
@@ -122,6 +118,29 @@ def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual
         float(phases.largest[0]),
         detected.wrong[0] or reason,
     )
+
+
+def _detect(shot: LiveShot, samples: NDArray[np.int16], into: Detected, bits: int, run: float, leaked: complex) -> None:
+    """Row 0 of `into` from a buffer, compiled; what is wrong with it in words, by the plain form."""
+    from catseye.signal import buffer_kernel as kernel
+
+    n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
+    ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    found, still = np.zeros(16), np.zeros(8)
+    if m < 2:  # a single cycle's noise comes from its overtones: rare, and not here
+        into.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+        return
+    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, found, still)
+    clipped, longest, dropped = found[kernel.CLIPPED], found[kernel.LONGEST], found[kernel.DROPPED]
+    if clipped or dropped or longest >= shortest_run(n):
+        into.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+    mean, moments = (found[0:2], found[kernel.TOTAL :]) if run == 0.0 else (still[0:2], still[2:])
+    into.raw[0] = complex(mean[0], mean[1]) * volts + (leaked if run else 0.0)
+    into.u_phasor[0] = math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts
+    into.offset[0], into.clipped[0] = found[kernel.OFFSET] * volts, int(clipped)
+    into.harmonics[0] = found[kernel.SECOND : kernel.SECOND + 2] * volts
+    into.largest[0] = max(-found[kernel.LOW], found[kernel.HIGH]) * volts
+    into.total[0], into.between[0] = moments[:3] * volts**2, moments[3:] * volts**2
 
 
 def phases_of(rows: list[Taken]) -> Phases:
@@ -162,7 +181,7 @@ def answer(
         return ShotAnswer(row.reason.partition(":")[0], row.reason, amplitude, phase)
     if row.shot.target == REFERENCE:
         usual = now.usual[True]
-        level = float(np.median(usual)) if len(usual) >= 3 else amplitude
+        level = median(usual) if len(usual) >= 3 else amplitude
         if abs(amplitude / level - 1.0) > REFERENCE_CHANGE:
             text = f"bad reference: return {amplitude:.3f} V where the cube gives {level:.3f} V"
             return ShotAnswer("bad reference", text, amplitude, phase)

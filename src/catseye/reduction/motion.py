@@ -4,6 +4,7 @@ A rigid telescope on a perfect track, [PARKER04] eq. 2.44; what the real one doe
 its rate of change an uncertainty of the carried state.
 """
 
+import math
 from bisect import bisect_right, insort
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,11 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from catseye.constants import MILLIMETRE, SECONDS_PER_DAY
+from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 from catseye.geometry.antenna import ground_from_alidade_at, ground_from_reflector_at
 from catseye.geometry.frame import Transforms
-from catseye.records.live import TICKS_PER_DAY, LivePosture
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site_folder import SiteFolder
 
 Array = NDArray[np.float64]
@@ -44,6 +45,12 @@ class PostureTrack:
                 del self._reads[gone]
             del self._ticks[:first]
 
+    def copy(self) -> "PostureTrack":
+        """The readings of now, to which nothing is added."""
+        same = PostureTrack()
+        same._ticks, same._reads, same._table = list(self._ticks), dict(self._reads), self._columns()
+        return same
+
     def __len__(self) -> int:
         return len(self._ticks)
 
@@ -66,6 +73,27 @@ class PostureTrack:
         t = (np.asarray(mjd, dtype=float) * TICKS_PER_DAY - self._ticks[0]) * SECONDS_PER_DAY / TICKS_PER_DAY
         i = np.clip(np.searchsorted(table[0], t, side="right") - 1, 0, max(len(self._ticks) - 2, 0))
         return self._angle(table, i, t, 1, 3), self._angle(table, i, t, 2, 4)
+
+    def angles(self, mjd: float) -> tuple[float, float]:
+        """`at` for one time, without arrays.
+
+        Raises InputError: no reading at all.
+        """
+        if len(self._ticks) < 2:
+            azimuth, elevation = self.at(mjd)
+            return float(azimuth), float(elevation)
+        ticks = mjd * TICKS_PER_DAY
+        i = min(max(bisect_right(self._ticks, ticks) - 1, 0), len(self._ticks) - 2)
+        a, b = self._reads[self._ticks[i]], self._reads[self._ticks[i + 1]]
+        h = (b.ticks - a.ticks) * TICK_SECONDS
+        t = (ticks - a.ticks) * TICK_SECONDS
+        u = min(max(t / h, 0.0), 1.0)
+        w = (1 + 2 * u) * (1 - u) ** 2, u**2 * (3 - 2 * u), h * u * (1 - u) ** 2, -h * u**2 * (1 - u)
+        beyond = max(t - h, 0.0), min(t, 0.0)
+        return (
+            _cubic(w, beyond, a.azimuth, _near(b.azimuth, a.azimuth), a.azimuth_rate, b.azimuth_rate),
+            _cubic(w, beyond, a.elevation, b.elevation, a.elevation_rate, b.elevation_rate),
+        )
 
     def age(self, mjd: ArrayLike) -> Array:
         """s from the nearest reading (...)."""
@@ -100,6 +128,39 @@ class PostureTrack:
             + h * (v0 * u * (1 - u) ** 2 - v1 * u**2 * (1 - u))
         )
         return np.asarray(cubic + np.where(t > t1, v1 * (t - t1), np.where(t < t0, v0 * (t - t0), 0.0)))
+
+
+def _cubic(
+    w: tuple[float, float, float, float], beyond: tuple[float, float], y0: float, y1: float, v0: float, v1: float
+) -> float:
+    return w[0] * y0 + w[1] * y1 + w[2] * v0 + w[3] * v1 + beyond[0] * v1 + beyond[1] * v0
+
+
+def _near(angle: float, other: float) -> float:
+    """The angle on the turn nearest to another."""
+    return angle + TWO_PI * round((other - angle) / TWO_PI)
+
+
+def carried_point(
+    site: SiteFolder, frame: str, own: Array, azimuth: float, elevation: float
+) -> tuple[float, float, float]:
+    """One point of a frame in the ground frame, m, without arrays.
+
+    own    (3,) m, in the frame
+
+    Source: [PARKER04] eq. 2.40-2.44, multiplied out.
+    """
+    x, y, z = own.tolist()
+    if frame == GROUND:
+        return x, y, z
+    if frame == REFLECTOR:
+        reflector = site.site.frames.reflector
+        dx, dy, dz = reflector.reflector_to_elevation_mm
+        x, y, z = x + dx * MILLIMETRE, y + dy * MILLIMETRE, z + dz * MILLIMETRE
+        s, c = math.sin(elevation), math.cos(elevation)
+        y, z = s * y + c * z, s * z - c * y + reflector.elevation_axis_height_mm * MILLIMETRE
+    s, c = math.sin(azimuth), math.cos(azimuth)
+    return c * x + s * y, c * y - s * x, z
 
 
 def ground_from(site: SiteFolder, frame: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
