@@ -233,11 +233,21 @@ class Live:
         return np.asarray(ground_from(self.site, frame, *self.track.at(times)).points(own))
 
     def uncertainty(self) -> dict[str, Array]:
-        """Covariance (3, 3) m^2 of each carried point, in its frame."""
+        """Covariance (3, 3) m^2 of each carried point, ground axes as the telescope last stood."""
         if self.carried is None:
             return {}
-        names = [n[:-2] for n in self.carried.names if n.endswith(" x") and n[:-2] in self._own]
-        return {name: self.carried.block([name])[1] for name in names}
+        latest = self.track.latest
+        turns: dict[str, Array] = {}
+        if latest is not None:
+            for frame in ("alidade", "reflector"):
+                turns[frame] = ground_from(self.site, frame, latest.azimuth, latest.elevation).single.rotation
+        found = {}
+        for i, name in enumerate(self.carried.names):
+            point = name[:-2]
+            if name.endswith(" x") and point in self._own:
+                turn = turns.get(self.frames[point], np.eye(3))
+                found[point] = turn @ self.carried.covariance[i : i + 3, i : i + 3] @ turn.T
+        return found
 
     # What it answers -------------------------------------------------------------------------------------------------
 

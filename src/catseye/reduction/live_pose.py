@@ -108,7 +108,7 @@ def live_pose(
     by[1, 3] += 1.0
     by[2] = relative[2]
     motion = np.concatenate([dish.translation, dish.rotation, feed.translation, feed.rotation])
-    return LivePose(dish, feed, by @ motion, by @ joint @ by.T, "")
+    return LivePose(dish, feed, by @ motion, _positive(by @ joint @ by.T), "")
 
 
 def _referenced(carried: Carried, names: Sequence[str]) -> list[str]:
@@ -146,6 +146,12 @@ def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Ar
     degrees = len(change) - 6
     chi2 = float(rest @ weight @ rest) if scale >= 1e-16 else 0.0
     motion = BodyMotion(
-        body, pivot, found[:3], found[3:], to_motion @ covariance @ to_motion.T, chi2, degrees, len(places)
+        body, pivot, found[:3], found[3:], _positive(to_motion @ covariance @ to_motion.T), chi2, degrees, len(places)
     )
     return motion, to_motion
+
+
+def _positive(covariance: Array) -> Array:
+    """Symmetric, and what rounding took below zero on the diagonal at zero: in the reference epoch nothing moves."""
+    even = 0.5 * (covariance + covariance.T)
+    return np.asarray(even + np.diag(np.maximum(-np.diag(even), 0.0)))
