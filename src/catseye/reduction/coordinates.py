@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.adjustment import Fit, Solution, adjust
+from catseye.estimation.adjustment import CONVERGED, Fit, Solution, adjust
 from catseye.estimation.observations import Linear, Observations
 from catseye.estimation.robust import CHECKED, adjust_robustly
 from catseye.records.campaign import Campaign
@@ -34,6 +34,7 @@ PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from 
 TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
 SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
 SETTLED_U = 0.01  # or than this share of its standard uncertainty
+UNSUSPICIOUS = 1.5  # variance factor, beyond which somebody is wrong though none stands out
 STEEP = 0.03  # °C/m between the stations, beyond which the thermometers are doubted
 
 
@@ -167,13 +168,20 @@ def adjust_coordinates(
 
 
 def settle_network(
-    network: Network, starts: Mapping[str, np.ndarray], progress: Progress | None = None, *, keep: float = 0.0
+    network: Network,
+    starts: Mapping[str, np.ndarray],
+    progress: Progress | None = None,
+    *,
+    keep: float = 0.0,
+    predicted: bool = False,
 ) -> tuple[Solution, list[tuple[ShotGroup, ShotParts]]]:
     """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
 
     network   with priors for whatever its shots do not hold
     starts    point: (3,) m, or parameters by the name in `layout.at`, where to begin instead of the layout's start
     keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
+    predicted the priors know where everything is to a few of the shots' sigmas: wrong shots are searched for only where
+              one stands out, since none can hide behind another
 
     Raises EstimationError where it finds no answer.
     """
@@ -197,7 +205,11 @@ def settle_network(
             for i, g in enumerate(groups)
         ]
         before = x
-        if turn < TESTED:
+        if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
+            solution = adjust(x, groups, free=free, names=layout.names)
+            predicted = _unsuspicious(solution, removable, settings.critical)
+            active = None
+        if turn < TESTED and not predicted:
             solution = adjust_robustly(
                 x,
                 groups,
@@ -209,8 +221,9 @@ def settle_network(
                 names=layout.names,
                 critical=settings.critical,
             )
-        else:
+        elif turn >= TESTED:
             solution = adjust(x, groups, free=free, active=active, names=layout.names)
+        assert solution is not None
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
         if not turn:
             advice = dish_advice(network, x, solution.covariance)
@@ -227,6 +240,15 @@ def settle_network(
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
     return solution, shots
+
+
+def _unsuspicious(solution: Solution, removable: Sequence[np.ndarray], critical: float) -> bool:
+    """Whether every observation that may be wrong passes its test by half a sigma, and all together theirs."""
+    if not solution.solved or solution.status != CONVERGED:
+        return False
+    large = [np.abs(f.standardised[may]) > critical - 0.5 for f, may in zip(solution.fits, removable, strict=True)]
+    factor, _ = solution.variance_factor([f.name for f in solution.fits if f.name != APPROXIMATE])
+    return not any(each.any() for each in large) and factor < UNSUSPICIOUS
 
 
 def coordinates_of(

@@ -132,7 +132,7 @@ def solve_epoch(
     frames = frames_at(network, motion)
     if carried is not None:
         network = _with_carried(network, carried, frames)
-    solution, shots = settle_network(network, resolved.starts, keep=SETTLED)
+    solution, shots = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
     found = coordinates_of(network, solution, shots, resolved)
     reasons |= resolved.rejected
     layout = network.layout
