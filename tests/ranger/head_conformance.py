@@ -1,6 +1,7 @@
 """What every Head must do. Derive, give `head()` and `pass_time()`, and pytest runs it for that head."""
 
 import numpy as np
+import pytest
 
 from catseye.geometry.time_tag import PER_SECOND, TimeTag
 from catseye.ranger.head import Sampling
@@ -104,6 +105,45 @@ class HeadConformance:
         assert abs(head.actual(0) - 120) <= 10
         assert abs(head.actual(1) + 60) <= 10
 
+    def test_a_track_waits_at_its_first_counts_for_its_time(self):
+        head = self.ready()
+        begin = head.now().after(0.8)
+        assert head.follow((np.array([90.0, -40.0]), np.array([140.0, 0.0])), (begin, begin.after(0.5)))
+        self.pass_time(head, 0.3)
+        for _ in range(20):
+            self.pass_time(head, 0.02)
+            assert abs(head.actual(0) - 90) <= 5
+            assert abs(head.actual(1) + 40) <= 5
+        assert self.until(head, lambda: not (head.moving(0) or head.moving(1)), 3.0)
+        assert abs(head.actual(0) - 140) <= 10
+
+    def test_a_track_takes_over_from_another_and_a_move_from_a_track(self):
+        head = self.ready()
+        begin = head.now()
+        for goal in (100.0, 300.0):
+            ends = (np.array([0.0, 0.0]), np.array([goal, 50.0]))
+            assert head.follow(ends, (begin, begin.after(30.0)))
+            self.pass_time(head, 0.2)
+        assert head.moving(0)
+        for axis in (0, 1):
+            assert head.start(axis, -200, velocity=VELOCITY, acceleration=ACCELERATION)
+        assert self.until(head, lambda: not (head.moving(0) or head.moving(1)), 10.0)
+        assert self.until(head, lambda: abs(head.actual(0) + 200) <= 5 and abs(head.actual(1) + 200) <= 5, 5.0)
+
+    def test_an_axis_without_amplifier_does_not_follow(self):
+        head = self.ready()
+        head.enable(1, False)
+        begin = head.now()
+        assert not head.follow((np.zeros(2), np.ones(2)), (begin, begin.after(1.0)))
+
+    @pytest.mark.parametrize("sampling", [Sampling(), Sampling(3, 1, 1000), Sampling(10, 1, 10_000)])
+    def test_any_sampling_gives_its_words_and_no_sooner(self, sampling):
+        head = self.head()
+        head.trigger(sampling)
+        assert head.buffer() is None
+        assert self.until(head, lambda: head.buffer() is not None, sampling.duration + 2.0)
+        assert head.buffer().samples.shape == (sampling.samples * sampling.cycles,)
+
     def test_power_and_reset(self):
         head = self.ready()
         head.switch_laser(False)
@@ -112,4 +152,5 @@ class HeadConformance:
         head.trigger(SHORT)
         head.reset()
         assert not head.enabled(0)
+        assert head.homing(0) == head.homing(1) == "never"
         assert head.buffer() is None
