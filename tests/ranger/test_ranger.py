@@ -392,3 +392,430 @@ def test_reset_is_a_cold_boot():
     assert told.one("CYC").text == "128"
     assert told.ranger.status() == Status.AUTO
     assert told.say(*READY)[-1].ok
+
+
+def answer(told, line):
+    """The reply to a line while a stream speaks between."""
+    (reply,) = [r for r in told.say(f"77\t{line}") if r.tid == 77 and r.command == line.split(" ")[0]]
+    return reply
+
+
+DOWN = [0.0, 0.0, -1.0]  # a Sun that no beam here looks at
+
+
+def heard(told, command):
+    return [o.reply for o in told.heard if o.reply.command == command]
+
+
+def test_a_stream_fires_the_next_buffer_before_it_tells_the_last():
+    told = ready()
+    told.say("CIL 1")
+    told.heard.clear()
+    fired = told.head.fired
+    told.ranger.receive(1, "1000\tSTM 1, 4")
+    lines = []
+    for _ in range(200):
+        for out in told.turns(1, 0.002):
+            if out.reply.command in ("CMEAS", "BUF"):
+                lines.append(out)
+                taking = told.head.taking is not None
+                assert taking == (told.head.fired - fired < 4 or len(lines) <= 6)
+        if len(lines) == 4:
+            assert Status.STREAMING in told.ranger.status()
+    told.turns(100)
+    lines += [o for o in told.heard if o.reply.command in ("CMEAS", "BUF") and o not in lines]
+    assert [o.reply.command for o in lines] == ["CMEAS", "BUF"] * 4
+    assert {o.reply.tid for o in lines} == {1000}
+    assert {o.client for o in lines if o.reply.command == "BUF"} == {1}
+    assert {o.client for o in lines if o.reply.command == "CMEAS"} == {None}
+    assert told.head.fired - fired == 4
+    stamps = [o.reply.ticks for o in lines if o.reply.command == "CMEAS"]
+    assert [o.reply.ticks for o in lines if o.reply.command == "BUF"] == stamps
+    gaps = np.diff(stamps) * TICK_NS * 1e-9
+    assert np.all((gaps >= 0.127) & (gaps < 0.128 + 2 * 0.002 + 0.001))  # two strides of the test's time, a tick
+    assert Status.STREAMING not in told.ranger.status()
+    assert told.ranger.idle
+
+
+def test_while_a_stream_runs_what_would_move_or_fire_is_refused_but_tracking_goes_on():
+    told = ready()
+    told.say("CIL 1")
+    assert told.one("STM 1, 1000").values == ("1", "1000")
+    for line in ("CIL 1", "CMEAS 2, 1", "TRG", "STT 0", "FHM 0", "CYC 10", "STM 1, 5", "SCN 1"):
+        reply = answer(told, line)
+        assert not reply.ok, line
+        assert "stream" in reply.text or "scan list" in reply.text, reply
+    t0, t1 = (stamp_text(told.ranger.now_ticks() + round(s * 1e9 / TICK_NS)) for s in (0.5, 1.5))
+    assert answer(told, f"TRK 1, {t0}, 0, 80000, 12000, {t1}, 1, 80000, 12000").ok
+    assert answer(told, "D0").ok
+    assert answer(told, "CYC").ok
+    told.heard.clear()
+    told.turns(20)
+    assert len(heard(told, "BUF")) >= 4
+    assert answer(told, "STM 1, 0").ok
+    told.heard.clear()
+    told.turns(20)
+    assert heard(told, "CMEAS") == []
+    told.say("CIL 2")
+    assert "not on 1" in told.one("STM 1, 9").text
+    assert "not known" in told.one("STM 99, 1").text
+
+
+def test_a_stream_ends_with_its_connection_and_says_why_where_it_cannot_go_on():
+    told = ready()
+    told.say("CIL 1", "STM 1, 1000", client=3)
+    told.ranger.disconnect(1)
+    assert told.ranger.stream is not None
+    told.ranger.disconnect(3)
+    assert told.ranger.idle
+    told.say("STM 1, 1000", "PS 0")
+    told.turns(10)
+    assert "laser is off" in heard(told, "CMEAS")[-1].text
+    assert told.ranger.idle
+    told.say("PS 1", "STM 1, 1000")
+    told.ranger.reset()
+    assert told.ranger.idle
+
+
+def rested(told, seconds, strides):
+    """Replies while time passes by the strides that `strides` gives, and how many turns that took."""
+    begin, replies, count = told.ranger.now_ns(), [], 0
+    while told.ranger.now_ns() - begin < seconds * 1e9:
+        replies += [(o.reply.command, o.reply.ok, o.reply.ticks) for o in told.turns(1, 0.0)]
+        told.head.advance(strides())
+        count += 1
+    return replies, count
+
+
+def test_a_ranger_that_rests_as_long_as_it_says_answers_as_one_that_is_asked_each_half_millisecond():
+    """Everything within the poll of 5 ms and the watch of 100 ms; what has a time of its own within a nanosecond."""
+    answers, counts = [], []
+    for quick in (True, False):
+        told = ready()
+        later = stamp_text(told.ranger.now_ticks() + round(3e9 / TICK_NS))
+        for line in ("CIL 1", "CMEAS 2, 1", "BUF", "CMEAS 1, 2", f"AT {later}, 3, 0.25, VER", "STM 2, 5"):
+            told.ranger.receive(1, line)
+        strides = (lambda: 5e-4) if quick else (lambda told=told: max(told.ranger.rest(), 1e-9))
+        replies, count = rested(told, 6.0, strides)
+        answers.append(replies)
+        counts.append(count)
+    fast, slow = answers
+    assert [each[:2] for each in fast] == [each[:2] for each in slow]
+    assert [c for c, _, _ in slow].count("VER") == 3
+    assert [c for c, _, _ in slow].count("CMEAS") == 7
+    late = np.array([b[2] - a[2] for a, b in zip(fast, slow, strict=True)]) * TICK_NS * 1e-9
+    assert np.all(np.abs(late) < 0.1)  # nine waits of 5 ms at most lie one behind the other
+    timed = [ticks for command, _, ticks in slow if command == "VER"]
+    assert np.all(np.abs(np.diff(timed) * TICK_NS * 1e-9 - 0.25) < 1e-3)  # a tick
+    assert counts[1] < 0.05 * counts[0]
+
+
+def test_what_rests_costs_ten_turns_a_second_and_one_where_nobody_listens():
+    told = ready()
+    told.turns(1)
+    assert told.ranger.rest() == 0.1
+    assert told.ranger.rest(heard=False) == 1.0
+    told.ranger.receive(1, "VER")
+    assert told.ranger.rest() == 0.0
+    told.turns(1, 0.0)
+    told.say("ACU 1")
+    told.turns(1, 0.0)
+    assert 0.0 < told.ranger.rest() <= 0.5
+    told.say("ACU 0", "CIL 1")
+    told.ranger.receive(1, "CMEAS 2, 1")
+    told.turns(1, 0.0)
+    assert told.ranger.rest() == 0.1
+    told.head.advance(0.1)
+    assert told.ranger.rest() == pytest.approx(0.028, abs=1e-9)
+    told.head.taking = None  # a buffer that does not come
+    told.head.advance(0.0281)
+    assert told.ranger.rest() == pytest.approx(1e-3)
+    told.head.advance(0.02)
+    assert told.ranger.rest() == pytest.approx(5e-3)
+
+
+def test_a_clock_that_is_set_back_stops_neither_updates_nor_the_watch():
+    sun = np.array(DOWN)
+    told = ready(sun=lambda mjd: sun)
+    told.say("ACU 1", "STI 52880")
+    told.turns(30)
+    told.heard.clear()
+    told.ranger.receive(1, "D0 200")
+    told.turns(30)
+    assert len(heard(told, "D0")) == 2
+    sun[:] = beam_of(told)
+    told.turns(30)
+    assert Status.LASER_OFF in told.ranger.status()
+
+
+def test_amplitude_and_phase_are_those_of_the_signal_s_own_detection():
+    from catseye.signal.phase import detect
+
+    told = ready()
+    told.say("CIL 1")
+    for sampling in ("SFQ 64", "SFQ 16", "CYC 1", "SFQ 3"):
+        told.say(sampling, "TRG", "MPC")
+        buffer = told.head.last
+        found = detect(buffer.samples, buffer.sampling.samples, buffer.volts_per_code, harmonics=())
+        assert told.ranger.measured.amplitude == pytest.approx(float(found.amplitude), rel=1e-12)
+        assert told.ranger.measured.phase == pytest.approx(float(found.phase), abs=1e-12)
+    for ends, clipped in (((-32767, 32766), False), ((-32768, 0), True), ((0, 32767), True)):
+        told.say("TRG")
+        told.head.last.samples[:2] = ends
+        told.say("MPC")
+        assert (Status.CLIPPED in told.ranger.status()) == clipped
+
+
+def test_each_bit_of_the_status_word_is_the_one_documented():
+    told = Told()
+    assert told.ranger.status() == Status.AUTO
+    head, z = told.head, told.ranger
+    z.auto = False
+    changes = {
+        1: (head.homes, 0, "home"),
+        2: (head.homes, 1, "home"),
+        8: (head.off, 0, True),
+        9: (head.off, 1, True),
+        12: (head.on, 0, True),
+        13: (head.on, 1, True),
+    }
+    for bit, (where, axis, value) in changes.items():
+        before, where[axis] = where[axis], value
+        assert int(z.status()) == 1 << bit
+        where[axis] = before
+    for bit, (whose, name, value) in {
+        0: (z, "auto", True),
+        3: (z, "updates", True),
+        4: (z, "scanning", True),
+        6: (z, "stream", object()),
+        10: (head, "laser", False),
+        11: (head, "locked", False),
+        14: (z, "sun_refused", True),
+        16: (z, "given", {"BP", "ALPHA", "BETA", "MO", "EZ", "D0"}),
+    }.items():
+        before = getattr(whose, name)
+        setattr(whose, name, value)
+        assert int(z.status()) == 1 << bit
+        setattr(whose, name, before)
+    z.in_sun = True
+    assert z.status() == Status.SUN_REFUSED
+
+
+def beam_of(told):
+    station = told.ranger.cubes.station
+    return beam(station, told.ranger.here) @ station.mirror_from_ground
+
+
+def test_a_cube_is_found_by_its_name_of_now():
+    told = ready()
+    assert told.one("COO 1, 0, 80000, 12000, OTHER").ok
+    assert not told.one("COO ZG11").ok
+    assert told.one("COO other").values[0] == "1"
+    assert told.one("COO 3, 1, 1, 1, ZG11").ok
+    assert "that of cube 3" in told.one("COO 2, 1, 1, 1, zg11").text
+    assert told.one("INI 2").ok
+    assert told.one("COO 1, 0, 80000, 12000, ZG12").ok
+    assert told.one("COO ZRG").values[0] == "0"
+
+
+def test_a_search_for_the_index_is_refused_where_its_turn_could_meet_the_sun_with_the_laser_on():
+    told = ready()
+    told.say("CIL 1")
+    station = told.ranger.cubes.station
+    here = np.array(told.ranger.here)
+    for axis in (0, 1):
+        for away in (20_000.0, 49_000.0, -30_000.0):
+            on_the_way = beam(station, here + away * np.eye(2)[axis]) @ station.mirror_from_ground
+            told.say("PS 1", "SUN " + ", ".join(f"{v:.9f}" for v in on_the_way))
+            said = told.one(f"FHM {axis}")
+            assert "PS 0" in said.text
+            assert "Sun" in said.text
+            assert told.head.homing(axis) == "home"
+    assert told.say("PS 0", "FHM 1")[-1].ok
+    told.say("PS 1", "CIL 1")
+    off_the_way = told.ranger.cubes.station.mirror_from_ground[2]  # the azimuth axis: its beam keeps off it
+    told.say("SUN " + ", ".join(f"{v:.9f}" for v in off_the_way))
+    assert told.one("FHM 0").ok
+
+
+def test_no_search_that_is_allowed_comes_near_the_sun():
+    """Exact angles all round, densely, of what `refuse_sun` let pass."""
+    told = ready()
+    told.say("CIL 1")
+    z = told.ranger
+    rng = np.random.default_rng(11)
+    passed = 0
+    for _ in range(200):
+        axis, here = int(rng.integers(2)), rng.uniform([-25_000, -20_000], [75_000, 20_000])
+        told.head.at[:] = told.head.goal[:] = here
+        sun = rng.normal(size=3)
+        sun /= np.linalg.norm(sun)
+        z.sun_vector = tuple(sun)
+        z.next_sun_ns = z.now_ns() + 10**9  # the watch shall not speak first
+        turn = np.rint(here) + np.linspace(0.0, 1e5, 4001)[:, None] * np.eye(2)[axis]
+        looks = beam(z.cubes.station, turn) @ z.cubes.station.mirror_from_ground
+        least = np.arccos(np.clip(looks @ sun, -1, 1)).min()
+        z.receive(1, f"FHM {axis}")
+        (first, *_) = [o.reply for o in told.turns(1, 0.0) if o.reply.command == "FHM"] or [None]
+        if first is None:
+            passed += 1
+            assert least >= 5.0 * DEGREE
+            told.head.homes[:] = ["home", "home"]
+            told.turns(3)
+        else:
+            assert least < 8.0 * DEGREE
+        told.head.laser = True
+    assert 40 < passed < 190
+
+
+def test_a_beam_that_the_sun_comes_to_goes_dark_says_so_once_and_drives_away():
+    sun = np.array(DOWN)
+    told = ready(sun=lambda mjd: sun)
+    told.say("CIL 1")
+    rest = beam_of(told)
+    side = np.cross(rest, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+
+    def comes(degrees):
+        sun[:] = np.cos(degrees * DEGREE) * rest + np.sin(degrees * DEGREE) * side
+        told.turns(25)  # 1.25 s
+
+    comes(5.1)
+    assert told.head.laser
+    assert heard(told, "SUN") == []
+    before = told.ranger.here
+    comes(4.9)
+    (line,) = heard(told, "SUN")
+    assert (line.ok, line.tid) == (False, 0)
+    assert "4.9 deg" in line.text
+    assert "driving away" in line.text
+    assert not told.head.laser
+    assert {Status.LASER_OFF, Status.SUN_REFUSED} <= set(told.ranger.status())
+    told.turns(60)
+    after = told.ranger.here
+    assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+    assert np.arccos(beam_of(told) @ sun) >= 20.0 * DEGREE
+    assert len(heard(told, "SUN")) == 1
+    told.turns(30)
+    assert Status.SUN_REFUSED not in told.ranger.status()
+    assert told.say("PS 1", "CMEAS 1, 2")[-1].ok
+    assert "of the Sun" in told.one("CIL 1").text
+
+
+def test_where_it_cannot_leave_the_ranger_stays_dark_and_refuses_to_shoot():
+    sun = np.array(DOWN)
+    told = ready(sun=lambda mjd: sun)
+    told.say("CIL 1", "AXIS 0, 0")
+    sun[:] = beam_of(told)
+    told.turns(60)
+    (line,) = heard(told, "SUN")
+    assert "amplifiers are off" in line.text
+    assert not told.one("PS 1").ok
+    assert "into the Sun" in told.one("CMEAS 2, 1").text
+    assert not told.head.laser
+    told.say("AXIS 0, 1")
+    told.turns(60)  # it tries again each second
+    assert np.arccos(np.clip(beam_of(told) @ sun, -1, 1)) >= 20.0 * DEGREE
+    assert told.one("PS 1").ok
+
+
+def test_a_move_that_leads_out_of_the_cone_is_not_stopped_and_a_track_that_stays_in_it_is():
+    sun = np.array(DOWN)
+    for slow, stays in ((True, False), (False, True)):
+        told = ready(sun=lambda mjd: sun)
+        told.say("CIL 1")
+        sun[:] = -beam_of(told)
+        end = 100.0 if stays else 50_000.0
+        t0, t1 = (stamp_text(told.ranger.now_ticks() + round(s * 1e9 / TICK_NS)) for s in (0.1, 100.0))
+        assert told.one(f"TRK 1, {t0}, 0, 80000, 12000, {t1}, {end}, 80000, 12000").ok
+        told.turns(10)
+        calls, stop = [], told.head.stop
+        told.head.stop = lambda calls=calls, stop=stop: (calls.append("stop"), stop())
+        sun[:] = beam_of(told)
+        told.turns(25)
+        assert bool(calls) != slow
+        assert not told.head.laser
+        assert (told.head.track is not None) == slow
+        assert ("leads out" in heard(told, "SUN")[-1].text) == slow
+        sun[:] = DOWN
+
+
+def test_a_ranger_that_turns_with_the_telescope_moves_only_under_a_fresh_vector():
+    told = ready(turning=True)
+    assert "not told for 60 s" in told.one("CIL 1").text
+    assert Status.SUN_REFUSED in told.ranger.status()
+    assert told.say("SUN 0, 0, -1", "CIL 1")[-1].ok
+    told.head.advance(50.0)
+    assert told.one("CIL 2").ok
+    told.head.advance(55.0)
+    assert "not told" in told.one("CIL 1").text
+    assert told.say("SUN 0, 0, -1", "CIL 1")[-1].ok
+    assert ready().one("CIL 1").ok  # one on the ground needs none
+
+
+def test_the_way_out_is_a_free_move_of_one_axis_that_ends_20_degrees_off():
+    """Exact angles along the whole way; the first 1.6 deg of it may come nearer, as `refusal` says."""
+    from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, way_out
+
+    station = ready().ranger.cubes.station
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        here = rng.uniform([-25_000, -20_000], [75_000, 20_000])
+        sun = beam(station, here) @ station.mirror_from_ground + rng.normal(size=3) * 0.05
+        sun /= np.linalg.norm(sun)
+        begin = np.arccos(beam(station, here) @ station.mirror_from_ground @ sun)
+        if begin >= HALF_ANGLE:
+            continue
+        end = way_out(station, here, [sun], (-30_000, 80_000))
+        assert end is not None
+        assert min(abs(np.array(end) - here)) <= 0.5
+        assert -30_000 <= end[0] <= 80_000
+        assert abs(end[1]) <= 25_000
+        way = here + np.linspace(0.0, 1.0, 3000)[:, None] * (np.array(end) - here)
+        angles = np.arccos(np.clip(beam(station, way) @ station.mirror_from_ground @ sun, -1, 1))
+        assert angles[-1] >= PARKED - 0.01 * DEGREE  # counts are whole
+        assert angles.min() >= begin - 1.7 * DEGREE
+        assert angles[len(angles) // 2 :].min() >= HALF_ANGLE
+
+
+def test_the_way_out_keeps_clear_of_other_suns():
+    from catseye.ranger.sun_watch import HALF_ANGLE, way_out
+
+    station = ready().ranger.cubes.station
+    rng = np.random.default_rng(7)
+    found = 0
+    for _ in range(150):
+        here = rng.uniform([-25_000, -20_000], [75_000, 20_000])
+        suns = beam(station, here) @ station.mirror_from_ground + rng.normal(size=(5, 3)) * [[0.04], *[[0.5]] * 4]
+        suns /= np.linalg.norm(suns, axis=1, keepdims=True)
+        begin = np.arccos(suns @ (beam(station, here) @ station.mirror_from_ground))
+        if begin[0] >= HALF_ANGLE or begin[1:].min() < 6.0 * DEGREE:
+            continue
+        end = way_out(station, here, list(suns), (-30_000, 80_000))
+        if end is None:
+            continue
+        found += 1
+        way = here + np.linspace(0.0, 1.0, 3000)[:, None] * (np.array(end) - here)
+        angles = np.arccos(np.clip(beam(station, way) @ station.mirror_from_ground @ suns.T, -1, 1))
+        assert angles[:, 1:].min() >= HALF_ANGLE
+    assert found > 50
+
+
+def test_the_ranger_s_own_sun_is_the_almanac_s_within_half_a_second_and_sets():
+    from catseye.ranger.sun_watch import own_sun
+    from catseye.records.site import Location
+    from catseye.reduction.earth_rotation import sun_at
+
+    place = Location(latitude_deg=38.433, longitude_deg=-79.84, elevation_of_z0_m=806.0)
+    source = own_sun(place)
+    seen = set()
+    for mjd in 52_889.0 + np.random.default_rng(2).uniform(0.0, 365.0, 100):
+        towards, true = source(mjd), sun_at(mjd, place).direction
+        seen.add(towards is None)
+        if towards is None:
+            assert true[2] < np.sin(-1.49 * DEGREE)
+        else:
+            assert true[2] > np.sin(-1.51 * DEGREE)
+            assert np.linalg.norm(towards - true) < 8.0 / 3600 * DEGREE  # 15" a second, half a second
+    assert seen == {True, False}
+    assert source(52_889.7) is source(52_889.7 + 1e-6)

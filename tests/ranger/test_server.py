@@ -11,8 +11,11 @@ from catseye.errors import InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
+from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, Connection, ZyServer
-from ranger.ranger_scene import ready
+from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
+from ranger.clocked_head import ClockedHead
+from ranger.ranger_scene import READY, REFERENCE_PHASE, ready
 
 
 class Site:
@@ -376,21 +379,153 @@ def test_a_client_counts_lines_that_it_cannot_read_and_goes_on():
 def test_serve_turns_until_it_is_cancelled():
     async def story():
         async with Site() as site:
-            slept = []
-
-            async def sleep(seconds):
-                slept.append(seconds)
+            task = asyncio.ensure_future(site.server.serve())
+            client = await ZyClient.connect(LOOPBACK, site.server.ports[0])
+            reply = asyncio.ensure_future(client.ask("CMEAS", 1, 1))
+            while not reply.done():
                 site.head.advance(0.01)
                 await asyncio.sleep(0)
-
-            task = asyncio.ensure_future(site.server.serve(sleep))
-            client = await ZyClient.connect(LOOPBACK, site.server.ports[0])
-            reply = await client.ask("CMEAS", 1, 1)
-            assert np.isfinite(float(reply.values[3]))
+            assert np.isfinite(float(reply.result().values[3]))
             task.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await task
-            assert set(slept) == {0.005}
             client.close()
 
     run(story)
+
+
+class VirtualSite:
+    """A served ranger whose time jumps, with a head whose time passes by itself."""
+
+    def __init__(self, latency=0.0):
+        self.loop = VirtualLoop()
+        self.clock = VirtualClock(self.loop, 52_889.0)
+        self.network = MemoryNetwork(latency)
+        self.turns = 0
+
+    def run(self, story):
+        async def whole():
+            head = ClockedHead(self.clock)
+            self.ranger = Ranger("ZY101", head, limits=(-30_000, 80_000))
+            turn = self.ranger.turn
+
+            def counted():
+                self.turns += 1
+                return turn()
+
+            self.ranger.turn = counted
+            self.server = ZyServer(self.ranger, clock=self.loop.time, network=self.network)
+            await self.server.start()
+            serving = asyncio.create_task(self.server.serve())
+            client = await ZyClient.connect(LOOPBACK, 5240, clock=self.loop.time, network=self.network)
+            for line in READY:
+                command, _, rest = line.partition(" ")
+                assert (await client.ask(command, *rest.split(", ") if ", " in rest else rest.split(","))).ok
+            azimuth = round(float((await client.ask("AZM", 1)).values[1]))
+            head.inner.signals = {azimuth: (3.0, REFERENCE_PHASE)}
+            assert (await client.ask("CIL", 1)).ok
+            await story(client)
+            client.close()
+            serving.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await serving
+            await self.server.stop()
+
+        try:
+            self.loop.run_until_complete(whole())
+        finally:
+            self.loop.close()
+
+
+def test_a_served_ranger_that_rests_turns_ten_times_a_second_and_once_where_nobody_listens():
+    site = VirtualSite()
+
+    async def story(client):
+        await asyncio.sleep(1.0)
+        for client_there, most in ((True, 101), (False, 11)):
+            if not client_there:
+                client.close()
+                await asyncio.sleep(1.0)
+            before = site.turns
+            await asyncio.sleep(10.0)
+            assert most - 2 <= site.turns - before <= most
+
+    site.run(story)
+
+
+def test_a_line_is_answered_at_once_though_the_ranger_rests():
+    """No virtual time passes: the line itself wakes the server."""
+    site = VirtualSite()
+
+    async def story(client):
+        for _ in range(20):
+            await asyncio.sleep(0.0377)
+            begin = site.loop.time()
+            assert (await client.ask("VER")).ok
+            assert site.loop.time() == begin
+
+    site.run(story)
+
+
+def test_a_served_ranger_keeps_times_to_the_stamp():
+    site = VirtualSite()
+
+    async def story(client):
+        due = site.ranger.now_ticks() + 10_007
+        reply = await client.ask("VER", ticks=due)
+        assert reply.ticks == due
+        begin = site.loop.time()
+        assert (await client.ask("CMEAS", 2, 1)).ok
+        assert 0.128 <= site.loop.time() - begin < 0.1291  # 128 ms and a fine poll
+        heard = []
+        client._heard = heard.append
+        silent = site.loop.time()
+        while not heard:
+            await asyncio.sleep(0.01)
+            if client._last_heard > silent and not client.outstanding:
+                break
+        assert 0.0 < site.loop.time() - silent <= 60.1  # the keep-alive
+
+    site.run(story)
+
+
+def test_a_client_streams_buffers_without_a_gap():
+    """128 ms a buffer, a fine poll of 1 ms at most between them, on a network of 0.2 ms: 7.75 a second and more."""
+    site = VirtualSite(2e-4)
+
+    async def story(client):
+        got = []
+        begin = site.loop.time()
+        tid, first = client.request("STM", 1, 100, then=got.append)
+        assert (await first).values == ("1", "100")
+        while len(got) < 201:
+            await asyncio.sleep(0.01)
+        assert [r.command for r in got] == ["STM"] + ["CMEAS", "BUF"] * 100
+        assert all(r.ok and r.tid == tid for r in got)
+        assert site.loop.time() - begin < 100 / 7.74
+        assert float(got[1].values[3]) == pytest.approx(3.0, abs=2e-3)
+        client.forget(tid)
+        # the same by hand, two requests always waiting
+        begin, asked = site.loop.time(), []
+        for _ in range(20):
+            asked += [client.request("CMEAS", 2, 1)[1], client.request("BUF")[1]]
+        replies = [await each for each in asked]
+        assert [r.command for r in replies] == ["CMEAS", "BUF"] * 20
+        assert all(r.ok for r in replies)
+        assert site.loop.time() - begin < 20 / 7.7
+
+    site.run(story)
+
+
+def test_what_came_too_fast_is_read_at_its_rate_while_the_ranger_sleeps():
+    site = VirtualSite()
+
+    async def story(client):
+        await asyncio.sleep(5.0)
+        begin = site.loop.time()
+        asked = [client.request("D0")[1] for _ in range(1000)]
+        for each in asked:
+            assert (await each).ok
+        assert 3.0 <= site.loop.time() - begin + 0.02 < 3.1  # 400 at once, then 200 a second
+
+    site.run(story)

@@ -7,6 +7,7 @@ raises for what the network does: a lost connection answers what is outstanding 
 import asyncio
 import time
 from collections.abc import Callable
+from functools import partial
 
 from catseye.errors import InputError
 from catseye.ranger.line import (
@@ -19,10 +20,12 @@ from catseye.ranger.line import (
     next_tid,
     parse_reply,
 )
+from catseye.ranger.network import Network, Sockets
 
 SECOND_CLIENT_TID = 2**31 + FIRST_CLIENT_TID  # for the client on 5241
 MOST_OUTSTANDING = 4096
 KEEP_ALIVE = 60.0  # s
+STREAMED = ("CMEAS", "BUF")  # what comes under the TID of STM
 SILENCE = 150.0  # s without a line: two keep-alives missed, the peer is gone
 Listener = Callable[[Reply], None]
 
@@ -63,19 +66,17 @@ class ZyClient(asyncio.Protocol):
         first_tid: int = FIRST_CLIENT_TID,
         heard: Listener | None = None,
         clock: Callable[[], float] = time.monotonic,
+        network: Network | None = None,
     ) -> "ZyClient":
-        """A client that is connected.
+        """A client that is connected, by sockets unless told otherwise.
 
         Raises InputError where nobody listens there.
         """
-        loop = asyncio.get_running_loop()
+        made = partial(cls, first_tid=first_tid, heard=heard, clock=clock)
         try:
-            _, client = await loop.create_connection(
-                lambda: cls(first_tid=first_tid, heard=heard, clock=clock), host, port
-            )
+            return await (network or Sockets()).connect(made, host, port)
         except OSError as problem:
             raise InputError(f"no ranger answers at {host} port {port}: {problem.strerror or problem}") from problem
-        return client
 
     def request(
         self, command: str, *parameters: object, ticks: int | None = None, then: Listener | None = None
@@ -173,7 +174,7 @@ class ZyClient(asyncio.Protocol):
 
     def _answer(self, reply: Reply) -> None:
         command, future, then = self._outstanding.get(reply.tid, ("", None, None))
-        mine = reply.command == command or reply.command == "UNKNOWN"
+        mine = reply.command in (command, "UNKNOWN") or (command == "STM" and reply.command in STREAMED)
         if future is None or not mine:
             if self._heard is not None:
                 self._heard(reply)

@@ -207,6 +207,12 @@ ROWS = (
     _row(
         "BUF", "the buffer itself: cube, cycles, samples, Hz, V a code, CRC-32, base64 of int16", asks=(0,), chosen=True
     ),
+    _row(
+        "STM",
+        "stream: measure the cube that the beam is on count times without a gap, CMEAS and BUF of each; 0 stops",
+        (CUBE, _of("count", 0, 1_000_000)),
+        chosen=True,
+    ),
     _row("LST", "scheduled commands of this connection", asks=(0,), chosen=True),
     _row("CLR", "clear the scheduled commands of this connection", chosen=True),
     _row("HLP", "commands, or one command's forms", (), (Parameter("command", "name"),), asks=(0, 1), chosen=True),

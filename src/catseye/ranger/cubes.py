@@ -65,6 +65,7 @@ class Cubes:
         }
         self.allocated = 0
         self.by_number: dict[int, Cube] = {0: Cube(0, REFERENCE, (0.0, 0.0, 0.0), "R")}
+        self._numbers = {REFERENCE: 0}  # by name in capitals
         self._counts: dict[int, list[float | None]] = {0: [None, None]}
         self._station: Station | None = None
         self.computed = 0  # times that encoder values were computed
@@ -87,6 +88,7 @@ class Cubes:
         """Room for cubes 1 to count; those there were are dropped, ZRG stays."""
         self.allocated = count
         self.by_number = {0: self.by_number[0]}
+        self._numbers = {REFERENCE: 0}
         self._counts = {0: self._counts[0]}
 
     def set_geometry(self, name: str, values: tuple[float, ...]) -> None:
@@ -100,10 +102,8 @@ class Cubes:
 
         Raises InputError: no such cube.
         """
-        if isinstance(key, int):
-            cube = self.by_number.get(key)
-        else:
-            cube = next((c for c in self.by_number.values() if c.name.upper() == str(key).upper()), None)
+        number = key if isinstance(key, int) else self._numbers.get(str(key).upper(), -1)
+        cube = self.by_number.get(number)
         if cube is None:
             raise InputError(f"cube {key} is not known (expected one of {len(self.by_number)} that COO lists)")
         return cube
@@ -122,16 +122,19 @@ class Cubes:
             raise InputError("cube 0 is ZRG, inside the instrument (expected 1 or above; its distance is D0)")
         if not 1 <= cube.number <= self.allocated:
             raise InputError(f"cube {cube.number} is not allocated (expected 1 to {self.allocated}; INI allocates)")
-        other = next((c for c in self.by_number.values() if c.name.upper() == cube.name.upper()), cube)
-        if other.number != cube.number:
-            raise InputError(f"name {cube.name} is that of cube {other.number} (expected another)")
+        other = self._numbers.get(cube.name.upper(), cube.number)
+        if other != cube.number:
+            raise InputError(f"name {cube.name} is that of cube {other} (expected another)")
         self.put(cube)
         self._counts.pop(cube.number, None)
         return cube
 
     def put(self, cube: Cube) -> None:
         """The cube instead of the one of its number, its encoder values untouched."""
+        if cube.number in self.by_number:
+            del self._numbers[self.by_number[cube.number].name.upper()]
         self.by_number[cube.number] = cube
+        self._numbers[cube.name.upper()] = cube.number
 
     def counts(self, cube: Cube) -> tuple[float, float]:
         """Encoder values of a cube.

@@ -1,7 +1,7 @@
 """What each ZY command does: functions of a ranger and the values that the table of commands has checked.
 
-A handler gives the values of its reply, or is a generator: `None` gives the turn back, values are one more reply, what
-it returns is the last (None: there is none). Refusals are raised, with the state as it was.
+A handler gives the values of its reply, or is a generator: `None` or a time gives the turn back, values are one more
+reply, what it returns is the last (None: there is none). Refusals are raised, with the state as it was.
 """
 
 from pathlib import Path
@@ -12,13 +12,14 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.handlers_axes import AXES, Handler
 from catseye.ranger.handlers_cubes import CUBES
-from catseye.ranger.handlers_shots import SHOTS, scan_rounds
+from catseye.ranger.handlers_shots import SHOTS, scan_rounds, stream_shots
+from catseye.ranger.handlers_sun import SUN, watch_sun
 from catseye.ranger.line import Reply, Request, commands_of_file, nanoseconds_to_ticks, tag_of
 from catseye.ranger.line import stamp_text as stamp
 from catseye.ranger.ranger import VERSION, Ranger, Values, Work
 from catseye.ranger.status import word_text
 
-__all__ = ["HANDLERS", "file_names", "replace_file", "scan_rounds"]
+__all__ = ["HANDLERS", "file_names", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
 
 
 def _sti(z: Ranger, _: int, ticks: int | None = None) -> Values:
@@ -28,6 +29,8 @@ def _sti(z: Ranger, _: int, ticks: int | None = None) -> Values:
 
 
 def _ps(z: Ranger, _: int, on: int | None = None) -> Values:
+    if on and z.in_sun:
+        raise InputError("the beam looks into the Sun (expected a move away first)")
     if on is not None:
         z.head.switch_laser(bool(on))
     return str(int(z.head.laser_on())), *(f"{k} {v:.2f}" for k, v in sorted(z.head.supplies().items()))
@@ -43,17 +46,6 @@ def _entemp(z: Ranger, _: int) -> Values:
 def _rst(z: Ranger, _: int) -> Values:
     z.reset()
     return ()
-
-
-def _sun(z: Ranger, _: int, *vector: float) -> Values:
-    if vector:
-        size = float(np.linalg.norm(vector))
-        if not 0.99 <= size <= 1.01:
-            raise InputError(f"vector to the Sun is {size:.4g} long (expected 1)")
-        z.sun_vector = vector
-    if z.sun_vector is None:
-        raise InputError("no vector to the Sun has been given (expected SUN x, y, z)")
-    return tuple(f"{v:.7f}" for v in z.sun_vector)
 
 
 def _lst(z: Ranger, client: int) -> Values:
@@ -156,13 +148,13 @@ HANDLERS: dict[str, Handler] = {
     **AXES,
     **CUBES,
     **SHOTS,
+    **SUN,
     "STW": lambda z, _: (word_text(z.status()),),
     "VER": lambda z, _: (z.name, VERSION),
     "STI": _sti,
     "PS": _ps,
     "ENTEMP": _entemp,
     "RST": _rst,
-    "SUN": _sun,
     "LST": _lst,
     "CLR": _clr,
     "HLP": _hlp,

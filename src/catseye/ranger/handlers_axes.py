@@ -3,12 +3,14 @@
 from collections.abc import Callable, Generator
 
 from catseye.errors import InputError
+from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger import motion_units
 from catseye.ranger.ranger import Ranger, Values, Work
 from catseye.ranger.values import Value
 
 FILTER = ("FKP", "FKI", "FKD", "FIL", "FSI")
+TURN = round(COUNTS_PER_TURN)
 MOVE_TIME = 60.0  # s, longest wait of WAI
 HOMING_TIME = 30.0  # s, [CREAGER02] page FHM
 Handler = Callable[..., Values | Work]
@@ -47,10 +49,11 @@ def start_moves(z: Ranger, targets: dict[int, int]) -> None:
     for axis in targets:
         if not z.head.enabled(axis):
             raise InputError(f"amplifier of axis {axis} is off (expected AXIS {axis}, 1 first)")
-    if all(z.head.homing(axis) == "home" for axis in (0, 1)):  # before, counts are no directions
+    if z.homed:  # before, counts are no directions
         if 0 in targets and not z.limits[0] <= end[0] <= z.limits[1]:
             raise InputError(f"azimuth {end[0]} counts is outside the stops {z.limits[0]:g} to {z.limits[1]:g}")
         z.refuse_sun(end)
+    z.heading = (end[0], end[1])
     for axis, position in targets.items():
         settings = z.axes[axis]
         if not z.head.start(axis, position, velocity=settings.velocity, acceleration=settings.acceleration):
@@ -71,12 +74,17 @@ def refuse_motors_off(z: Ranger, axes: tuple[int, ...]) -> None:
             )
 
 
-def wait_until(z: Ranger, done: Callable[[], bool], seconds: float, what: str) -> Generator[None, None, None]:
-    end = z.now_ns() + round(seconds * PER_SECOND)
+def wait_until(
+    z: Ranger, done: Callable[[], bool], seconds: float, what: str, *, earliest: float | None = None
+) -> Generator[int | None, None, None]:
+    """Give the turn back until it is done, `earliest` in so many s; InputError after `seconds`."""
+    begin = z.now_ns()
+    end = begin + round(seconds * PER_SECOND)
+    ask = None if earliest is None else begin + round(earliest * PER_SECOND)
     while not done():
         if z.now_ns() > end:
             raise InputError(f"{what} after {seconds:g} s")
-        yield None
+        yield ask
 
 
 def _acp(z: Ranger, _: int, axis: int) -> Values:
@@ -122,6 +130,15 @@ def _flt(z: Ranger, _: int, axis: int, *values: int) -> Values:
 def _fhm(z: Ranger, _: int, axis: int) -> Work:
     if not z.head.enabled(axis):
         raise InputError(f"amplifier of axis {axis} is off (expected AXIS {axis}, 1 first)")
+    if z.homed and z.head.laser_on():
+        turn = list(z.here)
+        turn[axis] += TURN
+        try:
+            z.refuse_sun(turn)
+        except InputError as problem:
+            raise InputError(
+                f"the search turns the whole way round: {problem}; or search with the laser off: PS 0"
+            ) from None
     z.aimed = None
     z.head.find_home(axis)
     text = f"the index of axis {axis} is not found"
@@ -137,7 +154,7 @@ def _cwt(z: Ranger, _: int, key: Value) -> Work:
     return (str(cube.number),)
 
 
-def settle(z: Ranger, counts: tuple[float, float]) -> Generator[None, None, None]:
+def settle(z: Ranger, counts: tuple[float, float]) -> Generator[int | None, None, None]:
     """WCNT reads in a row within WTOL of both axes, before WTMO."""
     wanted, row = [round(n) for n in counts], 0
     end = z.now_ns() + round(z.timeout * PER_SECOND)

@@ -93,7 +93,7 @@ def _cil(z: Ranger, _: int, key: Value, *where: float) -> Work:
     return *listed(cube), *(f"{n:.3f}" for n in counts)
 
 
-def illuminate(z: Ranger, cube: Cube, counts: tuple[float, float]) -> Generator[None, None, None]:
+def illuminate(z: Ranger, cube: Cube, counts: tuple[float, float]) -> Generator[int | None, None, None]:
     refuse_unready(z)
     z.aimed = None
     start_moves(z, {0: round(counts[0]), 1: round(counts[1])})
@@ -129,7 +129,7 @@ def _trk(z: Ranger, _: int, key: Value, t0: int, *rest: float) -> Values:
     z.refuse_sun(n1, n0)
     if not z.head.follow((n0, n1), (tag_of(t0), tag_of(t1))):
         raise InputError("axes do not follow (expected both amplifiers on, no move under way)")
-    z.aimed = cube.number
+    z.aimed, z.heading = cube.number, (float(n1[0]), float(n1[1]))
     return str(cube.number), *(f"{n:.3f}" for n in (*n0, *n1))
 
 

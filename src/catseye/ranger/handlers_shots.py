@@ -1,6 +1,7 @@
 """Commands of measurement: sampling, buffers, phases, distances, scans."""
 
 import base64
+import cmath
 import zlib
 from collections.abc import Callable, Generator
 from dataclasses import replace
@@ -11,14 +12,16 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.cubes import Cube, Shot
 from catseye.ranger.handlers_axes import Handler, wait_until
 from catseye.ranger.handlers_cubes import illuminate, refuse_unready
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import Buffer, Sampling
 from catseye.ranger.line import TICK_NS, Reply, nanoseconds_of, nanoseconds_to_ticks
-from catseye.ranger.ranger import Measured, Ranger, Values, Work
+from catseye.ranger.ranger import Measured, Outgoing, Ranger, Stream, Values, Work
 from catseye.ranger.ranging import distance_mm, group_index
 from catseye.ranger.values import Value
-from catseye.signal.phase import detect
+from catseye.signal.cycles import fraction
+from catseye.signal.phase import detect, phasors
 
 SLACK = 2.0  # s that a buffer may come late
+CONVERTER_END = 32_767  # code
 
 
 def _sampled(name: str) -> Handler:
@@ -30,16 +33,30 @@ def _sampled(name: str) -> Handler:
     return handler
 
 
-def _shoot(z: Ranger) -> Generator[None, None, None]:
+def _shoot(z: Ranger) -> Generator[int | None, None, None]:
+    owner = z.aimed
+    _fire(z)
+    z.measured = None
+    z.measured = Measured((yield from _taken(z)), owner)
+
+
+def _fire(z: Ranger) -> None:
+    if z.in_sun:
+        raise InputError("the beam looks into the Sun (expected a move away first)")
     if not z.head.laser_on():
         raise InputError("the laser is off (expected PS 1 first)")
-    owner, z.measured = z.aimed, None
     z.head.trigger(z.sampling)
-    yield from wait_until(z, lambda: z.head.buffer() is not None, z.sampling.duration + SLACK, "no buffer has come")
-    buffer = z.head.buffer()
+
+
+def _taken(z: Ranger) -> Generator[int | None, None, Buffer]:
+    """The buffer that was fired for, when it is whole."""
+    seconds, found = z.sampling.duration, z.head.buffer
+
+    yield from wait_until(z, lambda: found() is not None, seconds + SLACK, "no buffer has come", earliest=seconds)
+    buffer = found()
     if buffer is None:
         raise InputError("no buffer has come")
-    z.measured = Measured(buffer, owner)
+    return buffer
 
 
 def _computed(z: Ranger) -> Measured:
@@ -49,9 +66,10 @@ def _computed(z: Ranger) -> Measured:
         raise InputError("there is no buffer (expected TRG first)")
     if measured.phase is None:
         buffer = measured.buffer
-        found = detect(buffer.samples, buffer.sampling.samples, buffer.volts_per_code, harmonics=())
+        found = complex(phasors(buffer.samples, buffer.sampling.samples, buffer.volts_per_code))
+        clipped = bool(buffer.samples.min() <= -CONVERTER_END - 1 or buffer.samples.max() >= CONVERTER_END)
         measured = replace(
-            measured, amplitude=float(found.amplitude), phase=float(found.phase), clipped=bool(found.clipped > 0)
+            measured, amplitude=abs(found), phase=float(fraction(cmath.phase(found), 0.0)), clipped=clipped
         )
         z.measured = measured
     return measured
@@ -119,16 +137,26 @@ def _cmeas(z: Ranger, _: int, how: int, key: Value) -> Work:
     return (yield from measure(z, how, key))
 
 
-def measure(z: Ranger, how: int, key: Value) -> Generator[None, None, Values]:
+def measure(z: Ranger, how: int, key: Value) -> Generator[int | None, None, Values]:
     cube = z.cubes.find(key)
     if how == 1:
         yield from illuminate(z, cube, z.cubes.counts(cube))
-    elif z.aimed not in (None, cube.number):
-        raise InputError(f"the beam is on cube {z.aimed}, not on {cube.number} (expected CIL {cube.number}, or f = 1)")
+    else:
+        _refuse_other(z, cube)
     yield from _shoot(z)
-    cube = z.cubes.find(cube.number)
+    return _measured(z, how, cube.number)
+
+
+def _refuse_other(z: Ranger, cube: Cube) -> None:
+    if z.aimed not in (None, cube.number):
+        raise InputError(f"the beam is on cube {z.aimed}, not on {cube.number} (expected CIL {cube.number}, or f = 1)")
+
+
+def _measured(z: Ranger, how: int, number: int) -> Values:
+    """The buffer computed as a cube's: what CMEAS says of it."""
+    cube = z.cubes.find(number)
     if z.measured is not None:
-        z.measured = replace(z.measured, cube=cube.number)
+        z.measured = replace(z.measured, cube=number)
     shot = _keep(z, cube, _computed(z))
     return (
         str(how),
@@ -166,6 +194,46 @@ def _buf(z: Ranger, _: int) -> Values:
     return cube, str(s.cycles), str(s.samples), str(s.frequency_hz), volts, check, base64.b64encode(raw).decode("ascii")
 
 
+def _stm(z: Ranger, client: int, key: Value, count: int) -> Values:
+    cube = z.cubes.find(key)
+    if count == 0:
+        z.end_stream()
+    else:
+        refuse_unready(z)
+        _refuse_other(z, cube)
+        if z.stream is not None:
+            raise InputError(f"a stream is under way (expected STM {z.stream.cube}, 0 first)")
+        z.stream = Stream(client, z.tid, cube.number, count)
+    return str(cube.number), str(count)
+
+
+def stream_shots(z: Ranger, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
+    """Measure one cube again and again; the next buffer is fired before the last is computed and told."""
+
+    def fire() -> str | None:
+        try:
+            _refuse_other(z, z.cubes.find(stream.cube))
+            _fire(z)
+        except CatseyeError as problem:
+            return str(problem)
+        return None
+
+    problem = fire()
+    for left in range(stream.count - 1, -1, -1):
+        if problem is None:
+            try:
+                buffer = yield from _taken(z)
+                problem = fire() if left else None
+                z.measured = Measured(buffer, stream.cube)
+                yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))
+                yield Outgoing(Reply("BUF", True, _buf(z, stream.client), stream.tid), stream.client)
+            except CatseyeError as trouble:
+                problem = str(trouble)
+        if problem is not None:
+            yield Outgoing(Reply("CMEAS", False, (f"cube {stream.cube}: {problem}",), stream.tid))
+            return
+
+
 def _num(z: Ranger, _: int, count: int | None = None) -> Values:
     if count is not None:
         z.order = (z.order + [0] * count)[:count]
@@ -187,16 +255,18 @@ def _scn(z: Ranger, _: int, on: int | None = None, start: int = 0, rounds: int =
         refuse_unready(z)
         if z.scanning:
             raise InputError("a scan is under way (expected SCN 0 first)")
+        if z.stream is not None:
+            raise InputError(f"a stream is under way (expected STM {z.stream.cube}, 0 first)")
         z.scan_start, z.scan_rounds, z.scanning = start, rounds, True
     elif on == 0:
         z.end_scan()
     return (str(int(z.scanning)),)
 
 
-def scan_rounds(z: Ranger) -> Generator[Reply | None, None, None]:
+def scan_rounds(z: Ranger) -> Generator[Reply | int | None, None, None]:
     """Measure the cubes of the list one after another, round after round, from the scan's start on."""
     while z.now_ns() < z.scan_start * TICK_NS:
-        yield None
+        yield z.scan_start * TICK_NS
     done = 0
     while z.scan_rounds == 0 or done < z.scan_rounds:
         for number in tuple(z.order):
@@ -221,6 +291,7 @@ SHOTS: dict[str, Handler] = {
     "PHI": _last(lambda cube, shot: f"{shot.phase:.7f}"),
     "DST": _last(_dst),
     "BUF": _buf,
+    "STM": _stm,
     "NUM": _num,
     "ORD": _ord,
     "SCN": _scn,

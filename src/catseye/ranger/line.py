@@ -25,7 +25,7 @@ LONGEST_REQUEST = 1024  # bytes without the line's end
 LONGEST_REPLY = 2**18  # a buffer of 65 536 samples in base64 has 174 764
 MOST_PARAMETERS = 32
 COMMAND = re.compile(r"[A-Za-z][A-Za-z0-9]{0,15}")
-PRINTABLE = re.compile(r"[\x20-\x7e]*")
+STAMP = re.compile(r"([0-9]{1,5})\.([0-9]{8})")  # as all are that a program writes
 DIGITS = re.compile(r"[0-9]{1,10}")
 STATEMENTS = ("HELLO", "UNKNOWN")  # a text follows, no f
 
@@ -103,6 +103,9 @@ def parse_stamp(text: str) -> int:
 
     Raises InputError: not an MJD of 0 to 106 000.
     """
+    usual = STAMP.fullmatch(text)
+    if usual is not None:
+        return int(usual[1]) * TICKS_PER_DAY + int(usual[2])
     try:
         return ticks_of(TimeTag.parse(text))
     except ValidityError as problem:
@@ -251,7 +254,7 @@ def _tid(text: str) -> int:
 
 
 def _printable(body: str) -> None:
-    if not PRINTABLE.fullmatch(body):
+    if not (body.isascii() and body.isprintable()):
         at = next(i for i, letter in enumerate(body) if not " " <= letter <= "~")
         raise InputError(f"character {at + 1} is {body[at]!a} (expected printable ASCII)")
 

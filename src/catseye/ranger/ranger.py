@@ -2,7 +2,8 @@
 
 A transport gives it lines of connections (`receive`), calls `turn` again and again, and sends what that returns.
 Commands run in the order received, one at a time; one that waits for the hardware gives its turn back and is asked
-again. In a turn: the running or next command, at most one scheduled one, a step of the scan, updates, the status word.
+again. In a turn: the running or next command, at most one scheduled one, a step of the scan or the stream, the Sun,
+updates, the status word. `rest` says how long nothing will be due.
 """
 
 from collections import deque
@@ -10,7 +11,6 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from catseye.errors import CatseyeError, InputError
@@ -25,17 +25,25 @@ from catseye.ranger.status import Status, word_text
 from catseye.ranger.sun_watch import SunSource, refusal
 
 Values = tuple[str, ...]
-Work = Generator[Values | Reply | None, None, Values | None]
+# What a command that waits gives: values or a reply; else its turn back: None (ask soon) or when to ask, ns since MJD 0
+Work = Generator[Values | Reply | int | None, None, Values | None]
 VERSION = "2.20"
 MOST_QUEUED = 256  # commands of all connections
 REPLIES_A_TURN = 64
 UPDATE_NS = PER_SECOND // 2
+POLL_NS = 5_000_000  # while something is under way
+FINE_NS, FINE_SPAN_NS = 1_000_000, 10_000_000  # when it is due, and for how long
+WATCH_NS = 100_000_000  # the head's own changes
+UNHEARD_NS = PER_SECOND  # the same where nobody listens
+SUN_AGE = 60.0  # s that a vector from the coordinator holds where the ranger's frame turns
 NEEDED = ("BP", "ALPHA", "BETA", "MO", "EZ", "D0")
 REFUSED_IN_A_SCAN = (
     *("STT", "FHM", "CIL", "CMEAS", "CWT", "TRG", "TRK", "RST"),
     *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
 )
+REFUSED_IN_A_STREAM = tuple(name for name in REFUSED_IN_A_SCAN if name != "TRK")
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
+BITS = tuple(int(bit) for bit in Status)  # in the order of `Ranger.status`
 WATCHED = (
     ("ACP", "0"),
     ("ACP", "1"),
@@ -49,6 +57,16 @@ class Outgoing:
 
     reply: Reply
     client: int | None = None
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What STM asked: `count` buffers of a cube, for a connection, under the TID of its request."""
+
+    client: int
+    tid: int
+    cube: int
+    count: int
 
 
 @dataclass
@@ -82,6 +100,7 @@ class Ranger:
     files     folder of the initialisation files, None without
     mirror    name of its head, as in its initialisation file's
     sun       the ranger's own direction of the Sun for an MJD, None without
+    turning   its frame turns, as on the feed arm: it moves only if SUN was told within 60 s, and has no own Sun
     """
 
     def __init__(
@@ -93,19 +112,27 @@ class Ranger:
         files: Path | None = None,
         mirror: str = "zp",
         sun: SunSource | None = None,
+        turning: bool = False,
     ):
-        from catseye.ranger.handlers import HANDLERS, scan_rounds  # they know the ranger, so it asks late
+        from catseye.ranger import handlers  # they know the ranger, so it asks late
 
-        self._handlers: dict[str, Callable[..., Values | Work]] = HANDLERS
-        self._scan_rounds = scan_rounds
+        self._handlers: dict[str, Callable[..., Values | Work]] = handlers.HANDLERS
+        self._scan_rounds, self._stream_shots = handlers.scan_rounds, handlers.stream_shots
+        self._watch_sun = handlers.watch_sun
         self.name, self.head, self.limits, self.files, self.mirror, self.sun = name, head, limits, files, mirror, sun
         self._waiting: deque[tuple[int, Request]] = deque()
+        self.turning = turning
         self._running: tuple[int, Request, Work] | None = None
-        self._scan_work: Generator[Reply | None, None, None] | None = None
+        self._scan_work: Generator[Reply | int | None, None, None] | None = None
+        self._stream_work: Generator[Outgoing | int | None, None, None] | None = None
+        self._ask_at: dict[str, int | None] = {}  # by what waits for the head: when to ask it again
+        self.tid = 0  # of the command that runs
         self.scheduler = Scheduler()
         self._word: Status | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
-        self._next_update = 0
+        self._next_update = self.next_sun_ns = 0
+        head_now = getattr(head, "now_ns", None)  # a head may offer it: the same as `now`, cheaper
+        self._head_now_ns: Callable[[], int] = head_now or (lambda: nanoseconds_of(head.now()))
         self._boot()
 
     def _boot(self) -> None:
@@ -121,7 +148,10 @@ class Ranger:
         self.aimed: int | None = None
         self.reference_phase: float | None = None
         self.sun_vector: tuple[float, ...] | None = None
-        self.sun_refused = False
+        self.sun_told_ns = 0
+        self.sun_refused = self.in_sun = False
+        self.heading: tuple[float, float] | None = None  # counts where the last move ends
+        self.stream: Stream | None = None
         self.order: list[int] = []
         self.scan_start, self.scan_rounds, self.scanning = 0, 0, False
         for axis, settings in enumerate(self.axes):
@@ -130,7 +160,7 @@ class Ranger:
 
     def reset(self) -> None:
         """Cold boot: RST."""
-        self._scan_work = None
+        self._scan_work = self._stream_work = None
         self.scheduler = Scheduler()
         self.head.reset()
         self._boot()
@@ -163,6 +193,8 @@ class Ranger:
         """A connection is gone: its queued and scheduled commands are dropped; a scan goes on."""
         self._waiting = deque(item for item in self._waiting if item[0] != client)
         self.scheduler.clear(client)
+        if self.stream is not None and self.stream.client == client:
+            self.end_stream()
 
     def turn(self) -> list[Outgoing]:
         """One pass of the loop; what is to be sent."""
@@ -171,11 +203,13 @@ class Ranger:
             told += self._begin(*self._waiting.popleft())
         elif self._running is not None:
             told += self._go_on()
-        if self._running is None and not self.scanning:
+        if self._running is None and not self.scanning and self.scheduler.entries:
             entry = self.scheduler.take(self.now_ns())
             if entry is not None:
                 told += self._begin(entry.client, replace(entry.request, ticks=None))
         told += self._scan_step()
+        told += self._stream_step()
+        told += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in self._watch_sun(self)]
         told += self._updates()
         word = self.status()
         if word != self._word:
@@ -183,6 +217,33 @@ class Ranger:
                 told.append(Outgoing(self._reply(Request("STW"), True, (word_text(word),))))
             self._word = word
         return told
+
+    def rest(self, *, heard: bool = True) -> float:
+        """How long, s, nothing can be due if no line comes.
+
+        heard   somebody listens; else only the Sun and what is under way count
+        """
+        if self.has_queued:
+            return 0.0
+        if self.idle and not self.updates and not self.scheduler.entries:
+            return (WATCH_NS if heard else UNHEARD_NS) / PER_SECOND
+        now = self.now_ns()
+        due = [now + (WATCH_NS if heard else UNHEARD_NS)]
+        for work, at in (
+            (self._running, self._ask_at.get("command")),
+            (self._scan_work, self._ask_at.get("scan")),
+            (self._stream_work, self._ask_at.get("stream")),
+        ):
+            if work is not None:
+                fine = at is not None and now < at + FINE_SPAN_NS
+                due.append(now + POLL_NS if at is None else max(at, now + (FINE_NS if fine else POLL_NS)))
+        if (self.scanning and self._scan_work is None) or (self.stream is not None and self._stream_work is None):
+            return 0.0
+        if self._running is None and not self.scanning and self.scheduler.due_ns is not None:
+            due.append(self.scheduler.due_ns)
+        if self.updates:
+            due.append(self._next_update)
+        return max(0, min(due) - now) / PER_SECOND
 
     def waiting(self, client: int) -> int:
         """Commands of a connection that have not begun."""
@@ -195,14 +256,14 @@ class Ranger:
 
     @property
     def idle(self) -> bool:
-        """Whether nothing runs, waits or scans."""
-        return self._running is None and not self._waiting and not self.scanning
+        """Whether nothing runs, waits, scans or streams."""
+        return self._running is None and not self._waiting and not self.scanning and self.stream is None
 
     # What the handlers use ------------------------------------------------------------------------------------------
 
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
-        return nanoseconds_of(self.head.now())
+        return self._head_now_ns()
 
     def now_ticks(self) -> int:
         """The stamp of now."""
@@ -210,41 +271,56 @@ class Ranger:
 
     def status(self) -> Status:
         """The status word of now."""
-        head, word = self.head, Status(0)
-        measured = self.measured
-        for bit, on in (
-            (Status.AUTO, self.auto),
-            (Status.AZIMUTH_HOMED, head.homing(0) == "home"),
-            (Status.ELEVATION_HOMED, head.homing(1) == "home"),
-            (Status.UPDATES, self.updates),
-            (Status.SCANNING, self.scanning),
-            (Status.SCHEDULED, bool(self.scheduler.entries)),
-            (Status.CLIPPED, measured is not None and measured.clipped),
-            (Status.AZIMUTH_OFF, head.motor_off(0)),
-            (Status.ELEVATION_OFF, head.motor_off(1)),
-            (Status.LASER_OFF, not head.laser_on()),
-            (Status.CLOCK_FREE, not head.clock_locked()),
-            (Status.AZIMUTH_ENABLED, head.enabled(0)),
-            (Status.ELEVATION_ENABLED, head.enabled(1)),
-            (Status.SUN_REFUSED, self.sun_refused),
-            (Status.INITIALISED, self.initialised),
-        ):
-            word |= bit if on else Status(0)
-        return word
+        head, measured = self.head, self.measured
+        on = (
+            self.auto,
+            head.homing(0) == "home",
+            head.homing(1) == "home",
+            self.updates,
+            self.scanning,
+            bool(self.scheduler.entries),
+            self.stream is not None,
+            measured is not None and measured.clipped,
+            head.motor_off(0),
+            head.motor_off(1),
+            not head.laser_on(),
+            not head.clock_locked(),
+            head.enabled(0),
+            head.enabled(1),
+            self.sun_refused or self.in_sun,
+            self.initialised,
+        )
+        return Status(sum(bit for bit, is_on in zip(BITS, on, strict=True) if is_on))
 
     @property
     def initialised(self) -> bool:
         """Whether the geometry and D0 have been given since boot."""
         return self.given.issuperset(NEEDED)
 
+    @property
+    def homed(self) -> bool:
+        """Whether counts are directions."""
+        return self.head.homing(0) == "home" and self.head.homing(1) == "home"
+
+    @property
+    def here(self) -> tuple[float, float]:
+        """Counts where the mirror is."""
+        return float(self.head.actual(0)), float(self.head.actual(1))
+
+    def suns(self) -> list[ArrayLike]:
+        """Directions of the Sun that are known, each with its cone."""
+        known: list[ArrayLike] = [] if self.sun_vector is None else [self.sun_vector]
+        own = None if self.sun is None else self.sun(self.now_ns() / PER_DAY)
+        return known if own is None else [*known, own]
+
     def refuse_sun(self, end: ArrayLike, start: ArrayLike | None = None) -> None:
         """Raises InputError where a move, from here unless told, could look into the Sun; the status word says so."""
-        suns = [] if self.sun_vector is None else [self.sun_vector]
-        own = None if self.sun is None else self.sun(self.now_ns() / PER_DAY)
-        if own is not None:
-            suns.append(tuple(float(v) for v in np.asarray(own)))
-        here = [float(self.head.actual(axis)) for axis in (0, 1)] if start is None else start
-        said = refusal(self.cubes.station, here, end, suns)
+        if self.turning and not 0 <= self.now_ns() - self.sun_told_ns <= SUN_AGE * PER_SECOND:
+            said: str | None = (
+                f"where the Sun is was not told for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
+            )
+        else:
+            said = refusal(self.cubes.station, self.here if start is None else start, end, self.suns())
         self.sun_refused = said is not None
         if said is not None:
             raise InputError(said)
@@ -259,14 +335,22 @@ class Ranger:
             self.scheduler.add(client, replace(later, tid=request.tid), start * TICK_NS, repeats, interval)
             return (str(len(self.scheduler.entries)),)
         values = COMMANDS[request.command].read(request)
-        if self.scanning and request.command in REFUSED_IN_A_SCAN and not COMMANDS[request.command].only_asks(request):
-            raise InputError("a scan is under way (expected SCN 0 first)")
+        if not COMMANDS[request.command].only_asks(request):
+            if self.scanning and request.command in REFUSED_IN_A_SCAN:
+                raise InputError("a scan is under way (expected SCN 0 first)")
+            if self.stream is not None and request.command in REFUSED_IN_A_STREAM:
+                raise InputError(f"a stream is under way (expected STM {self.stream.cube}, 0 first)")
+        self.tid = request.tid
         return self._handlers[request.command](self, client, *values)
 
     def end_scan(self) -> None:
         """Stop the scan where it is."""
         self.scanning, self._scan_work = False, None
         self.head.stop()
+
+    def end_stream(self) -> None:
+        """No more buffers; the one being taken is not told."""
+        self.stream = self._stream_work = None
 
     # Inside ---------------------------------------------------------------------------------------------------------
 
@@ -303,7 +387,8 @@ class Ranger:
             except CatseyeError as problem:
                 self._running = None
                 return [*told, self._refused(request, str(problem))]
-            if values is None:
+            if values is None or isinstance(values, int):
+                self._ask_at["command"] = values
                 return told
             if isinstance(values, Reply):  # of a command that this one runs
                 told.append(Outgoing(replace(values, tid=request.tid, ticks=self._stamp(values))))
@@ -337,11 +422,31 @@ class Ranger:
         if reply is self:
             self.scanning, self._scan_work = False, None
             return []
-        return [Outgoing(replace(reply, ticks=self._stamp(reply)))] if isinstance(reply, Reply) else []
+        if isinstance(reply, Reply):
+            self._ask_at["scan"] = self.now_ns()
+            return [Outgoing(replace(reply, ticks=self._stamp(reply)))]
+        self._ask_at["scan"] = reply if isinstance(reply, int) else None
+        return []
+
+    def _stream_step(self) -> list[Outgoing]:
+        if self.stream is None:
+            return []
+        if self._stream_work is None:
+            self._stream_work = self._stream_shots(self, self.stream)
+        told: list[Outgoing] = []
+        for each in self._stream_work:
+            if not isinstance(each, Outgoing):
+                self._ask_at["stream"] = each
+                return told
+            told.append(replace(each, reply=replace(each.reply, ticks=self._stamp(each.reply))))
+        self.end_stream()
+        return told
 
     def _updates(self) -> list[Outgoing]:
+        if not self.updates:
+            return []
         now = self.now_ns()
-        if not self.updates or now < self._next_update:
+        if 0 < self._next_update - now <= UPDATE_NS:  # further off: the clock was set back
             return []
         self._next_update = now + UPDATE_NS
         told = []

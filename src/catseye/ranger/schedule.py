@@ -50,6 +50,11 @@ class Scheduler:
             return entry
         return None
 
+    @property
+    def due_ns(self) -> int | None:
+        """When the next is due, nanoseconds since MJD 0; None without one."""
+        return min((e.due_ns for e in self.entries), default=None)
+
     def clear(self, client: int) -> int:
         """Drop a connection's; how many they were."""
         before = len(self.entries)

@@ -1,5 +1,6 @@
 """A ZY on TCP: two ports, one connection each; both hear everything, each may command.
 
+The server sleeps until a line comes or something is due; a ranger that rests costs next to nothing.
 What one connection may cost is bounded: a line of 1024 bytes, 200 lines a second (what comes faster is left unread, not
 dropped), 64 commands that wait, 4 MiB not yet taken by a slow peer (which is then cut off).
 """
@@ -7,11 +8,13 @@ dropped), 64 commands that wait, 4 MiB not yet taken by a slow peer (which is th
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from catseye.errors import InputError
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
+from catseye.ranger.network import Listener, Network, Sockets
 from catseye.ranger.ranger import Outgoing, Ranger
 
 PORTS = (5240, 5241)
@@ -21,7 +24,6 @@ LINES_A_SECOND = 200.0
 MOST_AT_ONCE = 400.0  # lines
 MOST_WAITING = 64  # commands of one connection
 MOST_UNSENT = 4 * 2**20  # bytes
-TURN = 0.005  # s between two passes while nothing else happens
 LOG = logging.getLogger(__name__)
 
 
@@ -45,6 +47,7 @@ class Connection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         self.unread += data
         self.read_on()
+        self.server.wake()
 
     def read_on(self) -> None:
         """Hand over whole lines as far as rate and queue allow; otherwise stop reading from the peer."""
@@ -94,6 +97,7 @@ class ZyServer:
     host     address to listen at; only this machine unless told otherwise
     ports    two; 0 takes any free one, `ports` says which after `start`
     clock    s, never backwards; for keep-alive and rates
+    network  sockets unless told otherwise
     """
 
     def __init__(
@@ -103,44 +107,57 @@ class ZyServer:
         ports: tuple[int, int] = PORTS,
         *,
         clock: Callable[[], float] = time.monotonic,
+        network: Network | None = None,
     ):
         self.ranger, self.host, self.ports, self.clock = ranger, host, ports, clock
+        self.network: Network = network or Sockets()
         self.connections: dict[int, Connection] = {}
-        self._servers: list[asyncio.Server] = []
+        self._listeners: list[Listener] = []
+        self._waker: asyncio.Future[None] | None = None
         self._last_keep_alive = self._last_rate = clock()
 
     async def start(self) -> None:
         """Listen. Raises InputError where a port cannot be had."""
-        loop = asyncio.get_running_loop()
-        taken: list[int] = []
         for number, port in enumerate(self.ports):
             try:
-                server = await loop.create_server(lambda number=number: Connection(self, number), self.host, port)  # type: ignore[misc]
+                self._listeners.append(await self.network.serve(partial(Connection, self, number), self.host, port))
             except OSError as problem:
                 await self.stop()
                 raise InputError(
-                    f"{self.ranger.name}: {self.host} port {port} cannot be had: {problem.strerror}"
+                    f"{self.ranger.name}: {self.host} port {port} cannot be had: {problem.strerror or problem}"
                 ) from problem
-            self._servers.append(server)
-            taken.append(server.sockets[0].getsockname()[1])
-        self.ports = (taken[0], taken[1])
+        self.ports = (self._listeners[0].port, self._listeners[1].port)
 
     async def stop(self) -> None:
         """Close the connections and listen no more."""
         for connection in list(self.connections.values()):
             if connection.transport is not None:
                 connection.transport.close()
-        for server in self._servers:
-            server.close()
-        for server in self._servers:
-            await server.wait_closed()
-        self._servers.clear()
+        listeners, self._listeners = self._listeners, []
+        for listener in listeners:
+            await listener.close()
 
-    async def serve(self, sleep: Callable[[float], Awaitable[None]] = asyncio.sleep) -> None:
-        """Turn until cancelled; `start` first."""
+    async def serve(self) -> None:
+        """Turn when something comes or is due, until cancelled; `start` first."""
+        loop = asyncio.get_running_loop()
         while True:
             self.turn()
-            await sleep(0.0 if self.ranger.has_queued else TURN)
+            pause = self.ranger.rest(heard=bool(self.connections))
+            if pause <= 0.0:
+                await asyncio.sleep(0.0)
+                continue
+            waker = self._waker = loop.create_future()
+            alarm = loop.call_later(pause, self.wake)
+            try:
+                await waker
+            finally:
+                self._waker = None
+                alarm.cancel()
+
+    def wake(self) -> None:
+        """Turn now: a line came, or something is due."""
+        if self._waker is not None and not self._waker.done():
+            self._waker.set_result(None)
 
     def turn(self) -> None:
         """One pass: rates, the ranger's own pass, keep-alive."""
@@ -182,6 +199,7 @@ class ZyServer:
                 connection.transport.close()
             return
         self.connections[connection.number] = connection
+        self.wake()
         for out in self.ranger.greeting(port):
             connection.tell(out.reply)
 

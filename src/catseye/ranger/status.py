@@ -16,6 +16,7 @@ class Status(IntFlag):
     UPDATES = 1 << 3  # ACU is on
     SCANNING = 1 << 4
     SCHEDULED = 1 << 5  # commands wait for their time
+    STREAMING = 1 << 6  # STM is at work
     CLIPPED = 1 << 7  # the last buffer reached the converter's ends
     AZIMUTH_OFF = 1 << 8  # the chip switched the motor off: position error
     ELEVATION_OFF = 1 << 9
@@ -23,7 +24,7 @@ class Status(IntFlag):
     CLOCK_FREE = 1 << 11  # no time signal
     AZIMUTH_ENABLED = 1 << 12
     ELEVATION_ENABLED = 1 << 13
-    SUN_REFUSED = 1 << 14  # the last move asked was refused for the Sun
+    SUN_REFUSED = 1 << 14  # the last move asked was refused for the Sun, or the beam rests in its cone
     INITIALISED = 1 << 16  # BP, ALPHA, BETA, MO, EZ and D0 have been given
 
 

@@ -1,4 +1,4 @@
-"""A ranger refuses by itself to look into the Sun, whatever it is told.
+"""A ranger refuses by itself to look into the Sun, whatever it is told, and leaves when the Sun comes to its beam.
 
 The coordinator's unit vector to the Sun (SUN) is one source, the ranger's own, from its clock and place, another: each
 has its cone. A vector that lies can so only add a cone. Cone size is open in the sources; 5 degrees, as in the site's
@@ -11,14 +11,47 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from catseye.constants import DEGREE
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.keep_out import servo_margin
 from catseye.geometry.pointing import Station, beam
+from catseye.geometry.sun import EARLIEST_MJD, altitude_azimuth
+from catseye.records.site import Location
+from catseye.reduction.earth_rotation import Place, place_of, rotation_at, sun_at
 
 HALF_ANGLE = 5.0 * DEGREE
 MARGIN = servo_margin([20.0, 20.0])  # overshoot
 LARGEST_STEP = 400  # counts between two looks: 1.4 deg of azimuth, 2.9 of the beam's elevation
+PARKED = 20.0 * DEGREE  # from the Sun, where a beam is left alone: 80 minutes of its way
+SET = -1.5 * DEGREE  # altitude from which on its rim is down also for a ranger 100 m up
 SunSource = Callable[[float], ArrayLike | None]  # MJD -> vector in the ground frame, None where it is set
+
+
+class OwnSun:
+    """Where the Sun stands over a place, looked up once a second of its time: 7.5" off at most.
+
+    place   of the ground frame's origin
+    """
+
+    def __init__(self, place: Place):
+        self._place = place
+        self._second = -1
+        self._seen: NDArray[np.float64] | None = None
+
+    def __call__(self, mjd: float) -> NDArray[np.float64] | None:
+        """(3,) unit, ground frame; None where it is set."""
+        second = int(mjd * SECONDS_PER_DAY)
+        if second != self._second:
+            towards = sun_at((second + 0.5) / SECONDS_PER_DAY, self._place).direction
+            altitude, _ = altitude_azimuth(towards)
+            self._second, self._seen = second, None if altitude < SET else towards
+        return self._seen
+
+
+def own_sun(site: Location) -> OwnSun:
+    """The Sun of a site record's table [site], for all its rangers on the ground; the Earth's turn is read now."""
+    rotation_at(EARLIEST_MJD)  # a second or two that no turn of a ranger shall wait
+    return OwnSun(place_of(site))
 
 
 def nearest_sun(
@@ -41,10 +74,7 @@ def nearest_sun(
     grid = [np.linspace(a[k], b[k], number[k]) if number[k] > 1 else b[k : k + 1] for k in (0, 1)]
     half = [0.5 * np.ptp(g) / max(len(g) - 1, 1) for g in grid]
     looks = beam(station, np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2))
-    inside: NDArray[np.float64] = np.stack([np.asarray(s, dtype=float) for s in suns])
-    turned = inside / np.linalg.norm(inside, axis=-1, keepdims=True) @ station.mirror_from_ground.T
-    cosine = np.clip(looks @ turned.T, -1.0, 1.0)
-    return float(np.arccos(np.max(cosine))) - servo_margin(half)
+    return float(np.min(_angles(station, looks, suns))) - servo_margin(half)
 
 
 def refusal(station: Station, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike]) -> str | None:
@@ -52,17 +82,54 @@ def refusal(station: Station, start: ArrayLike, end: ArrayLike, suns: Sequence[A
 
     station, start, end, suns   as for `nearest_sun`
 
-    A move that begins inside a cone may be made if it ends outside and nowhere comes nearer than it began, as far as
-    the grid can tell: 1.6 deg.
+    A move that begins inside a Sun's cone may be made if it ends outside and nowhere comes nearer than it began, as far
+    as the grid can tell: 1.6 deg.
     """
-    allowed = HALF_ANGLE + MARGIN
-    least = nearest_sun(station, start, end, suns)
-    if least >= allowed:
+    allowed, all_least = HALF_ANGLE + MARGIN, nearest_sun(station, start, end, suns)
+    if all_least >= allowed:
         return None
-    begin, final = (nearest_sun(station, start, at, suns, exact=True) for at in (start, end))
-    if begin < allowed <= final and least >= begin - servo_margin([0.5 * LARGEST_STEP] * 2):
+    blocked = []
+    for sun in suns:
+        least = nearest_sun(station, start, end, [sun])
+        begin, final = (nearest_sun(station, start, at, [sun], exact=True) for at in (start, end))
+        leaves = begin < allowed <= final and least >= begin - servo_margin([0.5 * LARGEST_STEP] * 2)
+        if least < allowed and not leaves:
+            blocked.append(least)
+    if not blocked:
         return None
+    least = min(blocked)
     return (
         f"the beam could come within {max(least, 0.0) / DEGREE:.1f} deg of the Sun (expected at least "
         f"{allowed / DEGREE:.1f}): choose another way or wait"
     )
+
+
+def way_out(
+    station: Station, here: ArrayLike, suns: Sequence[ArrayLike], limits: tuple[float, float]
+) -> tuple[int, int] | None:
+    """Counts to drive to from inside a cone: the shortest free move of one axis that ends 20 deg from every Sun.
+
+    station, suns   as for `nearest_sun`
+    here            (2,) counts, where the mirror is
+    limits          counts, lowest and highest azimuth
+
+    None where no such move of a quarter turn of azimuth or of the beam's elevation is free.
+    """
+    at = np.asarray(here, dtype=float)
+    steps = LARGEST_STEP * np.arange(1, round(COUNTS_PER_TURN / 4 / LARGEST_STEP) + 1)
+    both = np.stack([steps, -steps], axis=1).ravel()  # near ones first
+    azimuth = at + np.stack([both, np.zeros(len(both))], axis=1)
+    elevation = at + np.stack([np.zeros(len(both)), both], axis=1)[: len(both) // 2]  # the beam turns twice as far
+    elevation = elevation[np.abs(elevation[:, 1] - station.zeros[1]) <= COUNTS_PER_TURN / 4]  # Phi of half a turn
+    ends = np.concatenate([elevation, azimuth[(azimuth[:, 0] >= limits[0]) & (azimuth[:, 0] <= limits[1])]])
+    for end in ends[np.min(_angles(station, beam(station, ends), suns), axis=1) >= PARKED]:
+        if refusal(station, at, end, suns) is None:
+            return round(float(end[0])), round(float(end[1]))
+    return None
+
+
+def _angles(station: Station, looks: NDArray[np.float64], suns: Sequence[ArrayLike]) -> NDArray[np.float64]:
+    """(n, suns) rad between beams (n, 3) in the mirror's axes and the Suns."""
+    inside: NDArray[np.float64] = np.stack([np.asarray(s, dtype=float) for s in suns])
+    turned = inside / np.linalg.norm(inside, axis=-1, keepdims=True) @ station.mirror_from_ground.T
+    return np.arccos(np.clip(looks @ turned.T, -1.0, 1.0))

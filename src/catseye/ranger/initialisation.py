@@ -1,0 +1,216 @@
+"""What a ranger must be told before it can point and measure, from a site's records: commands, and its three files.
+
+A ranger lives in one frame of its own, in which its BP, ALPHA, SUN and all coordinates of cubes are given: a ground
+ranger in the ground frame, one on the feed arm in the reflector frame, with which it turns. Cubes have the same numbers
+on all rangers of a site.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import InputError
+from catseye.geometry.pointing import Station
+from catseye.ranger.commands import MOST_CUBES
+from catseye.ranger.line import Request
+from catseye.records.mirror import Mirror
+from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.target import FeedArmRanger
+from catseye.reduction.places import Place, nominal_frame, places_of
+from catseye.reduction.pointing import offset_of, station_of
+
+FILTER = ("FKP", "FKI", "FKD", "FIL", "FSI")
+BOOT_ACCELERATION = 2_000  # of a ranger's AxisSettings
+Frame = Literal["ground", "reflector"]
+
+
+def frame_of(site: SiteFolder, ranger: str) -> Frame:
+    """The frame in which a ranger is told its base point, its cubes and the Sun.
+
+    Raises InputError: no such ranger.
+    """
+    if ranger in site.monuments:
+        return "ground"
+    _feed_arm_record(site, ranger)
+    return "reflector"
+
+
+def mount_from_reflector(site: SiteFolder, ranger: str) -> NDArray[np.float64]:
+    """(3, 3): mount axes of a feed-arm ranger of vectors in the reflector frame, by its record or else the default.
+
+    Default, chosen: y^ looks at the centre of the dish, z^ along the reflector's x as far as it can; so the dish lies
+    within 45 deg of Theta = Phi = 90 deg, far from the azimuth axis, where a mirror cannot follow, and from the stops.
+    """
+    record = _feed_arm_record(site, ranger)
+    if record.mount_z is not None and record.mount_y is not None:
+        z = np.array(record.mount_z) / np.linalg.norm(record.mount_z)
+        y = np.array(record.mount_y) - z * (z @ np.array(record.mount_y))
+        y /= np.linalg.norm(y)
+    else:
+        y = _unit(dish_centre(site) - np.array(record.nominal_scan_point_mm) * MILLIMETRE)
+        z = _unit(np.array([1.0, 0.0, 0.0]) - y[0] * y)
+    return np.stack([np.cross(y, z), y, z])
+
+
+def dish_centre(site: SiteFolder) -> NDArray[np.float64]:
+    """(3,) m, reflector frame: the point of the paraboloid over the centre of the aperture."""
+    x, y = (value * MILLIMETRE for value in site.site.paraboloid.aperture_centre_mm)
+    return np.array([x, y, (x**2 + y**2) / (4.0 * site.site.paraboloid.focal_length_mm * MILLIMETRE)])
+
+
+def own_station(site: SiteFolder, ranger: str) -> Station:
+    """The mirror on its mount, in the ranger's own frame, which for the feed arm is the reflector's.
+
+    Source: [PARKER04] section 2.2.
+    """
+    mirror = site.mirror_of(ranger)
+    if ranger in site.monuments:
+        return station_of(site.monuments[ranger], mirror)
+    record = _feed_arm_record(site, ranger)
+    return Station.from_matrix(
+        np.array(record.nominal_scan_point_mm) * MILLIMETRE,
+        mount_from_reflector(site, ranger),
+        offset=offset_of(mirror),
+        beta=np.array([mirror.beta1_rad, mirror.beta2_rad]),
+        zeros=np.array([mirror.na0, mirror.ne0]),
+    )
+
+
+def cube_numbers(site: SiteFolder) -> dict[str, int]:
+    """Number of every cube by its target's name, the same on all rangers: ZRG is 0, the rest in order of the alphabet.
+
+    Raises InputError: more than a ranger has room for.
+    """
+    names = [name for name in site.target_names if name != REFERENCE]
+    if len(names) > MOST_CUBES:
+        raise InputError(f"site {site.site.campaign.name} has {len(names)} targets (expected at most {MOST_CUBES})")
+    return {REFERENCE: 0, **{name: number for number, name in enumerate(names, start=1)}}
+
+
+def cube_places_mm(site: SiteFolder, ranger: str) -> dict[str, NDArray[np.float64]]:
+    """(3,) mm by name: every target but ZRG and the ranger itself, in the ranger's own frame, in the site's posture."""
+    return _in_own_frame(site, ranger, places_of(site))
+
+
+def cubes_commands(
+    site: SiteFolder,
+    ranger: str,
+    targets: Iterable[str] | None = None,
+    *,
+    places: Mapping[str, Place] | None = None,
+) -> list[Request]:
+    """INI, then COO and KND of the targets, all of them unless told which; ZRG and the ranger itself have none.
+
+    places   of the site, where the caller has them already
+    """
+    numbers, places = cube_numbers(site), places or places_of(site)
+    at = _in_own_frame(site, ranger, places)
+    certified = {b.target: b.certified_distance_mm for b in site.benchmarks if b.ranger == ranger}
+    told = [_command("INI", len(numbers) - 1)]
+    for name in sorted(at) if targets is None else [t for t in targets if t not in (REFERENCE, ranger)]:
+        if name not in at:
+            raise InputError(f"target {name} is not at this site (expected one of its {len(at)} targets)")
+        told.append(_command("COO", numbers[name], *(f"{v:.3f}" for v in at[name]), name))
+        if name in certified:
+            told.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
+        elif places[name].constant != 0.0:
+            told.append(_command("KND", numbers[name], "S", f"{places[name].constant / MILLIMETRE:.4f}"))
+    return told
+
+
+def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
+    """BP and ALPHA, in the ranger's own frame."""
+    station = own_station(site, ranger)
+    return [
+        _command("BP", *(f"{v:.4f}" for v in station.fixed_point / MILLIMETRE)),
+        _command("ALPHA", *(f"{v:.9f}" for v in station.alpha)),
+    ]
+
+
+def head_commands(site: SiteFolder, ranger: str) -> list[Request]:
+    """BETA, MO, EZ, D0, the counts of ZRG, and what the mirror's record says of its motion."""
+    mirror = site.mirror_of(ranger)
+    return [
+        _command("BETA", f"{mirror.beta1_rad:.9f}", f"{mirror.beta2_rad:.9f}"),
+        _command("MO", *(f"{v:.4f}" for v in (mirror.dx_mm, mirror.dy_mm, mirror.dz_mm))),
+        _command("EZ", f"{mirror.na0:.10g}", f"{mirror.ne0:.10g}"),
+        _command("D0", f"{mirror.d0_mm:.4f}"),
+        _command("AZM", 0, mirror.azm_zrg),
+        _command("ELV", 0, mirror.elv_zrg),
+        *(command for axis in (0, 1) for command in _motion(mirror, axis)),
+    ]
+
+
+def commands_of_ranger(site: SiteFolder, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
+    """Everything that initialises a ranger: monument, head, then cubes. Amplifiers, homing and the Sun are not in it.
+
+    site      its records
+    ranger    name
+    targets   names of the cubes to tell; None: all
+
+    Raises InputError: no such ranger or target, or more targets than a ranger has room for.
+    """
+    return [
+        *monument_commands(site, ranger),
+        *head_commands(site, ranger),
+        *cubes_commands(site, ranger, targets),
+    ]
+
+
+def files_of_ranger(site: SiteFolder, ranger: str, *, places: Mapping[str, Place] | None = None) -> dict[str, str]:
+    """CUBES.INI, ZYnnn.INI and the head's file, text by name, in the order in which INITZY runs them.
+
+    places   of the site, where the caller has them already
+
+    Rangers of the ground share their CUBES.INI but for what is theirs: benchmarks, and that none is its own target.
+    """
+    zp = site.mirror_of(ranger).zp
+    frame = frame_of(site, ranger)
+    cubes = cubes_commands(site, ranger, places=places)
+    return {
+        "CUBES.INI": _text(f"targets of {site.site.campaign.name}, {frame} frame", cubes),
+        f"{ranger.upper()}.INI": _text(f"mount of {ranger}, {frame} frame", monument_commands(site, ranger)),
+        f"{zp.lower()}.INI": _text(f"head and mirror {zp}", head_commands(site, ranger)),
+    }
+
+
+def _in_own_frame(site: SiteFolder, ranger: str, places: Mapping[str, Place]) -> dict[str, NDArray[np.float64]]:
+    names = [name for name in places if name != ranger]
+    points = np.array([places[name].start for name in names])
+    if frame_of(site, ranger) == "reflector":
+        points = nominal_frame(site).inverse().points(points)
+    return dict(zip(names, points / MILLIMETRE, strict=True))
+
+
+def _motion(mirror: Mirror, axis: int) -> list[Request]:
+    """Filter, error limit, speed and acceleration where the record has them, in an order that no check refuses."""
+    slow = (getattr(mirror, f"abv_{axis}") or BOOT_ACCELERATION) < BOOT_ACCELERATION
+    order = (*FILTER, "ERL", *(("ABA", "ABV") if slow else ("ABV", "ABA")))
+    values = {name: getattr(mirror, f"{name.lower()}_{axis}") for name in order}
+    if slow and values["ABA"] is None:
+        values["ABA"] = values["ABV"]  # no move may be slower than its acceleration
+    return [_command(name, axis, value) for name, value in values.items() if value is not None]
+
+
+def _feed_arm_record(site: SiteFolder, ranger: str) -> FeedArmRanger:
+    found = next((record for record in site.feedarm.ranger if record.name == ranger), None)
+    if found is None:
+        raise InputError(
+            f"{ranger} is no ranger of {site.site.campaign.name} (expected one of {', '.join(site.rangers)})"
+        )
+    return found
+
+
+def _command(name: str, *values: object) -> Request:
+    return Request(name, tuple(str(value) for value in values))
+
+
+def _text(title: str, commands: list[Request]) -> str:
+    return "\n".join([f"; {title}", *(f"{c.command} {', '.join(c.parameters)}" for c in commands), ""])
+
+
+def _unit(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    return v / np.linalg.norm(v)
