@@ -346,3 +346,12 @@ def test_a_ranger_homes_points_and_measures_with_it_as_it_boots():
     assert float(reference.values[3]) == pytest.approx(3.0, abs=0.05)
     assert float(reference.values[4]) == pytest.approx(2 * np.pi - 900e-3 + 800e-3, abs=0.02)
     assert float(found.values[3]) == pytest.approx(3.0, abs=0.05)
+
+
+def test_the_cheap_clock_is_the_clock():
+    clock = ManualClock(START)
+    head = TwinHead("ZY101", World(), clock, seed=3)
+    for _ in range(3):
+        clock.advance(0.1234567)
+        tag = head.now()
+        assert head.now_ns() == int(tag.day) * 86_400 * PER_SECOND + int(tag.nanoseconds)

@@ -106,6 +106,10 @@ class TwinHead:
         reading = self._reading(self._clock.now_ns())
         return TimeTag(np.asarray(reading // PER_DAY), np.asarray(reading % PER_DAY))
 
+    def now_ns(self) -> int:
+        """The same, nanoseconds since MJD 0: what a server asks a thousand times a second."""
+        return self._reading(self._clock.now_ns())
+
     def _reading(self, now: int) -> int:
         seconds = self._world.seconds(now)
         fault = self._faults.active("drifting-clock", self.ranger, at=seconds)
