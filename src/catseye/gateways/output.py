@@ -24,6 +24,7 @@ FORMATS = (
     "catseye-acoustic-1",
     "catseye-refractometer-1",
     "catseye-beam-1",
+    "catseye-journal-export-1",
 )
 
 

@@ -1,0 +1,176 @@
+"""What a journal holds: the run, and in one order all that happened in it. No database here."""
+
+import hashlib
+import json
+import math
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.errors import InputError
+from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.site_folder import SiteFolder, site_files
+
+if TYPE_CHECKING:
+    from catseye.coordinator.parts import ShotVerdict
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class AnsweredShot:
+    """A shot and what the reduction said of it.
+
+    status, text    "used", "reference", "blocked" ... and why; empty where it was not asked
+    range_, u_range, misfit   m, NaN where it gave none
+    """
+
+    shot: LiveShot
+    status: str = ""
+    text: str = ""
+    range_: float = NAN
+    u_range: float = NAN
+    misfit: float = NAN
+
+    @classmethod
+    def of(cls, shot: LiveShot, verdict: "ShotVerdict") -> "AnsweredShot":
+        """The shot with the answer that `Live.shot` gave."""
+        return cls(shot, verdict.status, verdict.text, verdict.range_, verdict.u_range, verdict.misfit)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A line sent to a ranger and its reply; a reply that never came is empty and `ok` None.
+
+    ticks   of the reply, or of now where none came
+    """
+
+    ticks: int
+    ranger: str
+    tid: int
+    line: str
+    reply: str = ""
+    ok: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What an epoch's solving gave, as plain values; one that gave nothing is kept too, since it used up its shots.
+
+    ticks        the time that `Live.solve` was asked for
+    answer       JSON's own types, what is no finite number is None; empty where nothing was solved
+    covariance   (n, n), in the answer's units, or None
+    """
+
+    ticks: int
+    answer: dict[str, Any]
+    covariance: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(cls, ticks: int, answer: Any) -> "Solution":
+        """An epoch answer, any dataclass or mapping, or None; its matrix `covariance` is kept apart, bit for bit.
+
+        Raises InputError for a value that JSON cannot hold.
+        """
+        if answer is None:
+            return cls(ticks, {})
+        values = dict(answer) if isinstance(answer, Mapping) else named_fields(answer)
+        matrix = values.get("covariance")
+        if isinstance(matrix, np.ndarray) and matrix.ndim == 2:
+            del values["covariance"]
+            matrix = np.array(matrix, dtype=np.float64)
+        else:
+            matrix = None
+        return cls(ticks, plain(values, "answer"), matrix)
+
+    @property
+    def text(self) -> str:
+        """The answer as JSON, keys sorted: two answers are the same where their texts are."""
+        return json.dumps(self.answer, sort_keys=True, allow_nan=False, ensure_ascii=False)
+
+    def same(self, other: "Solution | None") -> bool:
+        """Whether the other is this one to the last bit."""
+        if other is None or (self.covariance is None) != (other.covariance is None):
+            return False
+        if self.covariance is not None and other.covariance is not None:
+            pair = (np.ascontiguousarray(m, dtype="<f8") for m in (self.covariance, other.covariance))
+            one, two = ((matrix.shape, matrix.tobytes()) for matrix in pair)
+            if one != two:
+                return False
+        return self.ticks == other.ticks and self.text == other.text
+
+
+@dataclass(frozen=True)
+class Document:
+    """A text that belongs to the run: a plan, a setting changed under way, a certificate."""
+
+    ticks: int
+    name: str
+    text: str
+
+
+Entry = AnsweredShot | LiveWeather | LivePosture | Happening | Command | Solution | Document
+Item = Entry | LiveShot  # a bare shot is one without an answer
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a run of the coordinator starts from.
+
+    site       what stands there
+    settings   of everything that decides an answer, in JSON's own types
+    seed       of a simulated site; None at a real one
+    extra      further files, text by relative path, kept beside the site's
+    uuid       the run's own name in the world
+    """
+
+    site: SiteFolder
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+    extra: Mapping[str, str] = field(default_factory=dict)
+    uuid: str = field(default_factory=lambda: str(uuid.uuid4()))
+
+    def files(self) -> dict[str, str]:
+        """The site's files by relative path, each as it was read; one that has changed since is written anew."""
+        return {path: self._as_read(path) or text for path, text in site_files(self.site).items()} | dict(self.extra)
+
+    def _as_read(self, path: str) -> str | None:
+        try:
+            raw = (self.site.directory / path).read_bytes()
+        except OSError:
+            return None
+        return raw.decode("utf-8") if hashlib.sha256(raw).hexdigest() == self.site.hashes.get(path) else None
+
+
+def named_fields(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass by name, not copied."""
+    if not is_dataclass(value) or isinstance(value, type):
+        raise InputError(f"solution of type {type(value).__name__} (expected a dataclass or a mapping)")
+    return {each.name: getattr(value, each.name) for each in fields(value)}
+
+
+def plain(value: Any, place: str) -> Any:
+    """A value in JSON's own types; what is no finite number becomes None.
+
+    place   its name, for the refusal
+
+    >>> plain({"x": np.array([1.0, np.nan]), "n": (np.int64(3),)}, "answer")
+    {'x': [1.0, None], 'n': [3]}
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist(), place)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, f"{place}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{place}[{at}]") for at, item in enumerate(value)]
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(named_fields(value), place)
+    raise InputError(f"{place} is a {type(value).__name__}, which JSON cannot hold (expected numbers, text, lists)")

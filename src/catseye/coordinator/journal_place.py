@@ -1,0 +1,223 @@
+"""Where a journal is: a file (SQLite) or a PostgreSQL database; connections to it, and the lock of a file's writer."""
+
+import json
+import os
+import socket
+import sqlite3
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from sqlalchemy import Connection, Engine, NullPool, create_engine, event
+from sqlalchemy.engine import URL, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
+
+from catseye.errors import InputError
+
+EXPECTED = "expected a file's name, sqlite:///FILE or postgresql://USER@HOST/DATABASE"
+SIGNATURE = b"SQLite format 3\0"
+BUSY = 5.0  # s that a statement waits for another process's lock
+CONNECT = 5  # s
+CHECKPOINT_PAGES = 4096  # 32 MB: rarer than sqlite's own, as each holds a commit up
+
+
+@dataclass(frozen=True)
+class Place:
+    """A journal's place: `path` of a file, or `url` of a server; `shown` for people, without a password."""
+
+    shown: str
+    path: Path | None = None
+    url: URL | None = None
+
+
+def place_of(url: str | Path) -> Place:
+    """The place that a URL or a file's name means; InputError for any other text."""
+    if isinstance(url, Path) or "://" not in url:
+        return Place(str(url), path=Path(url))
+    try:
+        parsed = make_url(url)
+        backend = parsed.get_backend_name()
+    except (ArgumentError, ValueError):
+        raise InputError(f"journal {url.partition('://')[0]}://...: is no URL ({EXPECTED})") from None
+    if backend == "sqlite" and parsed.database and not parsed.host and parsed.database != ":memory:":
+        return Place(parsed.database, path=Path(parsed.database))
+    if backend in ("postgresql", "postgres") and parsed.database:
+        shown = parsed.set(drivername="postgresql").render_as_string(hide_password=True)
+        return Place(shown, url=parsed.set(drivername="postgresql+psycopg"))
+    raise InputError(f"journal {parsed.render_as_string(hide_password=True)}: cannot be used ({EXPECTED})")
+
+
+def refuse_foreign(place: Place, *, fresh: bool) -> None:
+    """A file that is there is an SQLite file; with `fresh` it need not be there, but its directory."""
+    if place.path is None:
+        return
+    try:
+        if not place.path.exists():
+            if fresh and place.path.absolute().parent.is_dir():
+                return
+            missing = f"directory {place.path.absolute().parent}" if fresh else "file"
+            raise InputError(f"journal {place.shown}: {missing} is missing (expected an existing one)")
+        if not place.path.is_file():
+            raise InputError(f"journal {place.shown}: is not a file (expected a journal's)")
+        with place.path.open("rb") as stream:
+            opening = stream.read(len(SIGNATURE))
+    except (OSError, ValueError) as problem:
+        raise InputError(f"journal {place.shown}: cannot be read: {getattr(problem, 'strerror', problem)}") from problem
+    if opening != SIGNATURE and not (fresh and not opening):
+        raise InputError(f"journal {place.shown}: starts with {opening!r}: no journal (expected a file of catseye)")
+
+
+def writing_engine(place: Place, *, create: bool = False) -> Engine:
+    """Connections that write, durable against power loss when a commit returns; one each time it is asked.
+
+    create   whether a file may be made
+    """
+    if place.url is not None:
+        return _server_engine(place.url)
+    mode = "rwc" if create else "rw"
+    engine = _file_engine(place, f"mode={mode}")
+
+    @event.listens_for(engine, "connect")
+    def durable(connection: sqlite3.Connection, _: object) -> None:
+        connection.execute("PRAGMA page_size = 8192")  # of a new file
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: object) -> None:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")  # type: ignore[attr-defined]
+
+    return engine
+
+
+def reading_engine(place: Place) -> Engine:
+    """Connections that only read, each transaction one state of the journal."""
+    if place.url is not None:
+        return _server_engine(place.url).execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+    whole = not Path(f"{place.path}-wal").exists() and not os.access(place.path.absolute().parent, os.W_OK)  # type: ignore[union-attr]
+    engine = _file_engine(place, "mode=ro&immutable=1" if whole else "mode=ro")
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: object) -> None:
+        connection.exec_driver_sql("BEGIN")  # type: ignore[attr-defined]
+
+    return engine
+
+
+def _file_engine(place: Place, options: str) -> Engine:
+    address = f"file:{quote(str(place.path))}?{options}"
+
+    def connected() -> sqlite3.Connection:
+        return sqlite3.connect(address, uri=True, timeout=BUSY, isolation_level=None, check_same_thread=False)
+
+    return create_engine("sqlite://", creator=connected, poolclass=NullPool)
+
+
+def _server_engine(url: URL) -> Engine:
+    options = {
+        "connect_timeout": CONNECT,
+        "application_name": "catseye journal",
+        "keepalives_idle": 5,
+        "tcp_user_timeout": 10_000,
+    }
+    try:
+        engine = create_engine(url, poolclass=NullPool, connect_args=options)
+    except ModuleNotFoundError:
+        raise InputError(
+            "journal postgresql://...: psycopg is not installed (expected the extra catseye[postgresql])"
+        ) from None
+
+    @event.listens_for(engine, "connect")
+    def durable(connection: object, _: object) -> None:
+        with connection.cursor() as cursor:  # type: ignore[attr-defined]
+            if cursor.execute("SHOW synchronous_commit").fetchone()[0] == "off":
+                cursor.execute("SET synchronous_commit TO on")
+        connection.commit()  # type: ignore[attr-defined]
+
+    return engine
+
+
+def identity(place: Place) -> tuple[int, int] | None:
+    """Of a journal's file; None for a server, and where it is not there."""
+    if place.path is None:
+        return None
+    try:
+        there = os.stat(place.path)
+    except OSError:
+        return (0, 0)
+    return there.st_dev, there.st_ino
+
+
+def fold(place: Place, connection: Connection) -> None:
+    """A file's log goes into the file, where nobody else has it open: a journal that was closed is one file."""
+    raw = connection.connection.driver_connection
+    if place.path is not None and raw is not None:
+        with suppress(sqlite3.Error):
+            raw.execute("PRAGMA busy_timeout = 200")
+            raw.execute("PRAGMA journal_mode = DELETE")
+
+
+def refused(place: Place, problem: SQLAlchemyError) -> InputError:
+    """A database's complaint in one line."""
+    why = str(problem.orig if isinstance(problem, DBAPIError) and problem.orig else problem).strip()
+    return InputError(f"journal {place.shown}: {' '.join(why.split())[:300]}")
+
+
+class WriterLock:
+    """One writer a file: a lock that the system takes back when its process dies, however it does.
+
+    Raises InputError, naming the writer that has it.
+    """
+
+    def __init__(self, place: Place):
+        self._file: int | None = None
+        if place.path is None:
+            return
+        import fcntl
+
+        self._path = Path(f"{place.path}.writer")
+        while self._file is None:
+            try:
+                file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            except OSError as problem:
+                raise InputError(f"journal {place.shown}: cannot be written: {problem.strerror}") from problem
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as problem:
+                holder = _holder(os.read(file, 1000))
+                os.close(file)
+                raise InputError(
+                    f"journal {place.shown}: {holder} is writing to it (expected one writer: stop it, or another file)"
+                ) from problem
+            if _same_file(file, self._path):
+                self._file = file
+            else:  # the last writer removed it between our opening and our locking
+                os.close(file)
+        os.ftruncate(self._file, 0)
+        os.write(self._file, json.dumps({"host": socket.gethostname(), "pid": os.getpid()}).encode())
+
+    def release(self) -> None:
+        """Let others write."""
+        if self._file is not None:
+            self._path.unlink(missing_ok=True)
+            os.close(self._file)
+            self._file = None
+
+
+def _holder(raw: bytes) -> str:
+    try:
+        holder = json.loads(raw)
+        return f"process {holder['pid']} on {holder['host']}"
+    except (ValueError, KeyError, TypeError):
+        return "another process"
+
+
+def _same_file(file: int, path: Path) -> bool:
+    try:
+        there = os.stat(path)
+    except FileNotFoundError:
+        return False
+    ours = os.fstat(file)
+    return (ours.st_dev, ours.st_ino) == (there.st_dev, there.st_ino)

@@ -1,0 +1,213 @@
+"""The journal's tables, the same in SQLite and PostgreSQL, and the steps from older versions (docs/formats/journal.md).
+
+Every event has the primary key (run, seq); seq counts all events of a run in the order in which they were given, over
+all tables. Times are ticks of 1e-8 day. NULL is a number that nobody knew.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Connection,
+    Executable,
+    Float,
+    ForeignKey,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+    UniqueConstraint,
+    insert,
+    inspect,
+    select,
+)
+from sqlalchemy.engine import Dialect
+from sqlalchemy.types import UserDefinedType
+
+from catseye import __version__
+from catseye.errors import InputError
+
+FORMAT = "catseye-journal"
+VERSION = 1
+APPLICATION_ID = 0x43_41_54_53  # "CATS" in the header of an SQLite file
+
+METADATA = MetaData()
+
+
+class Untyped(UserDefinedType[float]):
+    """A column of SQLite without a declared type, which keeps a double as it is: a REAL one makes -0.0 to 0."""
+
+    cache_ok = True
+
+    def get_col_spec(self, **_: Any) -> str:
+        return ""
+
+
+def _number(name: str) -> Column[float]:
+    return Column(name, Float(53).with_variant(Untyped(), "sqlite"), nullable=True)  # eight bytes, no bit lost
+
+
+def _text(name: str) -> Column[str]:
+    return Column(name, Text, nullable=False)
+
+
+def _whole(name: str) -> Column[int]:
+    return Column(name, BigInteger, nullable=False)
+
+
+def _events(name: str, *columns: Any) -> Table:
+    run = Column("run", Integer, ForeignKey("runs.run"), primary_key=True, autoincrement=False)
+    seq = Column("seq", BigInteger, primary_key=True, autoincrement=False)
+    return Table(name, METADATA, run, seq, *columns, sqlite_with_rowid=False)
+
+
+JOURNAL = Table("journal", METADATA, Column("format", Text, primary_key=True), _whole("version"))
+RUNS = Table(
+    "runs",
+    METADATA,
+    Column("run", Integer, primary_key=True),
+    Column("uuid", Text, nullable=False, unique=True),
+    _whole("started_ticks"),
+    Column("ended_ticks", BigInteger),
+    _text("site"),
+    Column("seed", BigInteger),
+    _text("settings"),
+    _text("host"),
+    _whole("pid"),
+    _text("catseye"),
+    _text("python"),
+    _text("numpy"),
+    Column("buffers", Boolean, nullable=False),
+)
+TEXTS = Table("texts", METADATA, Column("sha256", Text, primary_key=True), _text("text"))
+RUN_FILES = Table(
+    "run_files",
+    METADATA,
+    Column("run", Integer, ForeignKey("runs.run"), primary_key=True, autoincrement=False),
+    Column("path", Text, primary_key=True),
+    Column("sha256", Text, ForeignKey("texts.sha256"), nullable=False),
+)
+SHOTS = _events(
+    "shots",
+    _whole("number"),
+    _text("ranger"),
+    _text("target"),
+    _whole("ticks"),
+    _whole("cycles"),
+    _whole("samples_per_cycle"),
+    _whole("if_hz"),
+    _number("volts_per_code"),
+    _number("amplitude_v"),
+    _number("phase_rad"),
+    _text("status"),
+    _text("text"),
+    _number("range_m"),
+    _number("u_range_m"),
+    _number("misfit_m"),
+    UniqueConstraint("run", "ranger", "ticks", "target", name="shots_once"),
+)
+BUFFERS = _events(
+    "buffers", _whole("packing"), _whole("crc32"), Column("samples", LargeBinary, nullable=False)
+)  # of the shot with the same seq
+WEATHER = _events(
+    "weather",
+    _text("station"),
+    _whole("ticks"),
+    _number("temperature_c"),
+    _number("pressure_hpa"),
+    _number("humidity_percent"),
+)
+POSTURES = _events(
+    "postures",
+    _whole("ticks"),
+    _number("azimuth_rad"),
+    _number("elevation_rad"),
+    _number("azimuth_rate_rad_s"),
+    _number("elevation_rate_rad_s"),
+)
+COMMANDS = _events(
+    "commands",
+    _whole("ticks"),
+    _text("ranger"),
+    _whole("tid"),
+    _text("line"),
+    _text("reply"),
+    Column("ok", Boolean),
+)
+HAPPENINGS = _events(
+    "happenings", _whole("ticks"), _text("who"), _text("kind"), _text("severity"), _text("text"), _text("details")
+)
+SOLUTIONS = _events(
+    "solutions",
+    _whole("ticks"),
+    _text("answer"),
+    _whole("size"),
+    Column("covariance", LargeBinary),
+)
+DOCUMENTS = _events("documents", _whole("ticks"), _text("name"), _text("text"))
+EVENTS = (SHOTS, WEATHER, POSTURES, COMMANDS, HAPPENINGS, SOLUTIONS, DOCUMENTS)
+
+Step = Callable[[Connection], None]
+STEPS: tuple[Step, ...] = ()  # STEPS[n - 1] carries version n to n + 1
+
+
+def create_or_carry(connection: Connection, place: str) -> None:
+    """An empty database gets the tables, an older journal is carried to this version; in the caller's transaction.
+
+    place   for refusals
+
+    Raises InputError: another's database, or a newer version.
+    """
+    version = version_of(connection, place)
+    if version == 0:
+        METADATA.create_all(connection)
+        connection.execute(insert(JOURNAL).values(format=FORMAT, version=VERSION))
+        if connection.dialect.name == "sqlite":
+            connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
+        return
+    for step in STEPS[version - 1 :]:
+        step(connection)
+    if version < VERSION:
+        connection.execute(JOURNAL.update().values(version=VERSION))
+
+
+def version_of(connection: Connection, place: str) -> int:
+    """The version of the journal in a database; 0 where it holds nothing at all.
+
+    Raises InputError: another's database, or a newer version.
+    """
+    tables = inspect(connection).get_table_names()
+    if not tables:
+        return 0
+    row = None
+    if JOURNAL.name in tables:
+        columns = {column["name"] for column in inspect(connection).get_columns(JOURNAL.name)}
+        if columns == {"format", "version"}:
+            row = connection.execute(select(JOURNAL.c.version).where(JOURNAL.c.format == FORMAT)).first()
+    if row is None:
+        raise InputError(
+            f"journal {place}: holds other tables, such as {min(tables)!r}: it is no journal of catseye "
+            "(expected one, or a new name)"
+        )
+    version = int(row[0])
+    if version > VERSION:
+        raise InputError(
+            f"journal {place}: version {version} is newer than {VERSION}, the newest that this catseye, {__version__}, "
+            "knows (use a newer catseye)"
+        )
+    return version
+
+
+def insertion(table: Table, dialect: Dialect) -> Executable:
+    """An insert that leaves a row alone which is there already: what was sent twice is kept once."""
+    if dialect.name == "postgresql":
+        from sqlalchemy.dialects import postgresql
+
+        return postgresql.insert(table).on_conflict_do_nothing(index_elements=["run", "seq"])
+    from sqlalchemy.dialects import sqlite
+
+    return sqlite.insert(table).on_conflict_do_nothing(index_elements=["run", "seq"])

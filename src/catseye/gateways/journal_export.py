@@ -1,0 +1,298 @@
+"""Runs of a journal as tables: CSV, and FITS binary tables as a telescope's samplers write them.
+
+One file a quantity: shots, weather, postures, commands, happenings, solutions, coordinates. Columns are defined once:
+CSV says the unit in the name, FITS in TUNIT. Text in FITS is ASCII, others escaped.
+"""
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
+from catseye.coordinator.journal_entries import Entry, Solution
+from catseye.coordinator.journal_reader import JournalReader, Kind
+from catseye.errors import InputError
+from catseye.gateways.objects import json_page, plain
+from catseye.gateways.output import PROVENANCE, whole_directory
+from catseye.gateways.written import Progress, origin
+from catseye.records.live import TICKS_PER_DAY
+
+FORMAT = "catseye-journal-export-1"
+Form = Literal["csv", "fits"]
+Cells = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A column.
+
+    name      in CSV, unit at its end
+    fits      in FITS
+    unit      in FITS; "" of none
+    kind      "f" double, "i" whole, "s" text
+    factor, shift   the FITS value is factor times the CSV's plus shift
+    """
+
+    name: str
+    fits: str
+    kind: Literal["f", "i", "s"] = "f"
+    unit: str = ""
+    factor: float = 1.0
+    shift: float = 0.0
+
+
+RUN = (Field("run", "RUN", "i"), Field("seq", "SEQ", "i"), Field("mjd_utc", "DMJD", "s", "d"))
+
+
+@dataclass(frozen=True)
+class Table:
+    """A quantity: what it is read from, its columns after run, seq and time, and its rows of one entry."""
+
+    kind: Kind
+    fields: tuple[Field, ...]
+    rows: Callable[[Any], Iterable[Cells]]
+
+
+def _shot(entry: Any) -> Iterable[Cells]:
+    shot = entry.shot
+    taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, shot.if_hz)
+    found = (entry.range_, entry.u_range / MILLIMETRE, entry.misfit / MILLIMETRE)
+    yield (*taken, shot.amplitude, shot.phase, entry.status, entry.text, *found)
+
+
+def _solution(entry: Solution) -> Iterable[Cells]:
+    answer = entry.answer
+    names = ("number", "variance_factor", "degrees_of_freedom", "refractivity_ppm")
+    numbers = (float("nan") if answer.get(name) is None else answer[name] for name in names[1:])
+    pose = answer.get("pose")
+    yield (
+        answer.get("number") or 0,
+        *numbers,
+        len(answer.get("names") or ()),
+        "" if pose is None else json.dumps(pose),
+    )
+
+
+def _coordinates(entry: Solution) -> Iterable[Cells]:
+    names, x = entry.answer.get("names"), entry.answer.get("x")
+    if not isinstance(names, list) or not isinstance(x, list) or len(names) != len(x):
+        return
+    matrix = entry.covariance
+    whole = matrix is not None and matrix.shape == (3 * len(names),) * 2
+    for row, name in enumerate(names):
+        at = slice(3 * row, 3 * row + 3)
+        c = (matrix[at, at] if whole and matrix is not None else np.full((3, 3), np.nan)) / MILLIMETRE**2
+        place = (float("nan") if value is None else value for value in x[row])
+        yield (name, *place, *np.sqrt(np.diag(c)).tolist(), *c[(0, 0, 1), (1, 2, 2)].tolist())
+
+
+TABLES: dict[str, Table] = {
+    "shots": Table(
+        "shots",
+        (
+            Field("number", "NUMBER", "i"),
+            Field("ranger", "RANGER", "s"),
+            Field("target", "TARGET", "s"),
+            Field("cycles", "CYCLES", "i"),
+            Field("samples_per_cycle", "SAMPLES", "i"),
+            Field("if_hz", "IFFREQ", "i", "Hz"),
+            Field("amplitude_v", "AMPLITUDE", "f", "V"),
+            Field("phase_rad", "PHASE", "f", "rad"),
+            Field("status", "STATUS", "s"),
+            Field("text", "TEXT", "s"),
+            Field("range_m", "RANGE", "f", "m"),
+            Field("u_range_mm", "U_RANGE", "f", "mm"),
+            Field("misfit_mm", "MISFIT", "f", "mm"),
+        ),
+        _shot,
+    ),
+    "weather": Table(
+        "weather",
+        (
+            Field("station", "STATION", "s"),
+            Field("temperature_c", "TEMPERATURE", "f", "K", shift=ZERO_CELSIUS_K),  # FITS has no degree Celsius
+            Field("pressure_hpa", "PRESSURE", "f", "hPa"),
+            Field("humidity_percent", "HUMIDITY", "f", factor=0.01),
+        ),
+        lambda read: [(read.station, read.temperature_c, read.pressure_hpa, read.humidity_percent)],
+    ),
+    "postures": Table(
+        "postures",
+        (
+            Field("azimuth_deg", "AZIMUTH", "f", "deg"),
+            Field("elevation_deg", "ELEVATION", "f", "deg"),
+            Field("azimuth_rate_deg_s", "AZRATE", "f", "deg / s"),
+            Field("elevation_rate_deg_s", "ELRATE", "f", "deg / s"),
+        ),
+        lambda read: [
+            tuple(v / DEGREE for v in (read.azimuth, read.elevation, read.azimuth_rate, read.elevation_rate))
+        ],
+    ),
+    "commands": Table(
+        "commands",
+        (
+            Field("ranger", "RANGER", "s"),
+            Field("tid", "TID", "i"),
+            Field("line", "LINE", "s"),
+            Field("reply", "REPLY", "s"),
+            Field("ok", "OK", "s"),
+        ),
+        lambda sent: [(sent.ranger, sent.tid, sent.line, sent.reply, "" if sent.ok is None else str(int(sent.ok)))],
+    ),
+    "happenings": Table(
+        "happenings",
+        tuple(Field(name, name.upper(), "s") for name in ("severity", "who", "kind", "text", "details")),
+        lambda what: [
+            (what.severity, what.who, what.kind, what.text, json.dumps(what.details) if what.details else "")
+        ],
+    ),
+    "solutions": Table(
+        "solutions",
+        (
+            Field("number", "NUMBER", "i"),
+            Field("variance_factor", "VARFACTOR"),
+            Field("degrees_of_freedom", "FREEDOM"),
+            Field("refractivity_ppm", "REFRACTIVITY", factor=1e-6),
+            Field("points", "POINTS", "i"),
+            Field("pose", "POSE", "s"),
+        ),
+        _solution,
+    ),
+    "coordinates": Table(
+        "solutions",
+        (
+            Field("point", "POINT", "s"),
+            *(Field(f"{axis}_m", axis.upper(), "f", "m") for axis in "xyz"),
+            *(Field(f"u_{axis}_mm", f"U_{axis.upper()}", "f", "mm") for axis in "xyz"),
+            *(Field(f"cov_{pair}_mm2", f"COV_{pair.upper()}", "f", "mm2") for pair in ("xy", "xz", "yz")),
+        ),
+        _coordinates,
+    ),
+}
+
+
+def export_tables(
+    reader: JournalReader,
+    out: Path,
+    *,
+    runs: Sequence[int],
+    forms: Sequence[Form] = ("csv", "fits"),
+    span: tuple[int, int] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, int]:
+    """Every quantity of some runs, into a directory that appears whole or not at all; rows by quantity.
+
+    runs    numbers
+    forms   of file
+    span    ticks, the end not in it; all
+
+    Raises InputError: no such run, nothing to write, a directory that is another's.
+    """
+    if not runs or not forms:
+        raise InputError(f"--out {out}: no run or no form was named (expected at least one of each)")
+    found = [reader.run(run) for run in runs]
+    counts = dict.fromkeys(TABLES, 0)
+    with whole_directory(out, Path(reader.place)) as directory:
+        for done, (name, table) in enumerate(TABLES.items()):
+            if progress is not None:
+                progress(f"writing {name}", done, len(TABLES))
+            for form in forms:
+                rows = rows_of(reader, table, runs, span)
+                writer = _csv if form == "csv" else _fits
+                counts[name] = writer(directory / f"{name}.{form}", name, table, rows)
+        inputs = {f"run {run.run}: {path}": digest for run in found for path, digest in run.hashes.items()}
+        told = {"runs": {str(run.run): run.uuid for run in found}, "span_ticks": span, "rows": counts}
+        seal(directory, reader, {"made_by": "catseye export", **origin(datetime.now(UTC), inputs), **told})
+    return counts
+
+
+def rows_of(reader: JournalReader, table: Table, runs: Sequence[int], span: tuple[int, int] | None) -> Iterator[Cells]:
+    """The rows of a quantity: run, seq, the stamp as text of eight decimals, then its own."""
+    for run in runs:
+        for seq, entry in reader.events(run, kinds=[table.kind], buffers=False):
+            ticks = ticks_of(entry)
+            if span is None or span[0] <= ticks < span[1]:
+                for row in table.rows(entry):
+                    yield run, seq, stamp(ticks), *row
+
+
+def ticks_of(entry: Entry) -> int:
+    """When an entry was."""
+    return entry.shot.ticks if hasattr(entry, "shot") else entry.ticks
+
+
+def stamp(ticks: int) -> str:
+    """MJD with the eight decimals of a tick, exact.
+
+    >>> stamp(5288912500001)
+    '52889.12500001'
+    """
+    day, rest = divmod(ticks, TICKS_PER_DAY)
+    return f"{day}.{rest:08d}"
+
+
+def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> None:
+    """The provenance, with the journal's name and the hashes of all files; a directory's under its own name."""
+    outputs: dict[str, Any] = {}
+    for path in sorted(directory.rglob("*")):
+        if path.is_file():
+            top, *inner = path.relative_to(directory).parts
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            if inner:
+                outputs.setdefault(top, {})["/".join(inner)] = digest
+            else:
+                outputs[top] = digest
+    name = reader.place if "://" in reader.place else Path(reader.place).name
+    page = json_page(plain({"format": FORMAT, "journal": name, **provenance, "outputs": outputs}))
+    (directory / PROVENANCE).write_bytes(page.encode("utf-8"))
+
+
+def _csv(path: Path, name: str, table: Table, rows: Iterable[Cells]) -> int:
+    """Numbers as Python writes them, which reads back without the loss of a bit; empty where there is none."""
+    count = 0
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([field.name for field in RUN + table.fields])
+        for row in rows:
+            writer.writerow(["" if isinstance(cell, float) and cell != cell else cell for cell in row])
+            count += 1
+    return count
+
+
+def _fits(path: Path, name: str, table: Table, rows: Iterable[Cells]) -> int:
+    """One binary table; times are doubles (0.6 us) in DMJD and exact in TICKS."""
+    from astropy.io import fits
+
+    columns = list(zip(*rows, strict=True)) or [() for _ in RUN + table.fields]
+    made = []
+    for field, cells in zip(RUN + table.fields, columns, strict=True):
+        if field.name == "mjd_utc":
+            ticks = np.array([int(cell.replace(".", "")) for cell in cells], dtype=np.int64)
+            made.append(fits.Column("DMJD", "D", unit="d", array=np.array(cells, dtype=np.float64)))
+            made.append(fits.Column("TICKS", "K", array=ticks))
+        elif field.kind == "s":
+            text = np.array([str(cell).encode("ascii", "backslashreplace") for cell in cells] or [b""])
+            width = max(1, text.dtype.itemsize)
+            made.append(fits.Column(field.fits, f"{width}A", array=text[: len(cells)]))
+        elif field.kind == "i":
+            made.append(fits.Column(field.fits, "K", unit=field.unit or None, array=np.array(cells, dtype=np.int64)))
+        else:
+            values = np.array(cells, dtype=np.float64) * field.factor + field.shift
+            made.append(fits.Column(field.fits, "D", unit=field.unit or None, array=values))
+    page = fits.BinTableHDU.from_columns(made, name=name.upper())
+    page.header["TIMESYS"] = ("UTC", "time scale of DMJD")
+    page.header["TICKDAY"] = (TICKS_PER_DAY, "TICKS in a day, since MJD 0")
+    page.header["ORIGIN"] = "catseye"
+    whole = io.BytesIO()
+    fits.HDUList([fits.PrimaryHDU(), page]).writeto(whole, checksum=True)
+    path.write_bytes(whole.getvalue())
+    return len(columns[0])
