@@ -1,15 +1,17 @@
 """Replay: a run is fed again in its order, and held against what was said then, bit for bit."""
 
 from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.coordinator.replay import replay
-from catseye.errors import EstimationError, InputError
+from catseye.errors import InputError
 from catseye.records.live import Happening, LivePosture, LiveWeather
 from catseye.simulator.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, scene_run, scene_shot
@@ -59,6 +61,14 @@ class OrderedLive:
         self.shots = 0
         return answer
 
+    failed = ""
+
+    def begin(self, ticks):
+        return SimpleNamespace(solve=partial(self.solve, ticks))
+
+    def take_in(self, job, found):
+        return found
+
     def place(self, name, mjd):
         return np.zeros((len(mjd), 3))
 
@@ -80,7 +90,7 @@ def recorded(path, solves=6, gain=1.1):
             shot = scene_shot(k)
             journal.append(AnsweredShot.of(shot, live.shot(shot)), Happening(when, "ZY105", "x", "y"))
             if k % 7 == 6:
-                journal.append(Solution.of(when, live.solve(when)))
+                journal.append(Document(when, EPOCH_BEGUN, ""), Solution.of(when, live.solve(when)))
         journal.append().result(MOST_WAIT)
     return path
 
@@ -124,8 +134,6 @@ def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
             answer = super().solve(ticks)
             if answer is not None and self.state < 0.0:
                 self.state = 0.25
-                if answer.shots % 2:
-                    raise EstimationError("no answer")
                 return None
             return answer
 
@@ -144,11 +152,8 @@ def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
             except InputError as problem:
                 journal.append(AnsweredShot(shot, "refused", str(problem)))
             if k % 3 == 2:
-                try:
-                    answer = live.solve(shot.ticks)
-                except EstimationError:
-                    answer = None
-                journal.append(Solution.of(shot.ticks, answer))
+                begun = Document(shot.ticks, EPOCH_BEGUN, "")
+                journal.append(begun, Solution.of(shot.ticks, live.solve(shot.ticks)))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Failing(site, 1.1)))
     assert len(found) == 13
@@ -187,3 +192,32 @@ def test_sameness_is_of_every_part(part):
     assert not one.same(others[part])
     assert not others[part].same(one)
     assert not one.same(None)
+
+
+def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
+    """An epoch is taken out, solved beside the loop, and taken in: what is fed between changes neither."""
+
+    class Beside(OrderedLive):
+        def begin(self, ticks):
+            taken, self.shots = self.shots, 0
+            return SimpleNamespace(solve=lambda: (ticks, taken))
+
+        def take_in(self, job, found):
+            _, taken = found
+            self.state = np.sin(self.state + taken)
+            return Epoch({"ZEG": np.array([self.state])}, np.eye(2) * self.state, taken)
+
+    live = Beside(scene_run().site, 1.1)
+    with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(30):
+            shot = scene_shot(k)
+            if k % 10 == 5:
+                job = live.begin(shot.ticks)
+                journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
+            journal.append(AnsweredShot.of(shot, live.shot(shot)))
+            if k % 10 == 8:
+                journal.append(Solution.of(shot.ticks, live.take_in(job, job.solve())))
+    with JournalReader(tmp_path / "j.db") as reader:
+        found = list(replay(reader, 1, lambda site, run: Beside(site, 1.1)))
+    assert [replayed.same for replayed in found] == [True] * 3
+    assert [replayed.new.answer["shots"] for replayed in found] == [5, 10, 10]

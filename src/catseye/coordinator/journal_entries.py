@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from catseye.coordinator.parts import ShotVerdict
 
 NAN = float("nan")
+EPOCH_BEGUN = "epoch-begun"  # name of the document that says when an epoch's shots were taken out
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ class Command:
 class Solution:
     """What an epoch's solving gave, as plain values; one that gave nothing is kept too, since it used up its shots.
 
-    ticks        the time that `Live.solve` was asked for
+    ticks        the time that `Live.begin` was asked for
     answer       JSON's own types, what is no finite number is None; empty where nothing was solved
     covariance   (n, n), in the answer's units, or None
     """

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
-from catseye.coordinator.journal_reader import JournalReader, StoredRun
-from catseye.coordinator.parts import LiveReduction
+from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.journal_reader import JournalReader, Kind, StoredRun
+from catseye.coordinator.parts import EpochJob, LiveReduction
 from catseye.errors import CatseyeError
 from catseye.records.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import SiteFolder
@@ -47,7 +47,9 @@ def replay(
     """
     live = live_factory(reader.site(run), reader.run(run))
     shots, differing = 0, []
-    for seq, entry in reader.events(run, until=until, kinds=["shots", "weather", "postures", "solutions"]):
+    job: EpochJob | None = None
+    kinds: list[Kind] = ["shots", "weather", "postures", "documents", "solutions"]
+    for seq, entry in reader.events(run, until=until, kinds=kinds):
         if isinstance(entry, AnsweredShot):
             shots += 1
             again = _asked(live, entry.shot)
@@ -57,9 +59,12 @@ def replay(
             live.weather(entry)
         elif isinstance(entry, LivePosture):
             live.posture(entry)
+        elif isinstance(entry, Document) and entry.name == EPOCH_BEGUN:
+            job = live.begin(entry.ticks)
         elif isinstance(entry, Solution):
-            yield Replayed(seq, entry, _solved(live, entry.ticks), shots, tuple(differing))
-            shots, differing = 0, []
+            new = Solution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
+            yield Replayed(seq, entry, new, shots, tuple(differing))
+            shots, differing, job = 0, [], None
 
 
 def _asked(live: LiveReduction, shot: LiveShot) -> AnsweredShot:
@@ -68,13 +73,6 @@ def _asked(live: LiveReduction, shot: LiveShot) -> AnsweredShot:
         return AnsweredShot.of(shot, live.shot(shot))
     except CatseyeError as problem:
         return AnsweredShot(shot, "refused", str(problem))
-
-
-def _solved(live: LiveReduction, ticks: int) -> Solution:
-    try:
-        return Solution.of(ticks, live.solve(ticks))
-    except CatseyeError:
-        return Solution(ticks, {})
 
 
 def _answer(shot: AnsweredShot) -> tuple[str, ...]:

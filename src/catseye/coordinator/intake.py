@@ -1,0 +1,208 @@
+"""What comes in, in one order: numbered, given to the reduction, journalled, and made known when it is durable.
+
+The journal's order is that in which the reduction was fed. While the journal cannot make things durable, weather and
+posture are dropped, shots that were on their way wait in line, and nothing is acknowledged until the journal is back.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.parts import JournalWriter, LiveReduction
+from catseye.errors import CatseyeError, InputError
+from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+
+TOGETHER = 0.005  # s in which what arrives is handled at once
+RETRY = 0.5  # s between two looks whether the journal is back
+MOST_HELD = 2000  # happenings kept while the journal is away
+Entry = Any  # AnsweredShot | LiveWeather | LivePosture | Happening | Solution | ...
+
+
+class Intake:
+    """The one way into reduction and journal.
+
+    judged     called with each shot and what the reduction said of it, at once
+    publish    called with each entry when it is durable
+    herald     says what goes wrong with the journal; that itself is journalled when it can be
+    """
+
+    def __init__(
+        self,
+        live: LiveReduction,
+        journal: JournalWriter,
+        *,
+        judged: Callable[[AnsweredShot], None],
+        publish: Callable[[Entry], None],
+        herald: Herald,
+    ):
+        self._live, self._journal, self._herald = live, journal, herald
+        self._judged, self._publish = judged, publish
+        self._arrived: list[Entry] = []
+        self._timer: asyncio.TimerHandle | None = None
+        self._last: dict[str, int] = {}  # stamp of each ranger's last shot
+        self._held: deque[tuple[Entry, ...]] = deque()  # given to the reduction, and not yet taken by the journal
+        self._late: list[tuple[Entry, ...]] = []  # taken by the journal, and not durable when they should have been
+        self._fresh = 0  # shots since the last solution
+        self._retrying = self._solving = False
+        self.numbered = self.acknowledged = self.dropped = 0
+
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing may be measured: the journal is away; None where all is well."""
+        if self._journal.trouble is not None:
+            return self._journal.trouble
+        return "what was measured is not durable yet" if self._held or self._late else None
+
+    def take(self, item: LiveShot | LiveWeather | LivePosture | Happening) -> None:
+        """Something has come; what comes within 5 ms is handled together."""
+        if self.trouble is not None:
+            self._see_to_journal()
+            if isinstance(item, LiveWeather | LivePosture) or (
+                isinstance(item, Happening) and len(self._held) + len(self._arrived) > MOST_HELD
+            ):
+                self.dropped += 1
+                return
+        self._arrived.append(item)
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(TOGETHER, self.flush)
+
+    def flush(self) -> None:
+        """Handle what has come."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        while self._arrived:
+            arrived, self._arrived = self._arrived, []
+            entries = [entry for item in arrived if (entry := self._fed(item)) is not None]
+            if entries:
+                self._write(tuple(entries))
+
+    async def solve(self, ticks: int) -> Any | None:
+        """An epoch of all shots since the last, solved in a thread beside the loop; None where there is none.
+
+        The journal has both instants, when its shots were taken out and when its answer was taken in: shots that are
+        fed between belong to the next epoch, in a replay too.
+        """
+        self.flush()
+        if not self._fresh or self.trouble is not None or self._solving:
+            return None
+        job = self._live.begin(ticks)
+        if job is None:
+            self._herald.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "warning")
+            return None
+        self._fresh, self._solving = 0, True
+        self._write((Document(ticks, EPOCH_BEGUN, ""),))
+        try:
+            found = await asyncio.get_running_loop().run_in_executor(None, job.solve)
+        finally:
+            self._solving = False
+        self.flush()
+        answer = self._live.take_in(job, found)
+        self._write((Solution.of(ticks, answer),))
+        if answer is None:
+            self._herald.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
+        return answer
+
+    def _fed(self, item: Any) -> Entry | None:
+        """The reduction has it now; what the journal is to have."""
+        if isinstance(item, LiveWeather):
+            self._live.weather(item)
+        elif isinstance(item, LivePosture):
+            self._live.posture(item)
+        elif isinstance(item, LiveShot):
+            return self._answered(item)
+        return item
+
+    def _answered(self, shot: LiveShot) -> AnsweredShot | None:
+        last = self._last.get(shot.ranger, -1)
+        if shot.ticks <= last:  # a clock that was set back; a journal has each shot once
+            text = f"{shot.ranger}: a shot's stamp is {last - shot.ticks} ticks before the last one's: not used"
+            self._herald.tell("stamp-not-later", text, "warning", about=shot.ranger)
+            return None
+        self._last[shot.ranger] = shot.ticks
+        self.numbered += 1
+        shot = replace(shot, number=self.numbered)
+        try:
+            answered = AnsweredShot.of(shot, self._live.shot(shot))
+        except CatseyeError as problem:
+            answered = AnsweredShot(shot, "refused", str(problem))
+        self._fresh += 1
+        self._judged(answered)
+        return answered
+
+    def _write(self, entries: tuple[Entry, ...]) -> None:
+        self._held.append(entries)
+        self._send()
+
+    def _send(self) -> None:
+        """Give the journal what is held, in order."""
+        while self._held:
+            try:
+                future = self._journal.append(*self._held[0])
+            except InputError as problem:
+                self._away(str(problem))
+                return
+            entries = self._held.popleft()
+            loop = asyncio.get_running_loop()
+            future.add_done_callback(partial(_later, loop, partial(self._settled, entries)))
+
+    def _settled(self, entries: tuple[Entry, ...], done: "Future[Any]") -> None:
+        """The journal has made entries durable, or not."""
+        problem = done.exception()
+        if problem is None:
+            self._acknowledge(entries)
+        elif self._journal.trouble is not None or self._late:
+            self._late.append(entries)
+            self._away(str(problem))
+        else:
+            self._herald.tell("not-journalled", f"the journal refused {len(entries)} entries: {problem}", "alarm")
+
+    def _acknowledge(self, entries: tuple[Entry, ...]) -> None:
+        for entry in entries:
+            self.acknowledged += isinstance(entry, AnsweredShot)
+            self._publish(entry)
+
+    def _away(self, why: str) -> None:
+        self._herald.standing("journal-away", f"{why}: measuring stops", "alarm")
+        self._see_to_journal()
+
+    def _see_to_journal(self) -> None:
+        if not self._retrying:
+            self._retrying = True
+            asyncio.get_running_loop().call_later(RETRY, self._retry)
+
+    def _retry(self) -> None:
+        """Whether all that was given is durable now: an append of nothing is, when all before it are."""
+        self._retrying = False
+        try:
+            future = self._journal.append()
+        except InputError:
+            self._see_to_journal()
+            return
+        loop = asyncio.get_running_loop()
+        future.add_done_callback(partial(_later, loop, self._retried))
+
+    def _retried(self, done: "Future[Any]") -> None:
+        if done.exception() is not None or self._journal.trouble is not None:
+            self._see_to_journal()
+            return
+        late, self._late = self._late, []
+        for entries in late:
+            self._acknowledge(entries)
+        self._send()
+        if self.trouble is None:
+            self._herald.standing("journal-away", None, over="the journal is back: measuring goes on")
+        else:
+            self._see_to_journal()
+
+
+def _later(loop: asyncio.AbstractEventLoop, call: Callable[..., None], *given: Any) -> None:
+    """From the journal's thread into the loop, which may be closed by now."""
+    if not loop.is_closed():
+        loop.call_soon_threadsafe(call, *given)

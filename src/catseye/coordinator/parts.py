@@ -1,0 +1,183 @@
+"""What the coordinator's parts hand to each other, and what it needs of those that others write."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import SECONDS_PER_DAY
+from catseye.ranger.line import Reply, Request
+from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
+
+TICKS_PER_SECOND = TICKS_PER_DAY / SECONDS_PER_DAY
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedShot:
+    """One shot of a round.
+
+    ranger, target   names; ZRG is the ranger's own cube
+    begin_ticks      when its buffer shall begin
+    duration         s, of the buffer
+    at_begin, at_end (3,) m, where the target will be at `begin_ticks` and `duration` later: ground frame, or the
+                     reflector frame for rangers of the feed arm
+    fixed            it does not move against its ranger: CIL instead of TRK
+    reason           one line: why this shot
+    """
+
+    ranger: str
+    target: str
+    begin_ticks: int
+    duration: float
+    at_begin: NDArray[Any]
+    at_end: NDArray[Any]
+    fixed: bool
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What each ranger shall shoot between two times, in order; `unseen` says why pairs were left out."""
+
+    begin_ticks: int
+    end_ticks: int
+    shots: dict[str, tuple[PlannedShot, ...]]
+    unseen: dict[tuple[str, str], str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class SiteState:
+    """What a planner is told.
+
+    posture          the latest
+    ready            rangers that can shoot
+    counts           where their mirrors stand, azimuth and elevation
+    suspended        lines (ranger, target) that failed, left alone for now
+    since_reference  s since each ranger's last good shot on ZRG; a ranger without one is not in it
+    place            a point's name and times (MJD) to (n, 3) m, ground frame: `Live.place`
+    u                covariances (3, 3), m^2, of points as last known; may lack names
+    """
+
+    now_ticks: int
+    posture: LivePosture
+    ready: tuple[str, ...]
+    counts: dict[str, tuple[float, float]]
+    suspended: frozenset[tuple[str, str]]
+    since_reference: dict[str, float]
+    place: Callable[[str, ArrayLike], NDArray[Any]]
+    u: dict[str, NDArray[Any]]
+
+
+class Clock(Protocol):
+    """UTC, as `simulator.world_clock`."""
+
+    def now_ns(self) -> int:
+        """Nanoseconds since MJD 0."""
+        ...
+
+
+class Planner(Protocol):
+    """What to shoot next."""
+
+    def round(self, state: SiteState) -> Round: ...
+
+
+class SafetyAlarm(Protocol):
+    """A beam at rest that something comes to: `within` s from now; `remedy` is "move" or "dark"."""
+
+    @property
+    def ranger(self) -> str: ...
+    @property
+    def within(self) -> float: ...
+    @property
+    def cause(self) -> str: ...
+    @property
+    def remedy(self) -> str: ...
+    @property
+    def text(self) -> str: ...
+
+
+class SafetyGuard(Protocol):
+    """The last word before each request; it must hear what rangers answer, and how the telescope stands."""
+
+    def refusal(self, ranger: str, request: Request, now_ticks: int) -> str | None:
+        """Why a request must not be sent, None where it may."""
+        ...
+
+    def heard(self, ranger: str, reply: Reply) -> None: ...
+    def telescope(self, posture: LivePosture) -> None: ...
+    def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
+        """Unit vector to the Sun in the ranger's own frame. Raises InputError where the telescope's posture lacks."""
+        ...
+
+    def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> Sequence[SafetyAlarm]:
+        """What comes to beams at rest."""
+        ...
+
+
+class ShotVerdict(Protocol):
+    """What the reduction says of one shot; m, NaN where it has none."""
+
+    @property
+    def status(self) -> str: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def range_(self) -> float: ...
+    @property
+    def u_range(self) -> float: ...
+    @property
+    def misfit(self) -> float: ...
+
+
+class EpochJob(Protocol):
+    """An epoch by itself; a thread may solve it."""
+
+    def solve(self) -> Any: ...
+
+
+class LiveReduction(Protocol):
+    """`reduction.live.Live`: pure, and fed in one order."""
+
+    @property
+    def failed(self) -> str:
+        """Why the last epoch gave nothing."""
+        ...
+
+    def weather(self, read: LiveWeather) -> object: ...
+    def posture(self, read: LivePosture) -> None: ...
+    def shot(self, shot: LiveShot) -> ShotVerdict: ...
+    def begin(self, ticks: int) -> "EpochJob | None":
+        """The epoch of all shots since the last, to be solved; None where there is nothing to solve."""
+        ...
+
+    def take_in(self, job: Any, found: Any) -> Any | None:
+        """The answer of an epoch whose job has been solved; None where it found nothing."""
+        ...
+
+    def place(self, name: str, mjd: ArrayLike) -> NDArray[Any]: ...
+    def uncertainty(self) -> dict[str, NDArray[Any]]:
+        """Covariances (3, 3), m^2, of points as known by now."""
+        ...
+
+
+class JournalWriter(Protocol):
+    """What was given is durable when its future is done, in the order given; a full queue raises InputError."""
+
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing is durable at present; None where all is well."""
+        ...
+
+    def append(self, *items: Any) -> "Future[Any]": ...
+    def close(self) -> None: ...
+
+
+Tell = Callable[[Happening], None]
+
+
+def ticks_now(clock: Clock) -> int:
+    """The stamp of now."""
+    return (2 * clock.now_ns() + 864_000) // 1_728_000
