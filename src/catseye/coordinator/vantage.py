@@ -1,0 +1,171 @@
+"""Where rangers and retroreflectors stand, each in the frame that carries it, by the records of a site.
+
+A ranger on the ground lives in the ground frame, one on the feed arm in the reflector frame: there it stands still, its
+counts for the dish do not change, and it is the Sun and the ground that turn.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.geometry.antenna import ground_from_reflector
+from catseye.geometry.encoder import prime_counts, turned_within, within
+from catseye.geometry.frame import Transform
+from catseye.geometry.pointing import Station, counts
+from catseye.geometry.slew import Pace
+from catseye.ranger.initialisation import frame_of, own_station
+from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
+from catseye.ranger.ranger import AxisSettings
+from catseye.records.live import TICK_SECONDS, LivePosture
+from catseye.records.mirror import Mirror
+from catseye.records.site_folder import SiteFolder
+from catseye.records.target import FrameName
+
+Array = NDArray[np.float64]
+Frame = Literal["ground", "reflector"]
+TYPED = 0.010  # m: u of a coordinate that nobody states, as in the reduction
+
+
+@dataclass(frozen=True, eq=False)
+class Vantage:
+    """A ranger's place.
+
+    name        of the ranger
+    frame       that carries it: ground, or reflector for the feed arm
+    station     its mirror, in that frame
+    mirror      its record: stops, ZRG, tilts
+    pace        speed and acceleration of its axes
+    """
+
+    name: str
+    frame: Frame
+    station: Station
+    mirror: Mirror
+    pace: Pace
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Azimuth counts, low and high."""
+        return float(self.mirror.az_low_limit), float(self.mirror.az_high_limit)
+
+    @property
+    def reference(self) -> tuple[float, float]:
+        """Counts that look at ZRG."""
+        return float(self.mirror.azm_zrg), float(self.mirror.elv_zrg)
+
+    def look(self, points: ArrayLike) -> Array:
+        """Counts (..., 2) that its ZY takes for points (..., 3), m, own frame: direct within the stops, else prime.
+
+        NaN where neither is within them.
+
+        Source: as `ranger.cubes.Cubes.look` without a current pointing.
+        """
+        direct = counts(self.station, points)
+        low, high = self.stops
+        other = np.stack(prime_counts(direct[..., 0], direct[..., 1], self.station.zeros[1]), axis=-1)
+        answer = np.full(direct.shape, np.nan)
+        for setting in (other, direct):
+            azimuth = turned_within(setting[..., 0], low, high)
+            allowed = within(azimuth, low, high)
+            answer[allowed] = np.stack([azimuth, setting[..., 1]], axis=-1)[allowed]
+        return answer
+
+    def on_ground(self, frame: Transform) -> Station:
+        """Its mirror in the ground frame while the reflector stands so: `ground_from_reflector`."""
+        if self.frame == "ground":
+            return self.station
+        own = self.station
+        turned = own.gamma @ frame.rotation.T
+        return Station.from_matrix(
+            frame.points(own.scan_point), turned, offset=own.offset, beta=own.beta, zeros=own.zeros
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Retro:
+    """A retroreflector: kind as in `reduction.visibility.ACCEPTANCE`; point (3,) m and outward axis (3,), NaN where
+    unknown, in its frame; u m of each coordinate; what it is `part` of.
+    """
+
+    name: str
+    kind: Literal["prism", "hollow", "ball"]
+    frame: FrameName
+    point: Array
+    axis: Array
+    u: float
+    part: Literal["dish", "triplet", "structure", "benchmark"]
+
+
+def vantages_of(site: SiteFolder) -> dict[str, Vantage]:
+    """Every ranger of a site, by name, sorted; mounts without a record as `ranger.initialisation` has them."""
+    return {
+        name: Vantage(name, frame_of(site, name), own_station(site, name), mirror, pace_by(mirror))
+        for name in site.rangers
+        for mirror in [site.mirror_of(name)]
+    }
+
+
+def pace_by(mirror: Mirror) -> Pace:
+    """The axes' speeds by the record, else those with which a ZY boots."""
+    if all(getattr(mirror, key) for key in ("abv_0", "aba_0", "abv_1", "aba_1")):
+        return pace_of(mirror)
+    boot = AxisSettings()
+    speed, acceleration = velocity_counts(boot.velocity), acceleration_counts(boot.acceleration)
+    return Pace((speed, speed), (acceleration, acceleration))
+
+
+def retros_of(site: SiteFolder) -> dict[str, Retro]:
+    """Every retroreflector of a site, by name.
+
+    Source: [GOLDMAN00] figure 10 for triplets: ball = mid-point + h_corr normal, which points to the prisms' side.
+    """
+    benches = {each.target for each in site.benchmarks}
+    found: dict[str, Retro] = {}
+    for target in site.targets.values():
+        part: Literal["dish", "structure", "benchmark"] = "structure"
+        if target.name in benches:
+            part = "benchmark"
+        elif target.type == "prism" and target.frame == "reflector":
+            part = "dish"
+        axis = np.full(3, np.nan) if target.normal is None else np.array(target.normal)
+        point = np.array(target.position_mm) * MILLIMETRE
+        found[target.name] = Retro(target.name, target.type, target.frame, point, axis, _u(target.u_position_mm), part)
+    for triplet in site.triplets.values():
+        ball, normal = np.array(triplet.nominal_position_mm) * MILLIMETRE, np.array(triplet.normal)
+        middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
+        half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
+        left, right, own = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
+        u, frame = _u(triplet.u_position_mm), triplet.frame
+        found[left] = Retro(left, "prism", frame, middle - half, normal, u, "triplet")
+        found[right] = Retro(right, "prism", frame, middle + half, normal, u, "triplet")
+        found[own] = Retro(own, "ball", frame, ball, -normal, u, "triplet")
+    return found
+
+
+def reflector_at(site: SiteFolder, posture: LivePosture, seconds: float = 0.0) -> Transform:
+    """Ground from reflector, nominal, some s after a posture, its rates held."""
+    reflector = site.site.frames.reflector
+    return ground_from_reflector(
+        posture.azimuth + posture.azimuth_rate * seconds,
+        posture.elevation + posture.elevation_rate * seconds,
+        elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
+        reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
+    )
+
+
+def nominal_posture(site: SiteFolder) -> LivePosture:
+    """Azimuth and elevation of the record's [campaign]."""
+    posture = site.site.campaign
+    return LivePosture(0, posture.azimuth_deg * DEGREE, posture.elevation_deg * DEGREE)
+
+
+def seconds_between(since_ticks: int, ticks: int) -> float:
+    """s."""
+    return (ticks - since_ticks) * TICK_SECONDS
+
+
+def _u(u_mm: float | None) -> float:
+    return TYPED if u_mm is None else u_mm * MILLIMETRE
