@@ -1,0 +1,140 @@
+"""What a ranger's replies say of a shot: CMEAS (amplitude, phase) and BUF (the samples), checked before they count."""
+
+import binascii
+import math
+import re
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.errors import InputError, ValidityError
+from catseye.ranger.head import Sampling
+from catseye.ranger.line import Reply
+from catseye.records.live import LiveShot
+
+REAL = re.compile(r"[+-]?([0-9]{1,25}(\.[0-9]{0,25})?|\.[0-9]{1,25})([eE][+-]?[0-9]{1,3})?")
+WHOLE = re.compile(r"[0-9]{1,10}")
+CHECK = re.compile(r"0x[0-9a-f]{8}")
+LARGEST_CODE_V = 1.0  # V a code: beyond, it is none
+LARGEST_V = 1e3  # an amplitude beyond is none
+
+
+@dataclass(frozen=True, eq=False)
+class BufferRead:
+    """A BUF: whose, when its first sample was taken, how, V a code, and the samples, (m n,) int16."""
+
+    cube: int | None
+    ticks: int
+    sampling: Sampling
+    volts_per_code: float
+    samples: NDArray[np.int16]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A CMEAS: whose, when its buffer's first sample was taken, amplitude in V, phase in rad."""
+
+    cube: int
+    name: str
+    ticks: int
+    amplitude: float
+    phase: float
+
+
+def buffer_of(reply: Reply) -> BufferRead:
+    """The buffer that a BUF brought.
+
+    Raises InputError: refused by the ranger, another form, a sampling that none can have, a length that is not what it
+    says, a CRC that is not that of the bytes.
+    """
+    values = _values(reply, "BUF", 7)
+    cube = None if values[0] == "none" else _whole(values[0], "BUF's cube")
+    cycles, samples, frequency = (_whole(v, "BUF's sampling") for v in values[1:4])
+    try:
+        sampling = Sampling(samples, cycles, frequency)
+    except ValidityError as problem:
+        raise InputError(f"BUF: {problem}") from problem
+    volts = _real(values[4], "BUF's V a code", LARGEST_CODE_V)
+    if not volts > 0.0:
+        raise InputError(f"BUF: {values[4][:20]} V a code (expected above 0)")
+    if not CHECK.fullmatch(values[5]):
+        raise InputError(f"BUF: {values[5][:20]!a} is no CRC (expected 0x and 8 digits)")
+    try:
+        raw = binascii.a2b_base64(values[6].encode("ascii"), strict_mode=True)
+    except (binascii.Error, ValueError) as problem:
+        raise InputError(f"BUF: not base64: {problem}") from problem
+    if len(raw) != 2 * samples * cycles:
+        raise InputError(
+            f"BUF: {len(raw)} bytes came (expected {2 * samples * cycles} of {cycles} x {samples} samples)"
+        )
+    if zlib.crc32(raw) != int(values[5], 16):
+        raise InputError(f"BUF: CRC is 0x{zlib.crc32(raw):08x}, not {values[5]}: damaged on its way")
+    return BufferRead(cube, _ticks(reply), sampling, volts, np.frombuffer(raw, dtype="<i2"))
+
+
+def measurement_of(reply: Reply) -> Measurement:
+    """What a CMEAS says.
+
+    Raises InputError: refused by the ranger, another form, or numbers that are none.
+    """
+    values = _values(reply, "CMEAS", 6)
+    amplitude = _real(values[3], "CMEAS's amplitude", LARGEST_V)
+    return Measurement(
+        _whole(values[1], "CMEAS's cube"), values[2], _ticks(reply), amplitude, _real(values[4], "CMEAS's phase", 100.0)
+    )
+
+
+def shot_of(ranger: str, target: str, measured: Measurement, buffer: BufferRead | None, usual: Sampling) -> LiveShot:
+    """A shot from its two replies; `usual` is how it was taken where the buffer itself did not come."""
+    sampling = usual if buffer is None else buffer.sampling
+    return LiveShot(
+        ranger,
+        target,
+        measured.ticks,
+        sampling.cycles,
+        sampling.samples,
+        sampling.frequency_hz,
+        float("nan") if buffer is None else buffer.volts_per_code,
+        None if buffer is None else buffer.samples,
+        measured.amplitude,
+        measured.phase,
+    )
+
+
+def reals_of(reply: Reply, count: int) -> tuple[float, ...]:
+    """The last so many values of a reply as numbers.
+
+    Raises InputError: fewer, or not numbers.
+    """
+    if reply.ok is not True or len(reply.values) < count:
+        raise InputError(f"{reply.command}: {reply.text[:200]!a} (expected {count} numbers)")
+    return tuple(_real(v, reply.command, math.inf) for v in reply.values[-count:])
+
+
+def _values(reply: Reply, command: str, count: int) -> tuple[str, ...]:
+    if reply.ok is not True:
+        raise InputError(f"{command}: {reply.text[:200]}")
+    if reply.command != command or len(reply.values) != count:
+        raise InputError(f"{reply.command} with {len(reply.values)} values (expected {command} with {count})")
+    return reply.values
+
+
+def _ticks(reply: Reply) -> int:
+    if reply.ticks is None:
+        raise InputError(f"{reply.command} has no stamp (expected the trigger's time)")
+    return reply.ticks
+
+
+def _whole(text: str, what: str) -> int:
+    if not WHOLE.fullmatch(text):
+        raise InputError(f"{what}: {text[:20]!a} is no whole number")
+    return int(text)
+
+
+def _real(text: Any, what: str, most: float) -> float:
+    if not REAL.fullmatch(text) or not abs(float(text)) <= most or not math.isfinite(float(text)):
+        raise InputError(f"{what}: {text[:20]!a} is no number within {most:g}")
+    return float(text)

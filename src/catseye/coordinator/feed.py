@@ -1,0 +1,291 @@
+"""What the coordinator hears of the world: the site's feed of weather and posture, or a motion from a script.
+
+The feed speaks in ZY lines, unasked:
+
+    0<TAB>TS<TAB>WX 1, station, temperature_c, pressure_hpa, humidity_percent      none where a sensor says nothing
+    0<TAB>TS<TAB>TEL 1, azimuth_deg, elevation_deg, azimuth_rate_deg_s, elevation_rate_deg_s
+
+An observatory that has its own weather and position writes these two lines.
+"""
+
+import asyncio
+import csv
+import io
+import math
+import random
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
+from catseye.errors import InputError
+from catseye.ranger.client import ZyClient
+from catseye.ranger.line import Reply
+from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveWeather
+
+REAL = re.compile(r"[+-]?[0-9]{1,9}(\.[0-9]{0,20})?([eE][+-]?[0-9]{1,2})?")
+STATION = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
+LOOK = 0.5  # s between two looks for silence
+SKEW = 5.0  # s that a reading's stamp may be from now
+MOST_STATIONS = 64
+WEATHER_LIMITS = ((-90.0, 90.0), (300.0, 1200.0), (0.0, 110.0))  # deg C, hPa, %: beyond is no reading
+COLUMNS = ("mjd", "azimuth_deg", "elevation_deg")
+
+
+@dataclass(frozen=True)
+class FeedSettings:
+    """Times in s: silence that is told, and the waits before a connection is tried again."""
+
+    weather_silent: float = 60.0
+    telescope_silent: float = 2.0
+    first_wait: float = 0.2
+    longest_wait: float = 30.0
+    connect_timeout: float = 3.0
+
+
+class FeedClient:
+    """Listens to a feed.
+
+    weather, posture   called with each reading, in the order they came
+    stations           that should speak; those of the feed are added
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        clock: Clock,
+        tell: Tell,
+        weather: Callable[[LiveWeather], None],
+        posture: Callable[[LivePosture], None],
+        stations: tuple[str, ...] = (),
+        settings: FeedSettings | None = None,
+        seed: int = 0,
+        network: Any = None,
+    ):
+        self.host, self.port, self._settings = host, port, settings or FeedSettings()
+        self._clock, self._weather, self._posture = clock, weather, posture
+        self._tell, self._herald = tell, Herald("feed", clock, tell)
+        self._rng = random.Random(f"{seed} feed")
+        self._network = {} if network is None else {"network": network}
+        self._stations = {name: Herald(name, clock, tell) for name in stations}
+        self._telescope = Herald("telescope", clock, tell)
+        self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
+        self._stamps: dict[str, int] = {}
+        self._began: float | None = None
+
+    @property
+    def telescope_known(self) -> bool:
+        """Whether the posture is fresh."""
+        heard = self._heard.get("")
+        return heard is not None and asyncio.get_running_loop().time() - heard <= self._settings.telescope_silent
+
+    async def run(self) -> None:
+        """Connect, listen, connect again; until cancelled."""
+        self._began = asyncio.get_running_loop().time()
+        looking = asyncio.ensure_future(self._look())
+        try:
+            wait = self._settings.first_wait
+            while True:
+                client = None
+                try:
+                    async with asyncio.timeout(self._settings.connect_timeout):
+                        client = await ZyClient.connect(
+                            self.host,
+                            self.port,
+                            heard=self.hear,
+                            clock=asyncio.get_running_loop().time,
+                            **self._network,
+                        )
+                except InputError as problem:
+                    why = str(problem).replace("no ranger", "no feed")
+                except TimeoutError:
+                    why = f"{self.host} port {self.port} does not answer"
+                if client is not None:
+                    self._herald.standing("feed-lost", None, over="the site's feed is connected")
+                    why, wait = await self._listen(client), self._settings.first_wait
+                self._herald.standing("feed-lost", f"{why}; trying again", "warning")
+                await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
+                wait = min(2.0 * wait, self._settings.longest_wait)
+        finally:
+            looking.cancel()
+
+    async def _listen(self, client: ZyClient) -> str:
+        """Until the connection is over; one that says nothing at all is given up."""
+        patience = max(self._settings.weather_silent, self._settings.telescope_silent)
+        try:
+            while not client.closed.done():
+                await asyncio.wait([client.closed], timeout=self._settings.weather_silent)
+                client.check()
+                last = max(self._heard.values(), default=self._began or 0.0)
+                if asyncio.get_running_loop().time() - last > 2.0 * patience and not client.closed.done():
+                    return f"nothing was read for {2.0 * patience:g} s"
+            return client.closed.result()
+        finally:
+            client.close()
+
+    async def _look(self) -> None:
+        """Who is silent."""
+        while True:
+            await asyncio.sleep(LOOK)
+            self.look()
+
+    def look(self) -> None:
+        """Tell who has been silent for too long, and who speaks again."""
+        now, limit = asyncio.get_running_loop().time(), self._settings.telescope_silent
+        began = now if self._began is None else self._began
+        silent = now - self._heard.get("", began)
+        text = f"no posture for {limit:g} s: tracking stops, fixed targets go on" if silent > limit else None
+        self._telescope.standing("telescope-silent", text, "alarm", over="the telescope tells its posture again")
+        limit = self._settings.weather_silent
+        for name, herald in self._stations.items():
+            silent = now - self._heard.get(name, began)
+            text = (
+                f"{name} has said nothing for {limit:g} s (see to the station or its line)" if silent > limit else None
+            )
+            herald.standing("weather-silent", text, over=f"{name} speaks again")
+
+    def hear(self, reply: Reply) -> None:
+        """A line of the feed; what cannot be read is told, and not used."""
+        try:
+            if reply.command == "WX":
+                self._take_weather(weather_of(reply))
+            elif reply.command == "TEL":
+                self._take_posture(posture_of(reply))
+        except InputError as problem:
+            self._herald.tell("bad-reading", str(problem), "warning", about=reply.command)
+
+    def _take_weather(self, read: LiveWeather) -> None:
+        if not self._fresh(read.station, read.ticks):
+            return
+        if read.station not in self._stations:
+            if len(self._stations) >= MOST_STATIONS:
+                raise InputError(f"WX: station {read.station} is one too many (expected at most {MOST_STATIONS})")
+            self._stations[read.station] = Herald(read.station, self._clock, self._tell)
+        if not math.isnan(read.temperature_c + read.pressure_hpa + read.humidity_percent):
+            self._heard[read.station] = asyncio.get_running_loop().time()
+        self._weather(read)
+
+    def _take_posture(self, read: LivePosture) -> None:
+        if self._fresh("", read.ticks):
+            self._heard[""] = asyncio.get_running_loop().time()
+            self._posture(read)
+
+    def _fresh(self, who: str, ticks: int) -> bool:
+        """Whether a stamp is later than the last and not far from now."""
+        skew = (ticks - ticks_now(self._clock)) / TICKS_PER_SECOND
+        text = f"{who or 'the telescope'}'s stamps are {skew:+.1f} s from now (limit {SKEW:g} s): not used"
+        self._herald.standing(f"feed-clock-{who or 'telescope'}", text if abs(skew) > SKEW else None)
+        if abs(skew) > SKEW or ticks <= self._stamps.get(who, -1):
+            return False
+        self._stamps[who] = ticks
+        return True
+
+
+def weather_of(reply: Reply) -> LiveWeather:
+    """A WX line. Raises InputError: another form, or a reading that none can be."""
+    values = _values(reply, 4)
+    if not STATION.fullmatch(values[0]):
+        raise InputError(f"WX: station {values[0][:20]!a} is no name")
+    read = []
+    for text, (low, high), what in zip(values[1:], WEATHER_LIMITS, ("deg C", "hPa", "%"), strict=True):
+        value = math.nan if text.lower() == "none" else _real(text, "WX")
+        if not (math.isnan(value) or low <= value <= high):
+            raise InputError(f"WX: {values[0]}: {text} {what} is outside {low:g} to {high:g}")
+        read.append(value)
+    return LiveWeather(values[0], int(reply.ticks or 0), *read)
+
+
+def posture_of(reply: Reply) -> LivePosture:
+    """A TEL line. Raises InputError: another form, or angles that no telescope has."""
+    angles = [_real(text, "TEL") for text in _values(reply, 4)]
+    for angle, (low, high) in zip(angles, ((-360.0, 720.0), (-90.0, 180.0), (-10.0, 10.0), (-10.0, 10.0)), strict=True):
+        if not low <= angle <= high:
+            raise InputError(f"TEL: {angle:g} deg is outside {low:g} to {high:g}")
+    return LivePosture(int(reply.ticks or 0), *(angle * DEGREE for angle in angles))
+
+
+class MotionScript:
+    """A motion known beforehand, instead of a feed.
+
+    mjd                  (n,) days, rising; n = 1 stands still for ever
+    azimuth, elevation   (n,) rad, linear between; held at the ends
+    """
+
+    def __init__(self, mjd: NDArray[np.float64], azimuth: NDArray[np.float64], elevation: NDArray[np.float64]):
+        self.mjd, self.azimuth, self.elevation = mjd, azimuth, elevation
+
+    @staticmethod
+    def parse(text: str) -> "MotionScript":
+        """`fixed AZ EL` in degrees, or the path of a table mjd,azimuth_deg,elevation_deg.
+
+        Raises InputError with what was wrong and what was expected.
+
+        >>> MotionScript.parse("fixed 145.3 30").at(5288900000000).elevation
+        0.5235987755982988
+        """
+        words = text.split()
+        if len(words) == 3 and words[0] == "fixed":
+            angles = np.array([[_real(word, f"motion {text!a}")] for word in words[1:]]) * DEGREE
+            return MotionScript(np.zeros(1), *angles)
+        try:
+            table = Path(text).read_text("utf-8")
+        except (OSError, ValueError) as problem:
+            raise InputError(f"motion {text!a} is no file that can be read (expected it, or fixed AZ EL)") from problem
+        return MotionScript.of_table(table, text)
+
+    @staticmethod
+    def of_table(table: str, name: str) -> "MotionScript":
+        """From the text of a table. Raises InputError with its line."""
+        rows = list(csv.reader(io.StringIO(table)))
+        if not rows or tuple(word.strip() for word in rows[0]) != COLUMNS:
+            raise InputError(f"{name} line 1: expected {','.join(COLUMNS)}")
+        values: list[list[float]] = []
+        for number, row in enumerate(rows[1:], 2):
+            if len(row) != 3:
+                raise InputError(f"{name} line {number}: {len(row)} values (expected {','.join(COLUMNS)})")
+            values.append([_real(word.strip(), f"{name} line {number}") for word in row])
+            if len(values) > 1 and values[-1][0] <= values[-2][0]:
+                raise InputError(f"{name} line {number}: mjd {row[0]} is not later than the line before")
+        if not values:
+            raise InputError(f"{name} holds no line of motion (expected one at least)")
+        mjd, azimuth, elevation = np.array(values).T
+        return MotionScript(mjd, azimuth * DEGREE, elevation * DEGREE)
+
+    def at(self, ticks: int) -> LivePosture:
+        """Angles and rates at a time."""
+        day = ticks / TICKS_PER_DAY
+        k = int(np.searchsorted(self.mjd, day, side="right"))
+        angles = [float(np.interp(day, self.mjd, column)) for column in (self.azimuth, self.elevation)]
+        if not 0 < k < len(self.mjd):
+            return LivePosture(ticks, *angles)
+        span = (self.mjd[k] - self.mjd[k - 1]) * SECONDS_PER_DAY
+        rates = [float(column[k] - column[k - 1]) / float(span) for column in (self.azimuth, self.elevation)]
+        return LivePosture(ticks, *angles, *rates)
+
+
+async def play(script: MotionScript, clock: Clock, posture: Callable[[LivePosture], None], every: float = 0.1) -> None:
+    """Give a script's postures at 10 Hz, until cancelled."""
+    while True:
+        posture(script.at(ticks_now(clock)))
+        await asyncio.sleep(every)
+
+
+def _values(reply: Reply, count: int) -> tuple[str, ...]:
+    if reply.ok is not True or len(reply.values) != count or reply.ticks is None:
+        raise InputError(f"{reply.command} {reply.text[:60]!a} (expected {count} values and a stamp)")
+    return reply.values
+
+
+def _real(text: str, what: str) -> float:
+    if not REAL.fullmatch(text):
+        raise InputError(f"{what}: {text[:20]!a} is no number")
+    return float(text)

@@ -1,0 +1,180 @@
+"""Each ranger at its own list: shots of a round one after another, or one target again and again; and who rests."""
+
+import asyncio
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.intake import Intake
+from catseye.coordinator.journal_entries import AnsweredShot
+from catseye.coordinator.link import RangerLink
+from catseye.coordinator.modes import Suspensions
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, LiveReduction, PlannedShot, Round, ticks_now
+from catseye.errors import CatseyeError
+from catseye.ranger.initialisation import frame_of
+from catseye.records.live import TICKS_PER_DAY
+from catseye.records.site_folder import REFERENCE, SiteFolder
+
+GOOD = frozenset(["used", "reference"])
+OF_THE_LINE = frozenset(["blocked", "clipped", "dead", "dropout", "stuck", "refused"])  # its own fault
+FAILURES = 3  # in a row, on whatever target, until a ranger counts as failing
+STREAM_COUNT = 20  # buffers for each pointing of a stream
+STREAM_LEAD = 0.1  # s
+AT_REST = 1e-6  # m/s: a target slower than this is pointed at, not followed
+
+
+class Firing:
+    """Who shoots what.
+
+    allowed           whether anything may be fired
+    telescope_known   whether targets that move can be followed
+
+    `dropped` are left out on purpose; `streams` has a target by ranger; `since_reference` is by `references`, ticks;
+    `broken` is done when a task ended by a mistake of ours.
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        links: Mapping[str, RangerLink],
+        *,
+        intake: Intake,
+        live: LiveReduction,
+        herald: Herald,
+        clock: Clock,
+        allowed: Callable[[], bool],
+        telescope_known: Callable[[], bool],
+    ):
+        self._site, self._links, self._live, self._intake = site, links, live, intake
+        self._herald, self._clock = herald, clock
+        self._allowed, self._telescope_known = allowed, telescope_known
+        self.dropped: set[str] = set()
+        self.streams: dict[str, str] = {}
+        self.suspensions = Suspensions()
+        self.last_status: dict[str, str] = {}
+        self.references: dict[str, int] = {}
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        self.broken: asyncio.Future[None] | None = None
+
+    def ready(self, now: int) -> tuple[str, ...]:
+        """Rangers that can have a list now."""
+        return tuple(name for name in self._links if name not in self.streams and self._free(name, now))
+
+    def begin(self, planned: Round) -> None:
+        """Give each ranger its list."""
+        for ranger, shots in planned.shots.items():
+            if ranger in self._links and self._free(ranger, ticks_now(self._clock)):
+                self._start(ranger, self._list(ranger, shots, planned.end_ticks))
+
+    def begin_streams(self) -> None:
+        """Streams that are asked for and do not run."""
+        for ranger, target in self.streams.items():
+            if self._free(ranger, ticks_now(self._clock)):
+                self._start(ranger, self._stream(ranger, target))
+
+    async def done(self, rangers: Sequence[str], seconds: float) -> None:
+        """Wait until rangers are done with what they have, or so long."""
+        tasks = [self._tasks[ranger] for ranger in rangers if ranger in self._tasks]
+        if tasks:
+            await asyncio.wait(tasks, timeout=seconds)
+
+    async def stop(self) -> None:
+        """Give up all that is under way."""
+        tasks = list(self._tasks.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def judged(self, answered: AnsweredShot) -> None:
+        """What the reduction said of a shot: lines that are blocked again and again rest."""
+        shot, now = answered.shot, answered.shot.ticks
+        self.last_status[shot.ranger] = answered.status
+        if answered.status in GOOD:
+            self.suspensions.good(shot.ranger, shot.target)
+            self.suspensions.good(shot.ranger, "")
+            if shot.target == REFERENCE:
+                self.references[shot.ranger] = now
+        elif answered.status in OF_THE_LINE:
+            line = f"{shot.ranger} {shot.target}"
+            text = f"{line}: {answered.text or answered.status}"
+            self._herald.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+            self._line_failed(shot.ranger, shot.target, answered.status)
+
+    # Inside ---------------------------------------------------------------------------------------------------------
+
+    def _free(self, ranger: str, now: int) -> bool:
+        busy, link = self._tasks.get(ranger), self._links[ranger]
+        idle = (busy is None or busy.done()) and link.ready
+        return idle and ranger not in self.dropped and not self.suspensions.resting(ranger, "", now)
+
+    def _start(self, ranger: str, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work, name=f"shots {ranger}")
+        task.add_done_callback(self._ended)
+        self._tasks[ranger] = task
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        problem = None if task.cancelled() else task.exception()
+        if problem is not None and self.broken is not None and not self.broken.done():
+            self.broken.set_exception(problem)
+
+    def _may_go_on(self, ranger: str) -> bool:
+        return self._allowed() and ranger not in self.dropped
+
+    async def _list(self, ranger: str, shots: Sequence[PlannedShot], end_ticks: int) -> None:
+        """A ranger's shots of a round, one after another."""
+        for planned in shots:
+            if max(ticks_now(self._clock), planned.begin_ticks) >= end_ticks or not self._may_go_on(ranger):
+                return
+            if not planned.fixed and not self._telescope_known():
+                continue
+            if not await self._fire(planned, 1) and not self._failed(ranger, planned.target):
+                return
+
+    async def _stream(self, ranger: str, target: str) -> None:
+        """One target again and again."""
+        while self.streams.get(ranger) == target and self._may_go_on(ranger):
+            try:
+                planned = self._aim(ranger, target)
+            except CatseyeError as problem:
+                self._herald.tell("no-place", f"{ranger} {target}: {problem}", "warning", about=ranger)
+                return
+            if not planned.fixed and not self._telescope_known():
+                return
+            if not await self._fire(planned, STREAM_COUNT):
+                self._failed(ranger, target)
+                return
+
+    async def _fire(self, planned: PlannedShot, count: int) -> int:
+        return await self._links[planned.ranger].stream(planned, self._intake.take, count=count)
+
+    def _failed(self, ranger: str, target: str) -> bool:
+        """A shot did not come; whether the ranger goes on."""
+        link, now = self._links[ranger], ticks_now(self._clock)
+        if not link.connected:
+            return False
+        self._line_failed(ranger, target, "without a shot")
+        rest = self.suspensions.failed(ranger, "", now) if link.failures >= FAILURES else None
+        if rest is not None:
+            text = f"{ranger} failed {link.failures} times in a row: left alone for {rest:g} s"
+            self._herald.tell("ranger-suspended", text, "alarm", about=ranger, ranger=ranger)
+        return not self.suspensions.resting(ranger, "", now)
+
+    def _line_failed(self, ranger: str, target: str, how: str) -> None:
+        rest = self.suspensions.failed(ranger, target, ticks_now(self._clock))
+        if rest is not None:
+            line = f"{ranger} {target}"
+            text = f"{line} is {how} again and again: left alone for {rest:g} s"
+            self._herald.tell("line-suspended", text, "warning", about=line, ranger=ranger, target=target)
+
+    def _aim(self, ranger: str, target: str) -> PlannedShot:
+        """A shot as soon as it can be, on where the target is predicted; on the feed arm, where the records have it."""
+        duration = self._links[ranger].sampling.duration
+        begin = ticks_now(self._clock) + round(STREAM_LEAD * TICKS_PER_SECOND)
+        if target == REFERENCE or frame_of(self._site, ranger) == "reflector":
+            return PlannedShot(ranger, target, begin, duration, np.zeros(3), np.zeros(3), True, "stream")
+        mjd = np.array([begin, begin + duration * TICKS_PER_SECOND]) / TICKS_PER_DAY
+        first, last = self._live.place(target, mjd)
+        fixed = bool(np.linalg.norm(last - first) < AT_REST * duration)
+        return PlannedShot(ranger, target, begin, duration, first, last, fixed, "stream")

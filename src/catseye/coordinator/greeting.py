@@ -1,0 +1,54 @@
+"""The three lines with which a ranger greets, HELLO, CONNECT, STW: whether it is the right one, and the port free."""
+
+import asyncio
+from typing import Any
+
+from catseye.ranger.line import Reply
+
+LINES = frozenset(["HELLO", "CONNECT", "STW"])
+
+
+class Greeting:
+    """Of one new connection; `stranger` where another ranger answered."""
+
+    def __init__(self) -> None:
+        self._replies: dict[str, Reply] = {}
+        self._whole = asyncio.Event()
+        self.stranger = False
+
+    def hear(self, reply: Reply) -> None:
+        """A line that came unasked."""
+        if self._whole.is_set() or reply.command not in LINES:
+            return
+        self._replies[reply.command] = reply
+        if set(self._replies) == LINES or (reply.command == "CONNECT" and reply.ok is not True):
+            self._whole.set()
+
+    async def verdict(self, ranger: str, port: int, closed: "asyncio.Future[str]", limit: float) -> str | None:
+        """What is wrong with a connection; None where it can be used.
+
+        closed   done when the connection is over
+        limit    s
+        """
+        await first_of(closed, self._whole, limit)
+        if not self._whole.is_set():
+            return (
+                f"port {port}: {closed.result()}"
+                if closed.done()
+                else f"hung: port {port} did not greet in {limit:g} s"
+            )
+        if self._replies["CONNECT"].ok is not True:
+            return f"port {port} is taken"
+        hello = self._replies["HELLO"].text
+        self.stranger = hello.split()[2:3] != [ranger]
+        return f"port {port} greets with {hello[:60]!a} (expected {ranger})" if self.stranger else None
+
+
+async def first_of(closed: "asyncio.Future[str]", event: asyncio.Event, seconds: float) -> None:
+    """Wait for the end of a connection, for an event, or so long."""
+    waiting = asyncio.ensure_future(event.wait())
+    ends: list[asyncio.Future[Any]] = [closed, waiting]
+    try:
+        await asyncio.wait(ends, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        waiting.cancel()

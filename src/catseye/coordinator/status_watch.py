@@ -1,0 +1,41 @@
+"""What a ranger's status word tells, each thing once."""
+
+from collections.abc import Callable
+
+from catseye.coordinator.herald import Herald
+from catseye.ranger.status import Status
+
+NEEDED = Status.INITIALISED | Status.AZIMUTH_HOMED | Status.ELEVATION_HOMED | Status.AUTO
+
+
+class StatusWatch:
+    """The words of one ranger.
+
+    lost   called when it cannot measure any more as it is: home or geometry gone
+    """
+
+    def __init__(self, ranger: str, herald: Herald, lost: Callable[[str], None]):
+        self.ranger, self._herald, self._lost = ranger, herald, lost
+        self.word = Status(0)
+
+    def hear(self, text: str) -> None:
+        """A new word, as it travels; one that is none is told, and not used."""
+        try:
+            word = Status(int(text[:12], 16) & 0xFFFFFFFF)
+        except ValueError:
+            self._herald.tell("bad-line", f"{self.ranger}: STW {text[:20]!a} is no status word", "warning")
+            return
+        before, self.word = self.word, word
+        for axis, bit in enumerate((Status.AZIMUTH_OFF, Status.ELEVATION_OFF)):
+            text = f"the motor of axis {axis} went off: position error past its limit (see whether it turns freely)"
+            self._herald.standing(
+                f"motor-off-{axis}", text if word & bit else None, over=f"the motor of axis {axis} is on"
+            )
+        free = "its clock has no time signal" if word & Status.CLOCK_FREE else None
+        self._herald.standing("clock-free", free, over="its clock follows the time signal")
+        if word & Status.CLIPPED and not before & Status.CLIPPED:
+            self._herald.tell(
+                "saturated", "its converter is at its ends (weaken the return, see the amplifier)", "warning"
+            )
+        if NEEDED & ~word:
+            self._lost(f"{self.ranger} lost home, geometry or Auto mode (status 0x{word:08x})")

@@ -1,0 +1,316 @@
+"""The ZIY: asks the planner what to shoot, has each ranger shoot it, gives what comes back to reduction and journal.
+
+One asyncio loop. Each ranger goes through its list of a round by itself; when the round's time is over, the next one is
+planned and begun, and then the epoch is solved while the mirrors turn.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from catseye.coordinator.decode import measurement_of, shot_of
+from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
+from catseye.coordinator.firing import Firing
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.intake import Entry, Intake
+from catseye.coordinator.link import RangerLink
+from catseye.coordinator.link_settings import Address, LinkSettings, Wanted
+from catseye.coordinator.modes import Mode
+from catseye.coordinator.parts import (
+    TICKS_PER_SECOND,
+    Clock,
+    JournalWriter,
+    LiveReduction,
+    Planner,
+    Round,
+    SafetyGuard,
+    SiteState,
+    ticks_now,
+)
+from catseye.coordinator.vigil import Vigil
+from catseye.errors import CatseyeError, InputError
+from catseye.ranger.initialisation import commands_of_ranger
+from catseye.ranger.line import Reply, Request
+from catseye.records.live import Happening, LivePosture
+from catseye.records.site_folder import SiteFolder
+
+WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
+
+
+@dataclass(frozen=True)
+class ZiySettings:
+    """Times in s.
+
+    posture_every   the reduction and the journal get no more postures than one each
+    idle            before it is asked again what to do, where nothing can be done
+    passive_every   between two epochs in passive mode
+    grace           past a round's end, for shots under way, before the next is planned without their rangers
+    leave           for lasers to be switched off at the end
+    """
+
+    posture_every: float = 0.1
+    idle: float = 0.25
+    passive_every: float = 10.0
+    grace: float = 0.4
+    leave: float = 3.0
+
+
+class Coordinator:
+    """A site's rangers, feed, reduction and journal.
+
+    addresses     of the rangers
+    feed          host and port of the site's feed, a script of a known motion, or None: no posture is ever known
+    mode          active: plans and fires; passive: hears what another client has measured; hold: connected, no more
+    commands      what initialises a ranger; None: from the site's records
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        *,
+        addresses: Mapping[str, Address],
+        live: LiveReduction,
+        planner: Planner,
+        guard: SafetyGuard,
+        journal: JournalWriter,
+        clock: Clock,
+        feed: tuple[str, int] | MotionScript | None = None,
+        mode: Mode = "active",
+        commands: Callable[[str], Sequence[Request]] | None = None,
+        settings: ZiySettings | None = None,
+        links: LinkSettings | None = None,
+        feeds: FeedSettings | None = None,
+        seed: int = 0,
+        network: Any = None,
+    ):
+        self.site, self.clock, self.mode, self.settings = site, clock, mode, settings or ZiySettings()
+        self._live, self._planner, self._journal = live, planner, journal
+        self._guard = guard
+        self.listeners: list[Callable[[Entry], None]] = []
+        self._herald = Herald("coordinator", clock, self._happened)
+        self.intake = Intake(
+            live,
+            journal,
+            judged=lambda answered: self.firing.judged(answered),
+            publish=self._publish,
+            herald=Herald("journal", clock, self._happened),
+        )
+        asked = commands or (lambda ranger: commands_of_ranger(site, ranger))
+        self.links = {
+            name: RangerLink(
+                name,
+                address,
+                commands=asked(name),
+                guard=guard,
+                clock=clock,
+                tell=self._happened,
+                wanted=WANTED[mode],
+                heard=self._overheard,
+                settings=links,
+                seed=seed,
+                network=network,
+            )
+            for name, address in sorted(addresses.items())
+        }
+        self.firing = Firing(
+            site,
+            self.links,
+            intake=self.intake,
+            live=live,
+            herald=self._herald,
+            clock=clock,
+            allowed=lambda: self.mode == "active" and self.intake.trouble is None,
+            telescope_known=lambda: self.telescope_known,
+        )
+        self._script = feed if isinstance(feed, MotionScript) else None
+        self.feed = (
+            FeedClient(
+                *feed,
+                clock=clock,
+                tell=self._happened,
+                weather=self.intake.take,
+                posture=self._posed,
+                stations=tuple(station.name for station in site.site.weather_station),
+                settings=feeds,
+                seed=seed,
+                network=network,
+            )
+            if isinstance(feed, tuple)
+            else None
+        )
+        self.posture: LivePosture | None = None
+        self.round_number = 0
+        self.answer: Any = None
+        self._solving: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    # Life -----------------------------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Measure until cancelled; then lasers off that were switched on here, and the journal closed, within 5 s."""
+        self._herald.tell(
+            "started", f"coordinator of {self.site.site.campaign.name}, {len(self.links)} rangers, {self.mode}"
+        )
+        for name, link in self.links.items():
+            self._spawn(link.run(), f"link {name}")
+        if self.feed is not None:
+            self._spawn(self.feed.run(), "feed")
+        if self._script is not None:
+            self._spawn(play(self._script, self.clock, self._posed, self.settings.posture_every), "script")
+        self._spawn(Vigil(self.links, self._guard, clock=self.clock, herald=self._herald).run(), "vigil")
+        self._spawn(self._rounds(), "rounds")
+        self.firing.broken = asyncio.get_running_loop().create_future()
+        try:
+            ended, _ = await asyncio.wait([*self._tasks, self.firing.broken], return_when=asyncio.FIRST_COMPLETED)
+            for part in ended:
+                await part  # none ends by itself: what it raises, a mistake of ours, is the coordinator's
+        finally:
+            await self._end()
+
+    def _spawn(self, work: Any, name: str) -> asyncio.Task[Any]:
+        task = asyncio.get_running_loop().create_task(work, name=name)
+        self._tasks.add(task)
+        return task
+
+    async def _end(self) -> None:
+        """No more shots, lasers off, connections closed, journal closed."""
+        await self.firing.stop()
+        leaving = [asyncio.ensure_future(link.leave(self.settings.leave)) for link in self.links.values()]
+        last = [] if self._solving is None else [self._solving]  # an epoch under way may come to its end meanwhile
+        if leaving or last:
+            await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.5)
+        for each in (*leaving, *last):
+            each.cancel()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._herald.tell("stopped", f"{self.intake.numbered} shots, {self.intake.acknowledged} acknowledged")
+        self.intake.flush()
+        with suppress(InputError):  # what could not be written has been told
+            await asyncio.to_thread(self._journal.close)
+
+    # Rounds ---------------------------------------------------------------------------------------------------------
+
+    async def _rounds(self) -> None:
+        while True:
+            self.intake.flush()  # the planner shall know how the last shots were
+            now = ticks_now(self.clock)
+            stopped = self.mode != "active" or self.intake.trouble is not None
+            planned = None if stopped else self._planned(now)
+            if planned is not None:
+                self.round_number += 1
+                self.firing.begin(planned)
+            if not stopped:
+                self.firing.begin_streams()
+            if self._solving is None or self._solving.done():
+                if self._solving is not None:
+                    self._solving.result()  # an epoch's own failure is told; anything else is the program's
+                self._solving = asyncio.get_running_loop().create_task(self._solve(now), name="epoch")
+            asked_again = asyncio.get_running_loop().time() + self.settings.idle
+            if planned is not None and planned.shots:
+                left = (planned.end_ticks - ticks_now(self.clock)) / TICKS_PER_SECOND
+                await self.firing.done(tuple(planned.shots), max(self.settings.idle, left + self.settings.grace))
+            elif self.mode == "passive":
+                asked_again += self.settings.passive_every
+            # a round may be over at once: nothing in it, or nothing that may be fired
+            await asyncio.sleep(max(0.0, asked_again - asyncio.get_running_loop().time()))
+
+    def _planned(self, now: int) -> Round | None:
+        state = self.state(now)
+        if state is None or not state.ready:
+            return None
+        try:
+            return self._planner.round(state)
+        except CatseyeError as problem:
+            self._herald.tell("not-planned", f"no round could be planned: {problem}", "alarm")
+            return None
+
+    def state(self, now: int) -> SiteState | None:
+        """What the planner is told; None before the posture is known."""
+        if self.posture is None:
+            return None
+        return SiteState(
+            now,
+            self.posture,
+            self.firing.ready(now),
+            {name: link.counts for name, link in self.links.items() if link.counts is not None},
+            self.firing.suspensions.lines(now),
+            {name: (now - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()},
+            self._live.place,
+            self._live.uncertainty(),
+        )
+
+    async def _solve(self, now: int) -> None:
+        answer = await self.intake.solve(now)
+        if answer is not None:
+            self.answer = answer
+
+    # What comes in --------------------------------------------------------------------------------------------------
+
+    @property
+    def telescope_known(self) -> bool:
+        """Whether targets that move can be followed."""
+        return self._script is not None or (self.feed is not None and self.feed.telescope_known)
+
+    def _posed(self, read: LivePosture) -> None:
+        every = (self.settings.posture_every - 1e-3) * TICKS_PER_SECOND  # a stamp has steps
+        if self.posture is None or read.ticks - self.posture.ticks >= every:
+            self.posture = read
+            self._guard.telescope(read)
+            self.intake.take(read)
+
+    def _overheard(self, link: RangerLink, reply: Reply) -> None:
+        """Another client's shot, in passive mode."""
+        if self.mode != "passive" or reply.ok is not True:
+            return
+        try:
+            found = measurement_of(reply)
+            self.intake.take(shot_of(link.ranger, link.names.get(found.cube, found.name), found, None, link.sampling))
+        except InputError as problem:
+            self._herald.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
+
+    def _happened(self, happening: Happening) -> None:
+        self.intake.take(happening)
+
+    def _publish(self, entry: Entry) -> None:
+        for listener in self.listeners:
+            listener(entry)
+
+    # What people ask for --------------------------------------------------------------------------------------------
+
+    def set_mode(self, mode: Mode) -> None:
+        """Active, passive, hold; shots under way come to their end."""
+        self.mode = mode
+        for name, link in self.links.items():
+            link.wanted = "hold" if name in self.firing.dropped and mode == "active" else WANTED[mode]
+        self._herald.tell("mode", f"mode is {mode}", always=True)
+
+    def drop(self, ranger: str) -> None:
+        """Leave a ranger out; it stays connected. Raises InputError: no such ranger."""
+        self._known(ranger)
+        self.firing.dropped.add(ranger)
+        self.links[ranger].wanted = "hold" if self.mode == "active" else WANTED[self.mode]
+        self._herald.tell("dropped", f"{ranger} is left out on purpose", always=True, ranger=ranger)
+
+    def take(self, ranger: str) -> None:
+        """Use a ranger again. Raises InputError: no such ranger."""
+        self._known(ranger)
+        self.firing.dropped.discard(ranger)
+        self.links[ranger].wanted = WANTED[self.mode]
+        self._herald.tell("taken", f"{ranger} is used again", always=True, ranger=ranger)
+
+    def stream(self, ranger: str, target: str | None) -> None:
+        """Have a ranger measure one target again and again; None ends it. Raises InputError: not known."""
+        self._known(ranger)
+        if target is None:
+            self.firing.streams.pop(ranger, None)
+            return
+        if target not in self.links[ranger].preparation.numbers:
+            raise InputError(f"{ranger} does not know {target[:20]!a} (expected one of its cubes)")
+        self.firing.streams[ranger] = target
+
+    def _known(self, ranger: str) -> None:
+        if ranger not in self.links:
+            raise InputError(f"{ranger[:20]!a} is no ranger here (expected one of {', '.join(self.links)})")

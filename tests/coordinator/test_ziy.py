@@ -1,0 +1,439 @@
+"""The coordinator's loop on real servers with scripted heads; its reduction, planner and journal write down."""
+
+import asyncio
+from dataclasses import dataclass
+
+import pytest
+
+from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.errors import EstimationError, InputError
+from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+from coordinator.link_scene import MemoryJournal, run, until
+from coordinator.ziy_scene import ListLive, ListPlanner, Site, posture, weather
+
+
+def of(rows, kind):
+    return [row for row in rows if isinstance(row, kind)]
+
+
+def test_rounds_are_shot_reduced_journalled_and_acknowledged():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs >= 3)
+            shots = of(site.journal.rows, AnsweredShot)
+            assert [s.shot.number for s in shots] == list(range(1, len(shots) + 1))
+            assert {(s.shot.ranger, s.shot.target) for s in shots} == {
+                (r, t) for r in site.names for t in ("ZRG", "ZG11", "ZG12")
+            }
+            assert all(s.shot.samples is not None for s in shots)
+            assert all(s.status == ("reference" if s.shot.target == "ZRG" else "used") for s in shots)
+            solutions = of(site.journal.rows, Solution)
+            assert [s.answer["number"] for s in solutions][:3] == [1, 2, 3]
+            used = [n for s in solutions for n in s.answer["used"]]
+            assert used == list(range(1, len(used) + 1))  # each shot in one epoch, and in order
+            assert site.ziy.intake.acknowledged == site.ziy.intake.numbered
+            assert site.published == site.journal.rows
+            assert site.planner.states[-1].since_reference["ZY101"] < 10.0
+            assert set(site.planner.states[-1].counts) == set(site.names)
+
+    run(story)
+
+
+def test_the_journals_order_is_that_in_which_the_reduction_was_fed():
+    async def story():
+        async with Site() as site:
+            for _ in range(40):
+                site.ziy.intake.take(weather())
+                await asyncio.sleep(0.13)
+            site.ziy.intake.flush()
+            fed = [(type(x), x.ticks) for x in site.live.fed]
+            rows = [r.shot if isinstance(r, AnsweredShot) else r for r in site.journal.rows]
+            kept = [(type(x), x.ticks) for x in rows if isinstance(x, LiveShot | LiveWeather | LivePosture)]
+            assert fed == kept
+            assert {kind for kind, _ in fed} == {LiveShot, LiveWeather, LivePosture}
+
+    run(story)
+
+
+def test_cancelled_it_switches_lasers_off_and_closes_the_journal_within_five_seconds():
+    async def story():
+        async with Site(ready=False) as site:
+            for served in site.served.values():
+                served.head.switch_laser(False)
+            await until(lambda: all(link.state == "ready" for link in site.ziy.links.values()))
+            for served in site.served.values():
+                served.light()
+            await until(lambda: site.live.shots)
+            assert all(served.head.laser_on() for served in site.served.values())
+            began = asyncio.get_running_loop().time()
+            await site.end()
+            assert asyncio.get_running_loop().time() - began < 5.0
+            await asyncio.sleep(0.1)
+            assert not any(served.head.laser_on() for served in site.served.values())
+            assert not any(served.server.connections for served in site.served.values())
+            assert site.journal.closed
+            assert site.kinds()[-1] == "stopped"
+            left = {task.get_coro().__qualname__.split(".")[0] for task in asyncio.all_tasks()}
+            assert not left & {"Coordinator", "RangerLink", "FeedClient", "play"}
+
+    run(story)
+
+
+def test_a_new_coordinator_measures_again_within_five_seconds():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            await site.end()
+            site.journal, site.live = MemoryJournal(), ListLive()
+            began = asyncio.get_running_loop().time()
+            site.begin()
+            await until(lambda: of(site.journal.rows, AnsweredShot))
+            assert asyncio.get_running_loop().time() - began < 5.0
+            assert of(site.journal.rows, AnsweredShot)[0].shot.number == 1
+            assert not any("made ready" in h.text for h in of(site.journal.rows, Happening))
+
+    run(story)
+
+
+def test_a_ranger_that_dies_holds_nobody_up_and_comes_back():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            await site.served["ZY102"].stop()
+            rounds = site.ziy.round_number
+            began = asyncio.get_running_loop().time()
+            await until(lambda: site.ziy.round_number >= rounds + 5)
+            assert asyncio.get_running_loop().time() - began < 5 * (site.planner.period + 1.0) + 1.0
+            assert site.planner.states[-1].ready == ("ZY101",)
+            await site.served["ZY102"].start()
+            site.served["ZY102"].light()
+            await until(lambda: "ZY102" in site.planner.states[-1].ready)
+
+    run(story)
+
+
+def test_while_the_journal_is_away_nothing_is_fired_fed_or_acknowledged_and_all_goes_on_by_itself():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            site.journal.broken = "disk is full"
+            await asyncio.sleep(2.0)  # shots under way come to their end
+            fed, acknowledged = len(site.live.fed), site.ziy.intake.acknowledged
+            published = len(site.published)
+            fired = {name: s.head.inner.fired for name, s in site.served.items()}
+            await asyncio.sleep(30.0)
+            assert len(site.live.fed) == fed
+            assert site.ziy.intake.acknowledged == acknowledged
+            assert len(site.published) == published
+            assert {name: s.head.inner.fired for name, s in site.served.items()} == fired
+            site.journal.mend()
+            epochs = site.live.epochs
+            await until(lambda: site.live.epochs >= epochs + 2, 20.0)
+            assert site.ziy.intake.acknowledged == site.ziy.intake.numbered
+            assert {"journal-away", "journal-away-over"} <= set(site.kinds())
+            rows = [r.shot.number for r in site.journal.rows if isinstance(r, AnsweredShot)]
+            assert rows == sorted(set(rows)) == list(range(1, rows[-1] + 1))  # none lost, none twice
+            assert sorted(map(id, site.published)) == sorted(map(id, site.journal.rows))
+
+    run(story)
+
+
+def test_a_full_journal_that_refuses_an_append_loses_nothing_either():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            append, refusals = site.journal.append, []
+
+            def refuse(*items):
+                refusals.append(items)
+                raise InputError("20000 rows wait")
+
+            site.journal.append = refuse
+            await asyncio.sleep(8.0)
+            assert refusals
+            site.journal.append = append
+            await until(lambda: site.ziy.intake.trouble is None)
+            await until(lambda: site.ziy.intake.acknowledged == site.ziy.intake.numbered)
+            shots = [r.shot.number for r in site.journal.rows if isinstance(r, AnsweredShot)]
+            assert shots == list(range(1, site.ziy.intake.numbered + 1))
+
+    run(story)
+
+
+def test_without_a_posture_tracking_stops_and_fixed_targets_go_on(monkeypatch):
+    async def story():
+        async with Site(planner=ListPlanner(fixed=False)) as site:
+            await until(lambda: {s.target for s in site.live.shots} == {"ZRG", "ZG11", "ZG12"})
+            monkeypatch.setattr(type(site.ziy), "telescope_known", property(lambda self: False))
+            await asyncio.sleep(5.0)
+            count = len(site.live.shots)
+            await asyncio.sleep(15.0)
+            assert {s.target for s in site.live.shots[count:]} == {"ZRG"}
+
+    run(story)
+
+
+def test_nothing_is_planned_before_the_posture_is_known():
+    async def story():
+        async with Site(feed=None) as site:
+            await asyncio.sleep(5.0)
+            assert not site.planner.states
+            site.ziy._posed(posture())
+            await until(lambda: site.planner.states)
+
+    run(story)
+
+
+def test_postures_are_thinned_to_ten_a_second():
+    async def story():
+        async with Site(feed=None, mode="hold", ready=False) as site:
+            for _ in range(100):
+                site.ziy._posed(posture())
+                await asyncio.sleep(0.01)
+            assert 9 <= len(of(site.live.fed, LivePosture)) <= 11
+
+    run(story)
+
+
+def test_hold_fires_nothing_and_active_goes_on():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.shots)
+            site.ziy.set_mode("hold")
+            await asyncio.sleep(2.0)
+            count, asked = len(site.live.shots), len(site.guard.asked)
+            await asyncio.sleep(10.0)
+            assert len(site.live.shots) == count
+            assert len(site.guard.asked) == asked
+            site.ziy.set_mode("active")
+            await until(lambda: len(site.live.shots) > count + 3)
+
+    run(story)
+
+
+def test_a_passive_coordinator_takes_what_another_client_measures_and_changes_nothing():
+    async def story():
+        async with Site() as site:
+            passive = Site(mode="passive", ready=False)
+            passive.served = site.served
+            passive.begin()
+            await until(lambda: passive.live.epochs >= 2)
+            assert not [r for r in passive.guard.asked if r.command not in {"SUN"}]
+            assert {s.target for s in passive.live.shots} == {"ZRG", "ZG11", "ZG12"}
+            stamps = {(s.ranger, s.ticks): s for s in site.live.shots}
+            for shot in passive.live.shots:
+                assert shot.samples is None
+                assert shot.phase == pytest.approx(stamps[shot.ranger, shot.ticks].phase, abs=1e-7)
+            await passive.end()
+
+    run(story)
+
+
+def test_a_dropped_ranger_is_left_out_until_it_is_taken():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            site.ziy.drop("ZY101")
+            await asyncio.sleep(3.0)
+            count = len(site.live.shots)
+            await asyncio.sleep(10.0)
+            assert {s.ranger for s in site.live.shots[count:]} == {"ZY102"}
+            assert site.ziy.links["ZY101"].connected
+            site.ziy.take("ZY101")
+            await until(lambda: site.live.shots[-1].ranger == "ZY101")
+            with pytest.raises(InputError, match="ZY999"):
+                site.ziy.drop("ZY999")
+
+    run(story)
+
+
+def test_streams_measure_one_target_again_and_again():
+    async def story():
+        async with Site() as site:
+            for name in site.names:
+                site.ziy.stream(name, "ZG11")
+            await asyncio.sleep(5.0)
+            count = len(site.live.shots)
+            await asyncio.sleep(20.0)
+            rate = (len(site.live.shots) - count) / 20.0 / len(site.names)
+            assert 7.4 < rate <= 7.82  # 128 ms, and a gap of some ms; after 20 buffers it is begun anew
+            assert {s.target for s in site.live.shots[count:]} == {"ZG11"}
+            site.ziy.stream("ZY101", None)
+            await until(lambda: site.live.shots[-1].target == "ZRG")
+            with pytest.raises(InputError, match="NOWHERE"):
+                site.ziy.stream("ZY101", "NOWHERE")
+
+    run(story)
+
+
+def test_a_line_that_is_blocked_again_and_again_rests_and_is_tried_again():
+    async def story():
+        async with Site(("ZY101",), live=ListLive(ZG12="blocked")) as site:
+            line = ("ZY101", "ZG12")
+            await until(lambda: site.planner.states and line in site.planner.states[-1].suspended)
+            blocked = [s for s in site.live.shots if s.target == "ZG12"]
+            assert len(blocked) == 3
+            assert "line-suspended" in site.kinds()
+            del site.live.verdicts["ZG12"]
+            await until(lambda: line not in site.planner.states[-1].suspended)
+            await until(lambda: site.live.shots[-1].target == "ZG12")
+
+    run(story)
+
+
+def test_a_ranger_that_fails_again_and_again_rests_and_comes_back_by_itself():
+    async def story():
+        async with Site() as site:
+            bad = site.ziy.links["ZY101"]
+            await until(lambda: site.live.epochs)
+            head = site.served["ZY101"].head.inner
+            head.start = lambda *_, **__: False
+            await until(lambda: "ranger-suspended" in site.kinds())
+            begun = len(site.planner.states)
+            await asyncio.sleep(8.0)
+            assert len(site.planner.states) > begun
+            assert all("ZY101" not in state.ready for state in site.planner.states[begun:])
+            del head.start
+            shots = bad.shots
+            await until(lambda: bad.shots > shots + 3, 300.0)
+
+    run(story)
+
+
+def test_a_shot_whose_stamp_is_not_later_is_not_used():
+    async def story():
+        async with Site(("ZY101",)) as site:
+            await until(lambda: site.live.epochs)
+            site.served["ZY101"].head.offset = -0.05
+            last = site.live.shots[-1]
+            numbered = site.ziy.intake.numbered
+            site.ziy.intake.take(last)
+            site.ziy.intake.flush()
+            assert site.ziy.intake.numbered == numbered
+            assert "stamp-not-later" in site.kinds()
+
+    run(story)
+
+
+def test_what_planner_or_reduction_cannot_do_is_told_and_the_coordinator_goes_on():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs)
+            right = site.planner.round, site.live.take_in
+
+            def cannot(*_):
+                raise EstimationError("singular")
+
+            site.live.take_in, site.live.failed = lambda job, found: None, "singular"
+            await until(lambda: "not-solved" in site.kinds())
+            site.planner.round = cannot
+            await until(lambda: "not-planned" in site.kinds())
+            site.planner.round, site.live.take_in = right
+            epochs = site.live.epochs
+            await until(lambda: site.live.epochs > epochs)
+
+    run(story)
+
+
+def test_a_part_that_breaks_ends_the_coordinator_cleanly_with_its_own_error():
+    async def story():
+        async with Site(ready=False) as site:
+
+            def broken(state):
+                raise ZeroDivisionError("a mistake in the planner")
+
+            site.planner.round = broken
+            with pytest.raises(ZeroDivisionError):
+                await asyncio.wait_for(asyncio.shield(site.task), 30.0)
+            assert site.journal.closed
+            assert not any(link.connected for link in site.ziy.links.values())
+
+    run(story)
+
+
+def test_a_mistake_in_a_rangers_own_task_ends_the_coordinator_too():
+    async def story():
+        async with Site() as site:
+            site.live.place = lambda name, mjd: {}[name]
+            site.ziy.stream("ZY101", "ZG11")
+            with pytest.raises(KeyError):
+                await asyncio.wait_for(asyncio.shield(site.task), 30.0)
+            assert site.journal.closed
+
+    run(story)
+
+
+def test_rounds_in_which_nothing_can_be_fired_are_not_planned_without_a_pause():
+    async def story():
+        for targets, known in (((), True), (("ZG11",), False)):
+            async with Site(("ZY101",), planner=ListPlanner(targets=targets, fixed=False)) as site:
+                site.ziy.firing._telescope_known = lambda known=known: known
+                await asyncio.sleep(2.0)
+                begun = len(site.planner.states)
+                await asyncio.sleep(10.0)
+                assert 30 <= len(site.planner.states) - begun <= 41  # once in 0.25 s
+
+    run(story)
+
+
+def test_rangers_are_told_the_sun_every_few_seconds():
+    async def story():
+        async with Site(("ZY101",)) as site:
+            await asyncio.sleep(12.0)
+            assert site.served["ZY101"].ranger.sun_vector == (0.0, 0.0, 1.0)
+            assert sum(r.command == "SUN" for r in site.guard.asked) >= 2
+
+    run(story)
+
+
+def test_a_beam_that_the_sun_comes_to_is_parked_and_where_that_is_refused_the_laser_goes_off():
+    @dataclass(frozen=True)
+    class Alarm:
+        ranger: str
+        within: float
+        remedy: str
+        cause: str = "sun"
+        text: str = "the Sun comes"
+
+    async def story():
+        async with Site(("ZY101", "ZY102"), planner=ListPlanner(targets=())) as site:
+            head, other = (site.served[name].head for name in site.names)
+            site.guard.alarms = [Alarm("ZY101", 500.0, "move"), Alarm("ZY102", 500.0, "dark")]
+            await asyncio.sleep(5.0)
+            assert (head.actual(0), head.laser_on(), other.laser_on()) == (0, True, True)  # there is time
+            site.guard.alarms = [Alarm("ZY101", 30.0, "move")]
+            await until(lambda: head.actual(0) == -900)  # ZRG
+            assert head.laser_on()
+            site.guard.refused = ("CIL",)
+            await until(lambda: not head.laser_on(), 10.0)
+            site.guard.alarms, site.guard.refused = [Alarm("ZY102", 1.0, "dark")], ("CIL", "PS")
+            await asyncio.sleep(6.0)
+            assert other.laser_on()  # also this passes the guard, which here refuses
+            site.guard.refused = ()
+            await until(lambda: not other.laser_on(), 10.0)
+            site.guard.alarms = []
+            await until(lambda: head.laser_on() and other.laser_on(), 10.0)
+            assert "sun-comes" in site.kinds()
+
+    run(story)
+
+
+def test_the_guard_hears_what_rangers_answer_and_how_the_telescope_stands():
+    async def story():
+        async with Site(("ZY101",)) as site:
+            await until(lambda: site.live.epochs)
+            commands = {reply.command for _, reply in site.guard.replies}
+            assert {"ACP", "CIL", "CMEAS", "FHM", "STW"} <= commands
+            assert site.guard.posture.elevation == pytest.approx(0.5235987756)
+
+    run(story)
+
+
+def test_another_targets_failures_do_not_forgive_a_line():
+    async def story():
+        async with Site(("ZY101",), live=ListLive(ZG11="blocked", ZG12="used")) as site:
+            states = site.planner.states
+            await until(lambda: states and ("ZY101", "ZG11") in states[-1].suspended)
+            assert ("ZY101", "ZG12") not in site.planner.states[-1].suspended
+
+    run(story)
