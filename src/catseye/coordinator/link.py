@@ -6,7 +6,7 @@ wait has an end, and a connection that is gone is made again: after 0.2 s, then 
 
 import asyncio
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Literal
 
 from catseye.coordinator.clock_watch import ClockWatch
@@ -35,6 +35,7 @@ class RangerLink:
 
     ranger       name, as it must greet
     commands     that initialise it: geometry and cubes, from the site's records
+    later        names of cubes of which it is told before their first shot only
     wanted       "listen": ask and hear only, on the second port; "hold": connected, nothing sent that changes it;
                  "measure": made ready, and `fire` serves
     heard        called with what another client made it say (CMEAS ...)
@@ -48,6 +49,7 @@ class RangerLink:
         address: Address,
         *,
         commands: Sequence[Request],
+        later: Collection[str] = (),
         guard: SafetyGuard,
         clock: Clock,
         tell: Tell,
@@ -58,7 +60,8 @@ class RangerLink:
         network: Any = None,
     ):
         self.ranger, self.address, self.wanted = ranger, address, wanted
-        self.preparation = Preparation.of(commands)
+        self.preparation = Preparation.of(commands, later)
+        self.told: set[int] = set()  # cubes that it was told of on demand
         self.names = {number: name for name, number in self.preparation.numbers.items()}
         self.state: State = "down"
         self.sampling = Sampling()
@@ -209,6 +212,7 @@ class RangerLink:
         began, was_dark = loop.time(), bool(self.status & Status.LASER_OFF)
         try:
             self._teach_guard()
+            self.told.clear()
             sent = await prepare(self.sure, self.preparation, lambda: self.status)
             self.sampling = await sampling_of(self._ask)
             self.counts = await counts_of(self._ask)

@@ -25,6 +25,7 @@ class PlannedShot:
                      reflector frame for rangers of the feed arm
     fixed            it does not move against its ranger: CIL instead of TRK
     reason           one line: why this shot
+    via              counts (azimuth, elevation) at which the mirror halts on its way, in order: round the Sun or a box
     """
 
     ranger: str
@@ -35,6 +36,7 @@ class PlannedShot:
     at_end: NDArray[Any]
     fixed: bool
     reason: str
+    via: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,16 +18,6 @@ Array = NDArray[np.float64]
 AS_GIVEN = 0.005  # m: a target this near to its record is where the ranger believes it; half a beam's radius
 
 
-@dataclass(frozen=True, eq=False)
-class RoutedShot(PlannedShot):
-    """A shot to which the mirror goes by halts.
-
-    via   counts (azimuth, elevation), in order: `CIL 0, azimuth, elevation` each, before the shot's own CIL or TRK
-    """
-
-    via: tuple[tuple[float, float], ...] = ()
-
-
 @dataclass(frozen=True)
 class Chosen:
     """What a ranger shall shoot: target, s from the round's begin to its buffer, why, and halts on the way, counts."""
@@ -88,14 +78,14 @@ class Places:
             self._shifts[vantage.name] = there[0] - vantage.station.scan_point
         return self._shifts[vantage.name]
 
-    def shots(self, vantage: Vantage, chosen: "list[Chosen]", duration: float) -> tuple["RoutedShot", ...]:
+    def shots(self, vantage: Vantage, chosen: "list[Chosen]", duration: float) -> tuple[PlannedShot, ...]:
         """The shots of a ranger."""
         begin = np.array([later(int(self.ticks[0]), each.at) for each in chosen], dtype=np.int64)
         both = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)
         nodes = np.array([self._own(vantage, each.target) for each in chosen]).reshape(-1, len(self.ticks), 3)
         points = np.einsum("cbn,cnk->cbk", lagrange(self.ticks, both), nodes)
         return tuple(
-            RoutedShot(
+            PlannedShot(
                 vantage.name,
                 each.target,
                 int(begin[i]),

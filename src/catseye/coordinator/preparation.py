@@ -6,7 +6,7 @@ geometry reads back the same, needs nothing again, whoever asks: this coordinato
 
 import asyncio
 import hashlib
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from catseye.coordinator.decode import reals_of
@@ -46,15 +46,19 @@ class Preparation:
     requests   from the records, the mark with them
     numbers    of cubes by name, ZRG with them
     mark       number and name of the marking cube; None where there was no room for it
+    on_demand  by number of a cube: what tells of it, sent before its first shot
     """
 
     requests: tuple[Request, ...]
     numbers: dict[str, int]
     mark: tuple[int, str] | None
+    on_demand: dict[int, tuple[Request, ...]]
 
     @staticmethod
-    def of(commands: Sequence[Request]) -> "Preparation":
+    def of(commands: Sequence[Request], later: Collection[str] = ()) -> "Preparation":
         """From the commands of the records (`ranger.initialisation`): INI first, COO n, x, y, z, name.
+
+        later   names of cubes that can wait: there are thousands on a dish, and a ZY reads 200 lines a second
 
         >>> Preparation.of([Request("INI", ("1",)), Request("COO", ("1", "0", "9", "0", "ZG11"))]).numbers
         {'ZRG': 0, 'ZG11': 1}
@@ -64,13 +68,22 @@ class Preparation:
             if request.command == "COO" and len(request.parameters) == 5:
                 numbers[request.parameters[4]] = int(request.parameters[0])
         room = [int(r.parameters[0]) for r in commands if r.command == "INI"]
+        wait = {numbers[name] for name in later if name in numbers}
+        on_demand: dict[int, tuple[Request, ...]] = {}
+        now: list[Request] = []
+        for request in commands:
+            if request.command in ("COO", "KND") and len(request.parameters) > 1 and int(request.parameters[0]) in wait:
+                number = int(request.parameters[0])
+                on_demand[number] = (*on_demand.get(number, ()), request)
+            else:
+                now.append(request)
         if len(room) != 1 or room[0] >= MOST_CUBES:
-            return Preparation(tuple(commands), numbers, None)
+            return Preparation(tuple(now), numbers, None, on_demand)
         lines = "\n".join(f"{r.command} {','.join(r.parameters)}" for r in commands)
         mark = room[0] + 1, "H" + hashlib.sha256(lines.encode("ascii", "replace")).hexdigest()[:14]
-        more = [replace(r, parameters=(str(mark[0]),)) if r.command == "INI" else r for r in commands]
+        more = [replace(r, parameters=(str(mark[0]),)) if r.command == "INI" else r for r in now]
         last = Request("COO", (str(mark[0]), "0", "0", "0", mark[1]))
-        return Preparation((*more, last), numbers, mark)
+        return Preparation((*more, last), numbers, mark, on_demand)
 
     def same(self, replies: dict[str, Reply]) -> bool:
         """Whether what the ranger has is what it would be told: replies to COO of the mark and to the geometry."""

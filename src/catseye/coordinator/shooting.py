@@ -157,6 +157,11 @@ class Shooter:
     async def _point(self, planned: PlannedShot, count: int) -> int | None:
         """CIL or TRK; when the first buffer shall begin, None at once. Raises Refused."""
         link, number, settings = self._link, self._number(planned.target), self._link.settings
+        await self._tell_of(number)
+        for azimuth, elevation in planned.via:
+            self.aimed = None
+            halt = Request("CIL", ("0", f"{azimuth:.0f}", f"{elevation:.0f}"))
+            self._pointed(await link.sure(halt, settings.move_timeout))
         if planned.fixed:
             if self.aimed != number:
                 reply = await link.sure(Request("CIL", (str(number),)), settings.move_timeout)
@@ -172,6 +177,18 @@ class Shooter:
         request = track(planned, number, begin, more)
         self._pointed(await link.sure(request, settings.probe_timeout + settings.buffer_timeout))
         return begin
+
+    async def _tell_of(self, number: int) -> None:
+        """A cube that the ranger was not told of at first."""
+        link = self._link
+        requests = link.preparation.on_demand.get(number, ())
+        if number in link.told or not requests:
+            return
+        limit = link.settings.probe_timeout + link.settings.buffer_timeout
+        for reply in await asyncio.gather(*(link.sure(request, limit) for request in requests)):
+            if reply.ok is not True:
+                raise Refused("not-initialised", f"{reply.command}: {reply.text[:200]}")
+        link.told.add(number)
 
     def _pointed(self, reply: Reply) -> None:
         if reply.ok is not True:

@@ -98,11 +98,13 @@ class Coordinator:
             herald=Herald("journal", clock, self._happened),
         )
         asked = commands or (lambda ranger: commands_of_ranger(site, ranger))
+        later = [t.name for t in site.targets.values() if t.type == "prism" and t.frame == "reflector"]
         self.links = {
             name: RangerLink(
                 name,
                 address,
                 commands=asked(name),
+                later=later,
                 guard=guard,
                 clock=clock,
                 tell=self._happened,
