@@ -407,20 +407,23 @@ def _notes(
 ) -> list[str]:
     """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
     notes = []
-    for fit in solution.fits:
+    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
+            names = [network.layout.names[c] for c in np.ravel(group.columns).tolist()]
         if fit.name == THERMOMETERS:
-            for name, active in zip(network.field.stations, fit.active, strict=True):
-                value, u = air[name]
+            for name, active in zip(names, fit.active, strict=True):
+                station = name.removeprefix(f"{AIR} ")
+                value, u = air[station]
                 if not active:
-                    notes.append(f"{name}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+                    notes.append(f"{station}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
         if fit.name == ZEROS:
-            for name, active, off, u in zip(network.rangers, fit.active, fit.residual, fit.sigma, strict=True):
+            for name, active, off, u in zip(names, fit.active, fit.residual, fit.sigma, strict=True):
+                ranger = name.removeprefix("zero ")
                 if not active:
                     notes.append(
-                        f"{name}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
-                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(name).zp}"
+                        f"{ranger}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
+                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(ranger).zp}"
                     )
-    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
         if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
             worst = int(np.argmax(np.abs(fit.standardised)))
             called = network.layout.names[int(np.ravel(group.columns)[worst])]

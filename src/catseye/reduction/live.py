@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import CatseyeError
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import REFERENCE, SiteFolder
 from catseye.reduction.live_bodies import bodies_of, lasting_names
 from catseye.reduction.live_epoch import Epoch, campaign_of, frames_of_points, solve_epoch
@@ -52,7 +52,7 @@ class LiveSettings:
     jitter_mm        how far points of a body are at a shot from their mean of the epoch: wind, vibration
     references_s     s before an epoch whose reference shots count
     reference_after  epochs, after which the reference epoch is set that poses count from
-    beam_deviation   factor of the feed's displacement, see `live_pose`
+    bending_mm_per_degree   of a body's points for each degree that the telescope moves during an epoch
     """
 
     reduction: Settings = field(default_factory=Settings)
@@ -62,7 +62,9 @@ class LiveSettings:
     jitter_mm: Mapping[str, float] = field(default_factory=lambda: {"arm": 0.2, "dish": 0.03, "alidade": 0.03})
     references_s: float = 1200.0
     reference_after: int = 3
-    beam_deviation: float = 1.0
+    bending_mm_per_degree: Mapping[str, float] = field(
+        default_factory=lambda: {"arm": 0.2, "dish": 0.05, "alidade": 0.05}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,10 @@ class Live:
 
     def shot(self, shot: LiveShot) -> ShotAnswer:
         """One shot; it takes part in the next epoch."""
-        now = self.rangers[shot.ranger]
+        now = self.rangers.get(shot.ranger)
+        if now is None:
+            text = f"no ranger: {shot.ranger} is not at this site"
+            return ShotAnswer("no ranger", text, math.nan, math.nan)
         mirror, adc, rules = self.site.mirror_of(shot.ranger), self.site.site.adc, self.settings.reduction
         own = shot.target == REFERENCE
         usual = now.usual[own]
@@ -204,6 +209,8 @@ class Live:
             usual=median(usual) if usual else math.nan,
             run=run if abs(run) < 0.5 * math.pi else 0.0,
         )
+        stamped = abs(run) * shot.if_hz * TICK_SECONDS / math.sqrt(12.0)  # rad: a stamp has steps of 0.864 ms
+        row = replace(row, u_across=math.hypot(row.u_across, stamped * abs(row.phasor)))
         said = answer(
             row,
             now,
@@ -213,6 +220,8 @@ class Live:
             modulation_hz=modulation,
             walk=self.site.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR,
         )
+        if said.status == "no place" and not own and shot.target not in self._own:
+            said = replace(said, text=f"no place: the site has no target {shot.target}")
         if said.status in ("used", "reference"):
             usual.append(said.amplitude)
         if said.status == "reference":
@@ -266,7 +275,7 @@ class Live:
         rows, self._pending = self._rows(ticks), []
         mjd = ticks / TICKS_PER_DAY
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
-        motion = Motion(self.site, self.track.copy(), self.frames, mjd, self.bodies, self.jitter.mm)
+        motion = Motion(self.site, self.track.copy(), self.frames, mjd, self.bodies, self._shaking(rows))
         carried = self._carried_to(ticks, elevation)
         rules = self.settings.reduction
         return EpochJob(rows, weather, motion, azimuth, elevation, carried, self.lasting, ticks, rules)
@@ -310,7 +319,7 @@ class Live:
             self.set_reference()
         pose = None
         if self.number >= self.settings.reference_after:
-            pose = live_pose(self.carried, self.bodies, self.site, beam_deviation=self.settings.beam_deviation)
+            pose = live_pose(self.carried, self.bodies, self.site)
         number = [r.shot.number for r in rows]
         used = {number[int(k)] for k, on in zip(ranges.shot, ranges.used, strict=True) if on}
         rejected = {number[k]: reason for k, reason in epoch.reasons.items()}
@@ -364,6 +373,14 @@ class Live:
             else row
             for row, old in zip(rows, age, strict=True)
         ]
+
+    def _shaking(self, rows: Sequence[Taken]) -> dict[str, float]:
+        """Jitter of each body, mm: as learnt, and bent by the telescope's own motion during the epoch's shots."""
+        times = [r.mjd for r in rows if r.shot.target != REFERENCE]
+        angles = self.track.at(np.array(times or [rows[-1].mjd]))
+        moved = math.hypot(*(float(np.ptp(angle)) for angle in angles)) / DEGREE
+        bent = {b: self.settings.bending_mm_per_degree.get(b, 0.0) * moved / math.sqrt(12.0) for b in self.jitter.mm}
+        return {b: math.hypot(u, bent[b]) for b, u in self.jitter.mm.items()}
 
     def _carried_to(self, ticks: int, elevation: float) -> Carried | None:
         if self.carried is None:

@@ -4,9 +4,11 @@ All in the reflector frame: x to the right of who looks along the beam (along ri
 from the feed arm, downwards at low elevation. A small turn w of the dish moves the beam by w x z = (w_y, -w_x, 0);
 elevation rises along -y, so that the beam's elevation changes by w_x and its azimuth, times cos E, by w_y.
 
-A feed that moves by d against the dish moves the beam the other way, by -K d / f across the axis: azimuth times cos E
-by -K d_x / f, elevation by +K d_y / f. Prime focus; K is the beam deviation factor, 1 on the plate scale of geometry.
-Corrections are offsets with their sign changed.
+A feed at the prime focus that moves by d against the dish changes the way to a point of the surface, in the direction s
+from the focus, by -d.s; the plane that fits these ways over the aperture tilts the wavefront, and the beam with it, by
+its slopes u: azimuth times cos E by u_x, elevation by -u_y (`beam_per_feed_shift`). For a shallow dish that is -d/f; an
+offset section deviates less in its plane of symmetry, and turns the beam for a shift along the axis, too. The aperture
+counts evenly: a feed's taper is not known here. Corrections are offsets with their sign changed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +25,7 @@ from catseye.reduction.live_state import REFERENCE_EPOCH, XYZ, Carried
 
 Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
+APERTURE_GRID = 101  # points across the aperture
 OFFSETS = ("azimuth times cos E", "elevation", "focus")
 
 
@@ -72,13 +75,10 @@ class LivePose:
         return -self.offset
 
 
-def live_pose(
-    carried: Carried, bodies: Mapping[str, str], site: SiteFolder, *, beam_deviation: float = 1.0
-) -> LivePose:
+def live_pose(carried: Carried, bodies: Mapping[str, str], site: SiteFolder) -> LivePose:
     """Dish and feed since the reference epoch, from the carried state with its reference places.
 
-    bodies           point: "dish", "arm", ...
-    beam_deviation   K
+    bodies   point: "dish", "arm", ...
     """
     focal_length = site.site.paraboloid.focal_length_mm * MILLIMETRE
     vertex, focus = np.zeros(3), np.array([0.0, 0.0, focal_length])
@@ -102,13 +102,30 @@ def live_pose(
     by = np.zeros((3, 12))
     at_focus = np.hstack([np.eye(3), motions(focus[None], vertex, 1.0)[:, 3:6]])  # the dish's, of the focus
     relative = np.hstack([-at_focus, np.eye(3), np.zeros((3, 3))])
-    by[0] = -beam_deviation / focal_length * relative[0]
+    slopes = beam_per_feed_shift(site)
+    by[0], by[1] = slopes[0] @ relative, -slopes[1] @ relative
     by[0, 4] += 1.0
-    by[1] = beam_deviation / focal_length * relative[1]
     by[1, 3] += 1.0
     by[2] = relative[2]
     motion = np.concatenate([dish.translation, dish.rotation, feed.translation, feed.rotation])
     return LivePose(dish, feed, by @ motion, _positive(by @ joint @ by.T), "")
+
+
+def beam_per_feed_shift(site: SiteFolder) -> Array:
+    """Slopes (2, 3) of the wavefront, rad/m: how a shift of the feed turns the beam towards x and y, reflector frame.
+
+    Source: rays of geometrical optics; least squares of a plane over the aperture, all parts alike.
+    """
+    p = site.site.paraboloid
+    f, radius = p.focal_length_mm * MILLIMETRE, p.aperture_radius_mm * MILLIMETRE
+    grid = np.linspace(-1.0, 1.0, APERTURE_GRID)
+    inside = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    inside = inside[np.sum(inside**2, axis=1) <= 1.0] * radius
+    xy = inside + np.array(p.aperture_centre_mm) * MILLIMETRE
+    z = np.sum(xy**2, axis=1) / (4.0 * f)
+    way = -np.column_stack([xy, z - f]) / (f + z)[:, None]  # from the focus to the surface is f + z, exactly
+    plane = np.column_stack([np.ones(len(inside)), inside])
+    return np.asarray(np.linalg.lstsq(plane, way, rcond=None)[0][1:])
 
 
 def _referenced(carried: Carried, names: Sequence[str]) -> list[str]:
@@ -136,6 +153,7 @@ def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Ar
     weight = np.eye(len(change)) if scale < 1e-16 else np.linalg.pinv(covariance + 1e-6 * scale * np.eye(len(change)))
     normal = design.T @ weight @ design
     size = np.sqrt(np.diag(normal))
+    size[size == 0.0] = 1.0  # a turn that moves no point at all
     if np.linalg.cond(normal / np.outer(size, size)) > 1e12:
         raise EstimationError(
             f"{body}: its points lie on a line and do not hold its turn (expected points aside of it)"

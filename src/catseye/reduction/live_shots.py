@@ -96,7 +96,10 @@ def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual
     """
     detected = Detected.empty(1)
     cycles, samples = np.array([shot.cycles]), np.array([shot.samples_per_cycle])
-    if shot.samples is not None:
+    if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
+        told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
+        detected.wrong[0] = f"wrong length: {told} {shot.cycles * shot.samples_per_cycle}"
+    elif shot.samples is not None:
         leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
         _detect(shot, shot.samples, detected, adc.bits, run, leaked)
     elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):

@@ -31,8 +31,9 @@ class Loosening:
     point_mm                      each point of it by itself, at once
     body_mm_per_degree, body_rad_per_degree, point_mm_per_degree   of elevation passed: gravity
     point_mm_per_root_hour        temperature
-    ground_mm_per_root_hour       a monument with its ranger, a target on the ground
-    zero_mm_per_root_hour         a ranger's zero
+    ground_mm_per_root_hour       a monument with its ranger, a target on the ground: they settle by less, but the index
+                                  of a path that is off for half an hour looks the same, and epochs must not average it
+    zero_mm_per_root_hour         a ranger's zero, for the same reason
     leakage_volt_per_root_hour    each quadrature
     thermometer_c_per_root_hour   an offset
     profile_s                     s, in which the air's profile forgets
@@ -47,8 +48,8 @@ class Loosening:
     body_rad_per_degree: float = 5e-5
     point_mm_per_degree: float = 0.5
     point_mm_per_root_hour: float = 0.3
-    ground_mm_per_root_hour: float = 0.005
-    zero_mm_per_root_hour: float = 0.003
+    ground_mm_per_root_hour: float = 0.05
+    zero_mm_per_root_hour: float = 0.03
     leakage_volt_per_root_hour: float = 1e-4
     thermometer_c_per_root_hour: float = 0.05
     profile_s: float = 1800.0

@@ -18,6 +18,7 @@ ALONE = 600.0  # s, after which a single station is believed again: nobody says 
 
 @dataclass
 class _Station:
+    last: LiveWeather | None = None  # believed or not: a witness's own change is a witness
     good: deque[LiveWeather] = field(default_factory=deque)
     doubted_since: int | None = None
     doubt: str = ""
@@ -46,6 +47,7 @@ class StationWatch:
         if station.good and read.ticks <= station.good[-1].ticks:
             return f"{read.station}: a reading of an earlier time came late"
         station.doubt = self._jump(read, station)
+        station.last = read
         if station.doubt:
             station.doubted_since = station.doubted_since or read.ticks
             return station.doubt
@@ -71,19 +73,19 @@ class StationWatch:
         return tuple(s.doubt for s in self._stations.values() if s.doubted_since is not None)
 
     def _jump(self, read: LiveWeather, station: _Station) -> str:
-        own = _median(station, read.ticks)
+        own = _median(station)
         if math.isnan(own):
             return ""
         left = read.temperature_c - own
-        others = [s for s in self._stations.values() if s is not station and s.good]
-        if not others and station.doubted_since and _seconds(read.ticks - station.doubted_since) > ALONE:
+        changes = [_change(s, read.ticks) for s in self._stations.values() if s is not station]
+        went = [change for change in changes if change is not None]
+        if not went and station.doubted_since and _seconds(read.ticks - station.doubted_since) > ALONE:
             station.good.clear()  # nobody to ask: the air has changed
             return ""
-        went = [s.good[-1].temperature_c - _median(s, s.good[-1].ticks) for s in others]
         by_others = float(np.median(went)) if went else 0.0
         since = _seconds(read.ticks - station.good[-1].ticks)
         allowed = JUMP_C + 0.002 * since  # °C, and 7 °C an hour while nothing came or nothing was believed
-        if abs(left - by_others) <= allowed:
+        if min(abs(left), abs(left - by_others)) <= allowed:  # a station that stays is not doubted for others' jumps
             return ""
         return (
             f"{read.station} reads {read.temperature_c:.1f} C, {left:+.1f} C off its last five minutes while the "
@@ -91,7 +93,15 @@ class StationWatch:
         )
 
 
-def _median(station: _Station, ticks: int) -> float:
+def _change(station: _Station, ticks: int) -> float | None:
+    """°C, of a station that has spoken lately against its own five minutes; None of one that is no witness."""
+    if station.last is None or _seconds(ticks - station.last.ticks) > RECENT:
+        return None
+    median = _median(station)
+    return None if math.isnan(median) else station.last.temperature_c - median
+
+
+def _median(station: _Station) -> float:
     """°C, of the last good readings; NaN of fewer than three."""
     recent = [w.temperature_c for w in station.good if _seconds(station.good[-1].ticks - w.ticks) <= RECENT]
     return float(np.median(recent)) if len(recent) >= 3 else math.nan
