@@ -27,6 +27,7 @@ READ_BACK = {  # half of the last digit in which each is told back
 OF_A_CUBE = {"AZM": ("0",), "ELV": ("0",)}  # ZRG's, the only ones that are set
 HOMING_TIMEOUT = 35.0  # s an axis: a ZY gives up after 30
 PATIENCE = 30.0  # s for a reply while many are on their way
+SETTLED_COUNTS = 1  # WTOL: a count of azimuth is 7.5 mm at 120 m, and a beam some 14 mm
 SETTLE_S = 5.0  # WTMO: a mirror that has not settled then is stuck
 Ask = Callable[[Request, float], Awaitable[Reply]]
 
@@ -125,7 +126,8 @@ async def prepare(ask: Ask, preparation: Preparation, status: Callable[[], Statu
         sent = True
         for at in range(0, len(preparation.requests), AT_ONCE):
             await _all(ask, preparation.requests[at : at + AT_ONCE])
-    await _all(ask, [Request("WMD", ("1",)), Request("WTMO", (f"{SETTLE_S:g}",)), Request("MOD", ("1",))])
+    settling = [("WMD", "1"), ("WTOL", f"{SETTLED_COUNTS}"), ("WTMO", f"{SETTLE_S:g}"), ("MOD", "1")]
+    await _all(ask, [Request(name, (value,)) for name, value in settling])
     await _axes(ask, status)
     return sent
 

@@ -117,8 +117,8 @@ def refuse_unready(z: Ranger) -> None:
         raise InputError("not initialised (expected BP, ALPHA, BETA, MO, EZ and D0, or INITZY, first)")
 
 
-def _trk(z: Ranger, _: int, key: Value, t0: int, *rest: float) -> Values:
-    """[PARKER04] eq. 2.45, 2.46: encoder counts linear between t0 and t1."""
+def _trk(z: Ranger, _: int, key: Value, t0: int, *rest: float) -> Work:
+    """[PARKER04] eq. 2.45, 2.46: encoder counts linear between t0 and t1. A move that is under way ends first."""
     cube, start, t1, end = z.cubes.find(key), rest[:3], int(rest[3]), rest[4:]
     refuse_unready(z)
     if not (t0 < t1 and t1 > z.now_ticks()):
@@ -127,8 +127,17 @@ def _trk(z: Ranger, _: int, key: Value, t0: int, *rest: float) -> Values:
     n1 = z.cubes.look(end, (float(n0[0]), float(n0[1])))
     z.refuse_sun(n0)
     z.refuse_sun(n1, n0)
-    if not z.head.follow((n0, n1), (tag_of(t0), tag_of(t1))):
-        raise InputError("axes do not follow (expected both amplifiers on, no move under way)")
+    line = (n0, n1), (tag_of(t0), tag_of(t1))
+    if not z.head.follow(*line):
+        if not all(z.head.enabled(axis) for axis in (0, 1)):
+            raise InputError("axes do not follow (expected both amplifiers on: AXIS n, 1)")
+        free = "the axes are not free"
+        yield from wait_until(z, lambda: not (z.head.moving(0) or z.head.moving(1)), MOVE_TIME, free)
+        if t1 <= z.now_ticks():
+            raise InputError(f"t1 {stamp(t1)} was over before the axes were free (expected it to come)")
+        z.refuse_sun(n0)
+        if not z.head.follow(*line):
+            raise InputError("axes do not follow (expected no search for the index under way)")
     z.aimed, z.heading = cube.number, (float(n1[0]), float(n1[1]))
     return str(cube.number), *(f"{n:.3f}" for n in (*n0, *n1))
 
