@@ -61,7 +61,7 @@ class LiveSettings:
     u_flexure_mm: float = 10.0
     jitter_mm: Mapping[str, float] = field(default_factory=lambda: {"arm": 0.2, "dish": 0.03, "alidade": 0.03})
     references_s: float = 1200.0
-    reference_after: int = 3
+    reference_after: int = 2
     bending_mm_per_degree: Mapping[str, float] = field(
         default_factory=lambda: {"arm": 0.2, "dish": 0.05, "alidade": 0.05}
     )
