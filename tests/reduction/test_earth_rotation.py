@@ -20,6 +20,16 @@ def test_astropys_interpolation_of_the_same_tables_agrees():
     assert np.max(np.abs(rotation_at(mjd).ut1_minus_utc - theirs)) < 1e-9
 
 
+def test_before_the_newer_table_begins_the_older_one_counts():
+    from astropy.utils import iers
+
+    mjd = np.arange(41_318.0, 41_684.0)
+    older = iers.IERS_B.open()
+    theirs = np.interp(mjd, older["MJD"].value, older["UT1_UTC"].value)
+    whole = np.abs(rotation_at(mjd).ut1_minus_utc - theirs)
+    assert np.max(whole) < 1e-9
+
+
 def test_the_bulletins_printed_values_are_met():
     # IERS bulletins: 1998-12-31 to 1999-01-01 over a leap second; 2003-09-07.
     before, after = rotation_at([51_178.0, 51_179.0]).ut1_minus_utc

@@ -147,8 +147,8 @@ def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
         q[np.ix_(at, at)] += design @ np.diag([shift**2] * 3 + [turn**2] * 3) @ design.T + own * np.eye(len(at))
     for axis in "xyz":
         both = [column[f"ZY1 {axis}"], column[f"ZY1-F {axis}"]]
-        q[np.ix_(both, both)] += (0.005e-3) ** 2 * hours
-    q[column["zero ZY1"], column["zero ZY1"]] = (0.003e-3) ** 2 * hours
+        q[np.ix_(both, both)] += (0.02e-3) ** 2 * hours
+    q[column["zero ZY1"], column["zero ZY1"]] = (0.01e-3) ** 2 * hours
     for part in ("real", "imaginary"):
         q[column[f"leakage ZY1 {part}"], column[f"leakage ZY1 {part}"]] = 1e-8 * hours
     q[column["the air WX1"], column["the air WX1"]] = 0.05**2 * hours
@@ -218,3 +218,13 @@ def test_points_are_found_by_name():
     np.testing.assert_array_equal(covariance[:3, 3:], one.covariance[3:6, 0:3])
     with pytest.raises(KeyError):
         one.columns(["nobody x"])
+
+
+def test_what_lasts_of_a_path_returns_to_its_prior():
+    """Half an hour takes e^-1 of it and gives 1 - e^-2 of its variance back."""
+    before = Carried(("path ZY1 A", "x"), np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
+    after = carried_on(before, 1, 1800.0, 0.5, {}, USUAL, 0.5, 0.105)
+    kept = np.exp(-1.0)
+    np.testing.assert_allclose(after.x, [0.1 * kept, 2.0], rtol=1e-12)
+    expected = [[4e-4 * kept**2 + (1 - kept**2) * 0.105**2, 1e-4 * kept], [1e-4 * kept, 1.0]]
+    np.testing.assert_allclose(after.covariance, expected, rtol=1e-12)

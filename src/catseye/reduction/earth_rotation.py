@@ -7,10 +7,10 @@ that some 1" a year more).
 """
 
 import math
-import warnings
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from catseye.geometry.sun import EARLIEST_MJD, LATEST_MJD, refracted, sun_direct
 from catseye.records.site import Location
 
 KNOT = 300.0 / SECONDS_PER_DAY  # days
+EARLY_ROWS = 5000  # of the table that begins in 1962: until long after the newer one begins, in 1973
 WORTH_KNOTS = 16  # times, from which on interpolation may pay
 
 
@@ -178,21 +179,20 @@ def _many(mjd: NDArray[np.float64], place: Place) -> NDArray[np.float64]:
 @cache
 def _table() -> dict[str, Any]:
     """UT1 - TAI by day, free of steps; the steps of UTC (UT1 - UTC less UT1 - TAI) and where they start."""
-    from astropy.utils import iers
+    from astropy_iers_data import IERS_A_FILE, IERS_B_FILE  # type: ignore[import-untyped]
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about the tables' age: the status says it
-        older, newer = iers.IERS_B.open(), iers.IERS_A.open(iers.IERS_A_FILE)
-    first = newer["MJD"].value[0]
-    early = older["MJD"].value < first
-    mjd = np.concatenate([older["MJD"].value[early], newer["MJD"].value])
-    ut1_minus_utc = np.concatenate([older["UT1_UTC"].value[early], np.asarray(newer["UT1_UTC"].value, dtype=float)])
+    newer_mjd, newer_ut1, flag = _newer(IERS_A_FILE)
+    with open(IERS_B_FILE, encoding="ascii") as stream:
+        older = [line.split() for line in islice(stream, EARLY_ROWS) if not line.startswith("#")]
+    older_mjd, older_ut1 = np.array([(row[4], row[7]) for row in older], dtype=float).T
+    early = older_mjd < newer_mjd[0]
+    mjd = np.concatenate([older_mjd[early], newer_mjd])
+    ut1_minus_utc = np.concatenate([older_ut1[early], newer_ut1])
     used = np.isfinite(ut1_minus_utc) & (mjd >= 41_317.0)
     mjd, ut1_minus_utc = mjd[used], ut1_minus_utc[used]
     jumps = np.concatenate([[0.0], np.round(np.diff(ut1_minus_utc))])  # a leap second, seen from one day to the next
     steps = -np.cumsum(jumps)
-    flag = np.asarray(newer["UT1Flag"])
-    measured = newer["MJD"].value[(flag == "B") | (flag == "I")]
+    measured = newer_mjd[(flag == "B") | (flag == "I")]
     return {
         "mjd": mjd,
         "ut1_minus_tai": ut1_minus_utc + steps,
@@ -200,3 +200,21 @@ def _table() -> dict[str, Any]:
         "steps": np.concatenate([[0.0], steps[jumps != 0.0]]),
         "last_measured": measured[-1],
     }
+
+
+def _newer(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.str_]]:
+    """MJD, UT1 - UTC (final where it is known, NaN past the predictions), and B final, I measured, P predicted.
+
+    Source: the readme of finals2000A.all, by columns. astropy's reader takes a second for the same, which a
+    coordinator that starts again does not have.
+    """
+    with open(path, encoding="ascii") as stream:
+        lines = [line.rstrip("\n").ljust(188) for line in stream]
+    rapid, final = ([line[at] for line in lines] for at in (slice(58, 68), slice(154, 165)))
+    chosen = [b if b.strip() else a for a, b in zip(rapid, final, strict=True)]
+    flag = np.array(["B" if b.strip() else line[57] for line, b in zip(lines, final, strict=True)])
+    return (
+        np.array([float(line[7:15]) for line in lines]),
+        np.array([float(v) if v.strip() else np.nan for v in chosen]),
+        flag,
+    )

@@ -50,6 +50,7 @@ class LiveSettings:
     loosening        how much less sure the state gets between epochs
     u_flexure_mm     of each coordinate of a typed point of the telescope against a rigid one, beside the record's
     jitter_mm        how far points of a body are at a shot from their mean of the epoch: wind, vibration
+    lasting_path     share of the standard deviation of a path's index that lasts; the rest is an epoch's own
     references_s     s before an epoch whose reference shots count
     reference_after  epochs, after which the reference epoch is set that poses count from
     bending_mm_per_degree   of a body's points for each degree that the telescope moves during an epoch
@@ -60,6 +61,7 @@ class LiveSettings:
     loosening: Loosening = USUAL
     u_flexure_mm: float = 10.0
     jitter_mm: Mapping[str, float] = field(default_factory=lambda: {"arm": 0.2, "dish": 0.03, "alidade": 0.03})
+    lasting_path: float = 0.7
     references_s: float = 1200.0
     reference_after: int = 2
     bending_mm_per_degree: Mapping[str, float] = field(
@@ -275,7 +277,9 @@ class Live:
         rows, self._pending = self._rows(ticks), []
         mjd = ticks / TICKS_PER_DAY
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
-        motion = Motion(self.site, self.track.copy(), self.frames, mjd, self.bodies, self._shaking(rows))
+        motion = Motion(
+            self.site, self.track.copy(), self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path
+        )
         carried = self._carried_to(ticks, elevation)
         rules = self.settings.reduction
         return EpochJob(rows, weather, motion, azimuth, elevation, carried, self.lasting, ticks, rules)
@@ -393,7 +397,8 @@ class Live:
         seconds = (ticks - carried.ticks) / TICKS_PER_DAY * SECONDS_PER_DAY
         rules = self.settings.reduction
         profile = rules.u_gradient_c_per_m if "the air gradient" in carried.names else rules.u_profile_c
-        return carried_on(carried, ticks, seconds, elevation, self.bodies, self.settings.loosening, profile)
+        path = self.settings.lasting_path * self.site.site.ranging.path_index_fluctuation_ppm
+        return carried_on(carried, ticks, seconds, elevation, self.bodies, self.settings.loosening, profile, path)
 
     def _moving(self) -> list[str]:
         known = set(self.carried.names) if self.carried is not None else set()

@@ -169,6 +169,8 @@ def _lasts(name: str, lasting: Sequence[str]) -> bool:
     if name.startswith(("axes ", "amplitude ", "cyclic ")):
         return True
     kind, _, rest = name.partition(" ")
+    if kind == "path":
+        return all(end in lasting for end in rest.split(" "))
     if kind == "normal":
         group = rest.rpartition(" ")[0]
         return group in lasting or any(n.startswith(f"{group}-") for n in lasting)

@@ -31,12 +31,12 @@ class Loosening:
     point_mm                      each point of it by itself, at once
     body_mm_per_degree, body_rad_per_degree, point_mm_per_degree   of elevation passed: gravity
     point_mm_per_root_hour        temperature
-    ground_mm_per_root_hour       a monument with its ranger, a target on the ground: they settle by less, but the index
-                                  of a path that is off for half an hour looks the same, and epochs must not average it
-    zero_mm_per_root_hour         a ranger's zero, for the same reason
+    ground_mm_per_root_hour       a monument with its ranger, a target on the ground
+    zero_mm_per_root_hour         a ranger's zero
     leakage_volt_per_root_hour    each quadrature
     thermometer_c_per_root_hour   an offset
     profile_s                     s, in which the air's profile forgets
+    path_s                        s, in which what lasts of a path's index forgets
     velocity_mm_per_s             each coordinate's at first, where velocities are kept
     acceleration_mm_per_s15       mm/s per root second: how velocities change
     """
@@ -48,11 +48,12 @@ class Loosening:
     body_rad_per_degree: float = 5e-5
     point_mm_per_degree: float = 0.5
     point_mm_per_root_hour: float = 0.3
-    ground_mm_per_root_hour: float = 0.05
-    zero_mm_per_root_hour: float = 0.03
+    ground_mm_per_root_hour: float = 0.02
+    zero_mm_per_root_hour: float = 0.01
     leakage_volt_per_root_hour: float = 1e-4
     thermometer_c_per_root_hour: float = 0.05
     profile_s: float = 1800.0
+    path_s: float = 1800.0
     velocity_mm_per_s: float = 0.02
     acceleration_mm_per_s15: float = 0.002
 
@@ -195,6 +196,7 @@ def carried_on(
     bodies: Mapping[str, str],
     rule: Loosening,
     profile_sigma: float,
+    path_sigma_ppm: float = 0.0,
 ) -> Carried:
     """The state at a later instant, loosened.
 
@@ -202,6 +204,7 @@ def carried_on(
     elevation       rad, of the telescope then
     bodies          point: "dish", "arm", "alidade"; others stand on the ground
     profile_sigma   prior uncertainty of the air's profile, to which it returns
+    path_sigma_ppm  the same of what lasts of a path's index
 
     Source: random walks, and constant velocity where velocities are carried: x += v t, with white acceleration q:
     q t^3/3, q t^2/2, q t.
@@ -228,14 +231,20 @@ def carried_on(
         elif name.startswith("leakage "):
             p[i, i] += rule.leakage_volt_per_root_hour**2 * hours
         elif name in ("the air bend", "the air gradient"):
-            kept = np.exp(-t / rule.profile_s)
-            x[i] *= kept
-            p[i] *= kept
-            p[:, i] *= kept
-            p[i, i] += (1.0 - kept**2) * profile_sigma**2
+            _return(x, p, i, np.exp(-t / rule.profile_s), profile_sigma)
+        elif name.startswith("path "):
+            _return(x, p, i, np.exp(-t / rule.path_s), path_sigma_ppm)
         elif name.startswith("the air ") and " - " not in name:
             p[i, i] += rule.thermometer_c_per_root_hour**2 * hours
     return replace(carried, x=x, covariance=p, ticks=ticks, elevation=elevation)
+
+
+def _return(x: Array, p: Array, i: int, kept: float, sigma: float) -> None:
+    """Let a parameter go back to zero and its prior, a Gauss-Markov process; in place."""
+    x[i] *= kept
+    p[i] *= kept
+    p[:, i] *= kept
+    p[i, i] += (1.0 - kept**2) * sigma**2
 
 
 def _with_velocity(

@@ -202,6 +202,7 @@ class Motion:
     epoch       MJD
     bodies      name: what it moves with, where that is not the ground
     jitter_mm   body: how far its points are at a shot from where they are on average
+    lasting     share of the standard deviation of a path's index that lasts: a parameter of the line
     """
 
     site: SiteFolder
@@ -210,6 +211,7 @@ class Motion:
     epoch: float
     bodies: Mapping[str, str] = field(default_factory=dict)
     jitter_mm: Mapping[str, float] = field(default_factory=dict)
+    lasting: float = 0.0
 
     def jitter(self, ranger: str, targets: tuple[str, ...]) -> Array:
         """Variance (m,), m^2, of ranges to targets by what shakes; none where both ends shake together."""

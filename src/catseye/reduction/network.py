@@ -25,6 +25,12 @@ THERMOMETERS = "thermometers"
 SOUND = "path temperatures"
 ZEROS = "ranger zeros"
 HEADS = "head effects"
+PATHS = "lasting paths"
+
+
+def path_of(ranger: str, target: str) -> str:
+    """The parameter of what lasts of a line's index, ppm."""
+    return f"path {ranger} {target}"
 
 
 @dataclass
@@ -122,7 +128,15 @@ def build_network(
     for name in sorted(fired):
         if seen[name].u_constant > 0.0:
             layout.add(f"glass {name}", [""], [0.0])
+    u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
+    fired_lines = {path_of(n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots}
+    lines = sorted(fired_lines) if u_path > 0.0 else []
+    for line in lines:
+        layout.add(line, [""], [0.0])
     priors = _priors(campaign, settings, seen, layout, air)
+    if lines:
+        columns = [layout.at[line] for line in lines]
+        priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
     return Network(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
 
 

@@ -9,7 +9,7 @@ from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.observations import Distances, MovingDistances
 from catseye.optics.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.head import HeadCorrections, head_corrections
-from catseye.reduction.network import AIR, Network
+from catseye.reduction.network import AIR, Network, path_of
 from catseye.reduction.places import unit
 from catseye.reduction.ranges import Electronics
 from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
@@ -102,7 +102,8 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, S
     leakage_slope = per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
 
     covariance = np.diag((per_radian * phases.u_phase[rows]) ** 2) + per_radian**2 * electronics.covariance
-    path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance
+    lasting = 0.0 if network.motion is None else network.motion.lasting
+    path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance * np.sqrt(1.0 - lasting**2)
     same = np.array(targets)[:, None] == np.array(targets)
     covariance += same * np.outer(path, path)
     if network.motion is not None:
@@ -113,8 +114,10 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, S
         - distance * (air.slopes @ x[air_columns])
         + n * np.sum(normal_slopes * x[normal_columns], axis=1)
     )
+    paths = np.array([[layout.at.get(path_of(name, t), -1)] for t in targets])  # -1: none
     nuisance = np.concatenate(
         [
+            paths,
             np.full((m, 1), layout.at[f"zero {name}"]),
             np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
             np.broadcast_to(air_columns, (m, len(air_columns))),
@@ -126,6 +129,7 @@ def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, S
     )
     coefficient = np.concatenate(
         [
+            PPM * distance[:, None] * (paths >= 0),
             -n[:, None],
             leakage_slope,
             distance[:, None] * air.slopes,
