@@ -130,8 +130,8 @@ def test_many_nights_err_by_what_they_claim(motion, nights, faults, filter_):
 def test_over_ten_minutes_the_ground_stays_honest():
     """What is local to a path lasts half an hour, so that sixty epochs of one line are no sixty observations of it.
 
-    Six nights of 36 epochs gave 0.93 in the first two minutes and 1.05 in the last; 1.07 and 1.42 while each epoch took a
-    path's index as new. One night scatters from 0.6 to 1.6: stations share the air and the telescope.
+    Six nights of 36 epochs gave 0.93 in the first two minutes and 1.05 in the last; 1.07 and 1.42 while each epoch took
+    the index of a path as new. One night scatters from 0.6 to 1.6: stations share the air and the telescope.
     """
     late = []
     for seed in (30, 31):
