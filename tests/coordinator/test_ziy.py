@@ -418,6 +418,21 @@ def test_a_beam_that_the_sun_comes_to_is_parked_and_where_that_is_refused_the_la
     run(story)
 
 
+def test_streams_alone_go_on_without_a_pause_and_an_epoch_each_ten_seconds():
+    """Buffers of 0.128 s, twenty a pointing, and less than half a buffer lost with each: 2 %."""
+
+    async def story():
+        async with Site(("ZY101",)) as site:
+            site.ziy.stream("ZY101", "ZG11")
+            await until(lambda: site.served["ZY101"].ranger.stream is not None)
+            before, epochs = len(site.live.shots), site.live.epochs
+            await asyncio.sleep(30.0)
+            assert len(site.live.shots) - before >= 0.98 * 30.0 / 0.128
+            assert 2 <= site.live.epochs - epochs <= 4
+
+    run(story)
+
+
 def test_the_guard_hears_what_rangers_answer_and_how_the_telescope_stands():
     async def story():
         async with Site(("ZY101",)) as site:

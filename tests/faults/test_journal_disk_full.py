@@ -12,8 +12,9 @@ from contextlib import contextmanager
 import pytest
 
 from catseye.coordinator import journal as journal_module
-from catseye.coordinator.journal import Journal, NotDurable
+from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.parts import NotDurable
 from catseye.errors import InputError
 from catseye.records.live import Happening
 from catseye.simulator.world_clock import ManualClock

@@ -171,3 +171,13 @@ def test_tids_wrap_to_a_thousand():
         LAST_TID,
         1000,
     ]
+
+
+@pytest.mark.parametrize("letter", ["\x00", "\x1f", "\x7f", "\n", "é"])
+@pytest.mark.parametrize("length", [40, 511, 512, 513, 22_000])
+def test_what_is_not_printable_is_refused_in_long_lines_as_in_short_ones(letter, length):
+    line = "1000\t52889.12500000\tBUF 1, " + "A" * length
+    assert parse_reply(line).values == ("A" * length,)
+    assert parse_reply(line[:-1] + "~").values[0].endswith("~")
+    with pytest.raises(InputError, match="printable ASCII"):
+        parse_reply(line[:-1] + letter + "A")

@@ -184,7 +184,7 @@ def test_a_hung_ranger_takes_lines_and_answers_nothing_and_forgets_them(few):
 
     async def story(world):
         client = await world.at_work("ZY101")
-        await asyncio.sleep(99.0 - world.loop.time())
+        await asyncio.sleep(95.0 - world.loop.time())
         for line in ("NUM 1", "ORD 1, 0", "SCN 1"):
             word, _, rest = line.partition(" ")
             assert (await world.ask(client, word, *rest.split(", "))).ok

@@ -20,6 +20,7 @@ MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 ROOMS = (
     *("air", "sound", "refractometer", "acoustic", "networks", "explain", "calibrate", "certificate"),
     *("baseline", "link", "point", "triplet", "glass", "beam", "safety", "plot"),
+    *("zy", "ziy", "simulate", "serve", "replay", "export"),
 )
 
 app = typer.Typer(

@@ -47,6 +47,7 @@ class FeedSettings:
     telescope_silent: float = 2.0
     first_wait: float = 0.2
     longest_wait: float = 30.0
+    growth: float = 1.33
     connect_timeout: float = 3.0
 
 
@@ -114,7 +115,7 @@ class FeedClient:
                     why, wait = await self._listen(client), self._settings.first_wait
                 self._herald.standing("feed-lost", f"{why}; trying again", "warning")
                 await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
-                wait = min(2.0 * wait, self._settings.longest_wait)
+                wait = min(self._settings.growth * wait, self._settings.longest_wait)
         finally:
             looking.cancel()
 

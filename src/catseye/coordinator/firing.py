@@ -1,7 +1,9 @@
 """Each ranger at its own list: shots of a round one after another, or one target again and again; and who rests."""
 
 import asyncio
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -16,12 +18,16 @@ from catseye.errors import CatseyeError
 from catseye.ranger.initialisation import frame_of
 from catseye.records.live import TICKS_PER_DAY
 from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.reduction.motion import frames_of
 
 GOOD = frozenset(["used", "reference"])
 OF_THE_LINE = frozenset(["blocked", "clipped", "dead", "dropout", "stuck", "refused"])  # its own fault
+MISFIT = "reflected"  # how an epoch begins its reason for a range that does not fit the others
+WEAK = 0.1  # of the usual return, below which it is told
+RETURNS, FEWEST_RETURNS = 31, 5  # whose median is usual
 FAILURES = 3  # in a row, on whatever target, until a ranger counts as failing
 STREAM_COUNT = 20  # buffers for each pointing of a stream
-STREAM_LEAD = 0.1  # s
+STREAM_LEAD = 0.1  # s that a track is told ahead; what rests is measured at once
 AT_REST = 1e-6  # m/s: a target slower than this is pointed at, not followed
 
 
@@ -52,7 +58,10 @@ class Firing:
         self._allowed, self._telescope_known = allowed, telescope_known
         self.dropped: set[str] = set()
         self.streams: dict[str, str] = {}
-        self.suspensions = Suspensions()
+        self.suspensions, self._misfits = Suspensions(), Suspensions()
+        self._unfitted: dict[int, tuple[str, str]] = {}  # lines of shots that no epoch has judged yet, by number
+        self._frames = frames_of(site)
+        self._returns: dict[str, deque[float]] = {}  # V, of each ranger's last good shots on targets
         self.last_status: dict[str, str] = {}
         self.references: dict[str, int] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -94,6 +103,8 @@ class Firing:
         if answered.status in GOOD:
             self.suspensions.good(shot.ranger, shot.target)
             self.suspensions.good(shot.ranger, "")
+            self._unfitted[shot.number] = shot.ranger, shot.target
+            self._weigh(answered)
             if shot.target == REFERENCE:
                 self.references[shot.ranger] = now
         elif answered.status in OF_THE_LINE:
@@ -101,6 +112,25 @@ class Firing:
             text = f"{line}: {answered.text or answered.status}"
             self._herald.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
             self._line_failed(shot.ranger, shot.target, answered.status)
+
+    def fitted(self, used: Iterable[int], rejected: Mapping[int, str]) -> None:
+        """What an epoch said of shots that were good by themselves: one that does not fit is told, its line rests."""
+        kept = frozenset(used)
+        latest = max([*kept, *rejected], default=0)
+        for number in [n for n in self._unfitted if n <= latest]:
+            ranger, target = self._unfitted.pop(number)
+            reason = rejected.get(number, "")
+            if number in kept:
+                self._misfits.good(ranger, target)
+            elif reason.startswith(MISFIT):
+                line = f"{ranger} {target}"
+                text = f"{line}: {reason} (light from elsewhere, or one of them has moved)"
+                self._herald.tell("wrong-range", text, "warning", about=line, ranger=ranger, target=target)
+                self._line_failed(ranger, target, "of a wrong range", self._misfits)
+
+    def resting(self, now: int) -> frozenset[tuple[str, str]]:
+        """Lines that are left alone."""
+        return self.suspensions.lines(now) | self._misfits.lines(now)
 
     # Inside ---------------------------------------------------------------------------------------------------------
 
@@ -125,9 +155,12 @@ class Firing:
     async def _list(self, ranger: str, shots: Sequence[PlannedShot], end_ticks: int) -> None:
         """A ranger's shots of a round, one after another."""
         for planned in shots:
-            if max(ticks_now(self._clock), planned.begin_ticks) >= end_ticks or not self._may_go_on(ranger):
+            begin = ticks_now(self._clock)
+            if planned is not shots[0]:  # the first may be behind the round: a way longer than a round is gone too
+                begin = max(begin, planned.begin_ticks)
+            if begin >= end_ticks or not self._may_go_on(ranger):
                 return
-            if not planned.fixed and not self._telescope_known():
+            if not self._telescope_known() and not self._stands(planned):
                 continue
             if not await self._fire(planned, 1) and not self._failed(ranger, planned.target):
                 return
@@ -140,11 +173,15 @@ class Firing:
             except CatseyeError as problem:
                 self._herald.tell("no-place", f"{ranger} {target}: {problem}", "warning", about=ranger)
                 return
-            if not planned.fixed and not self._telescope_known():
+            if not self._telescope_known() and not self._stands(planned):
                 return
             if not await self._fire(planned, STREAM_COUNT):
                 self._failed(ranger, target)
                 return
+
+    def _stands(self, planned: PlannedShot) -> bool:
+        """Whether it is where it is planned, wherever the telescope points."""
+        return planned.fixed or {self._frames.get(n) for n in (planned.ranger, planned.target)} == {"ground"}
 
     async def _fire(self, planned: PlannedShot, count: int) -> int:
         return await self._links[planned.ranger].stream(planned, self._intake.take, count=count)
@@ -161,8 +198,20 @@ class Firing:
             self._herald.tell("ranger-suspended", text, "alarm", about=ranger, ranger=ranger)
         return not self.suspensions.resting(ranger, "", now)
 
-    def _line_failed(self, ranger: str, target: str, how: str) -> None:
-        rest = self.suspensions.failed(ranger, target, ticks_now(self._clock))
+    def _weigh(self, answered: AnsweredShot) -> None:
+        """A return far below what the ranger's targets give is told, though it is used."""
+        shot, usual = answered.shot, self._returns.setdefault(answered.shot.ranger, deque(maxlen=RETURNS))
+        if shot.target == REFERENCE or not shot.amplitude > 0.0:
+            return
+        level = median(usual) if len(usual) >= FEWEST_RETURNS else 0.0
+        usual.append(shot.amplitude)
+        if shot.amplitude < WEAK * level:
+            line, share = f"{shot.ranger} {shot.target}", 100.0 * shot.amplitude / level
+            text = f"{line}: return {shot.amplitude:.3f} V, {share:.0f} % of usual: dew, or partly in the way"
+            self._herald.tell("weak-return", text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+
+    def _line_failed(self, ranger: str, target: str, how: str, records: Suspensions | None = None) -> None:
+        rest = (records or self.suspensions).failed(ranger, target, ticks_now(self._clock))
         if rest is not None:
             line = f"{ranger} {target}"
             text = f"{line} is {how} again and again: left alone for {rest:g} s"
@@ -171,10 +220,11 @@ class Firing:
     def _aim(self, ranger: str, target: str) -> PlannedShot:
         """A shot as soon as it can be, on where the target is predicted; on the feed arm, where the records have it."""
         duration = self._links[ranger].sampling.duration
-        begin = ticks_now(self._clock) + round(STREAM_LEAD * TICKS_PER_SECOND)
+        now = ticks_now(self._clock)
+        begin = now + round(STREAM_LEAD * TICKS_PER_SECOND)
         if target == REFERENCE or frame_of(self._site, ranger) == "reflector":
-            return PlannedShot(ranger, target, begin, duration, np.zeros(3), np.zeros(3), True, "stream")
+            return PlannedShot(ranger, target, now, duration, np.zeros(3), np.zeros(3), True, "stream")
         mjd = np.array([begin, begin + duration * TICKS_PER_SECOND]) / TICKS_PER_DAY
         first, last = self._live.place(target, mjd)
         fixed = bool(np.linalg.norm(last - first) < AT_REST * duration)
-        return PlannedShot(ranger, target, begin, duration, first, last, fixed, "stream")
+        return PlannedShot(ranger, target, now if fixed else begin, duration, first, last, fixed, "stream")

@@ -128,7 +128,7 @@ class SafetyGuard:
         Raises InputError: a ranger on the feed arm, and no posture, or an old one.
         """
         vantage = self.vantages[ranger]
-        sun = self.keep_clear.sun(now_ticks)
+        sun = self._suns_between(now_ticks, now_ticks)[0]
         if not self.keep_clear.counts_at(sun):
             return DOWN if vantage.frame == "ground" else ALONG_THE_BEAM
         if vantage.frame == "reflector":

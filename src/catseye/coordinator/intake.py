@@ -14,11 +14,11 @@ from typing import Any
 
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
-from catseye.coordinator.parts import JournalWriter, LiveReduction
+from catseye.coordinator.parts import JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
 
-TOGETHER = 0.005  # s in which what arrives is handled at once
+TOGETHER = 0.002  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back
 MOST_HELD = 2000  # happenings kept while the journal is away
 Entry = Any  # AnsweredShot | LiveWeather | LivePosture | Happening | Solution | ...
@@ -30,6 +30,7 @@ class Intake:
     judged     called with each shot and what the reduction said of it, at once
     publish    called with each entry when it is durable
     herald     says what goes wrong with the journal; that itself is journalled when it can be
+    doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
     """
 
     def __init__(
@@ -40,9 +41,10 @@ class Intake:
         judged: Callable[[AnsweredShot], None],
         publish: Callable[[Entry], None],
         herald: Herald,
+        doubted: Callable[[LiveWeather, str], None] = lambda read, why: None,
     ):
         self._live, self._journal, self._herald = live, journal, herald
-        self._judged, self._publish = judged, publish
+        self._judged, self._publish, self._doubted = judged, publish, doubted
         self._arrived: list[Entry] = []
         self._timer: asyncio.TimerHandle | None = None
         self._last: dict[str, int] = {}  # stamp of each ranger's last shot
@@ -60,7 +62,7 @@ class Intake:
         return "what was measured is not durable yet" if self._held or self._late else None
 
     def take(self, item: LiveShot | LiveWeather | LivePosture | Happening) -> None:
-        """Something has come; what comes within 5 ms is handled together."""
+        """Something has come; what comes within 2 ms is handled together."""
         if self.trouble is not None:
             self._see_to_journal()
             if isinstance(item, LiveWeather | LivePosture) or (
@@ -112,7 +114,7 @@ class Intake:
     def _fed(self, item: Any) -> Entry | None:
         """The reduction has it now; what the journal is to have."""
         if isinstance(item, LiveWeather):
-            self._live.weather(item)
+            self._doubted(item, self._live.weather(item) or "")
         elif isinstance(item, LivePosture):
             self._live.posture(item)
         elif isinstance(item, LiveShot):
@@ -156,8 +158,9 @@ class Intake:
         """The journal has made entries durable, or not."""
         problem = done.exception()
         if problem is None:
+            self._acknowledge_late()  # the journal keeps the order: they stand before these, and are durable too
             self._acknowledge(entries)
-        elif self._journal.trouble is not None or self._late:
+        elif isinstance(problem, NotDurable) or self._journal.trouble is not None or self._late:
             self._late.append(entries)
             self._away(str(problem))
         else:
@@ -167,6 +170,11 @@ class Intake:
         for entry in entries:
             self.acknowledged += isinstance(entry, AnsweredShot)
             self._publish(entry)
+
+    def _acknowledge_late(self) -> None:
+        late, self._late = self._late, []
+        for entries in late:
+            self._acknowledge(entries)
 
     def _away(self, why: str) -> None:
         self._herald.standing("journal-away", f"{why}: measuring stops", "alarm")
@@ -192,9 +200,7 @@ class Intake:
         if done.exception() is not None or self._journal.trouble is not None:
             self._see_to_journal()
             return
-        late, self._late = self._late, []
-        for entries in late:
-            self._acknowledge(entries)
+        self._acknowledge_late()
         self._send()
         if self.trouble is None:
             self._herald.standing("journal-away", None, over="the journal is back: measuring goes on")

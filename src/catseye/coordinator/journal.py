@@ -32,7 +32,7 @@ from catseye.coordinator.journal_place import (
 from catseye.coordinator.journal_rows import PACKED, RAW, Row, Rows, pack, rows_of
 from catseye.coordinator.journal_run import begin
 from catseye.coordinator.journal_tables import METADATA, RUNS, insertion
-from catseye.coordinator.parts import Clock, ticks_now
+from catseye.coordinator.parts import Clock, NotDurable, ticks_now
 from catseye.errors import InputError
 
 MOST_ROWS = 512  # of one commit
@@ -43,10 +43,6 @@ FIRST_WAIT, LONGEST_WAIT = 0.05, 2.0  # s between attempts while there is troubl
 LONGEST_DURABLE = 10.0  # s that `durable` waits: a server may hang without a word
 
 Tell = Callable[[str], None]
-
-
-class NotDurable(InputError):
-    """Entries that are not on the disk yet: they stay in line, and are written when that is possible."""
 
 
 @dataclass(eq=False)

@@ -1,7 +1,7 @@
 """One ranger, from the coordinator's side: connected, made ready, watched, and asked for one shot after another.
 
 Nothing here raises for what a ranger or the network does. What goes wrong is told as a happening with a name, every
-wait has an end, and a connection that is gone is made again: after 0.2 s, then twice that, up to 30 s.
+wait has an end, and a connection that is gone is made again: after 0.2 s, then a third longer each time, up to 30 s.
 """
 
 import asyncio
@@ -79,6 +79,7 @@ class RangerLink:
         self._client: ZyClient | None = None
         self._greeting = Greeting()
         self._doubt = asyncio.Event()
+        self._probed_at = 0.0
         self._heard_at = 0.0
         self._was_ready, self._patience = False, self.settings.probe_every
         self._lit_here = self._left = False
@@ -118,7 +119,7 @@ class RangerLink:
             if self._was_ready:
                 wait = self.settings.first_wait
             await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
-            wait = min(2.0 * wait, self.settings.longest_wait)
+            wait = min(self.settings.growth * wait, self.settings.longest_wait)
 
     async def _session(self) -> str:
         """One connection's life; why it ended."""
@@ -185,10 +186,13 @@ class RangerLink:
         """Of VER, s; another client's moves may stand before it."""
         return self.settings.probe_timeout if self.wanted == "measure" else self.settings.move_timeout
 
-    async def _lives(self) -> bool:
-        """Ask VER; from its stamp and the round trip, see to the clock."""
+    async def _lives(self, *, idle: bool = False) -> bool:
+        """Ask VER; from its stamp and the round trip, see to the clock.
+
+        idle   no shot is under way though `busy` says so
+        """
         loop = asyncio.get_running_loop()
-        sent = loop.time()
+        sent = self._probed_at = loop.time()
         reply = await self._ask(Request("VER"), self._probe_timeout)
         if reply.ok is not True or reply.ticks is None:
             return not self.connected or self._heard_at > sent  # gone is not hung: the session says why
@@ -198,7 +202,7 @@ class RangerLink:
         slow = f"a round trip takes {self.round_trip:.2f} s (limit {limit:g} s)" if self.round_trip > limit else None
         self._herald.standing("slow", slow, over=f"a round trip takes {self.round_trip:.3f} s again")
         right = self._watch.look(reply.ticks, self.round_trip)
-        if self.wanted == "measure" and not self.busy:
+        if self.wanted == "measure" and (idle or not self.busy):
             if right is not None:
                 await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
             if self.state == "ready" and self.status & Status.LASER_OFF:  # the ranger itself switched it off
@@ -318,6 +322,10 @@ class RangerLink:
             return 0
         self.busy = True
         try:
+            since = asyncio.get_running_loop().time() - self._probed_at  # a ranger that is always busy is asked, too
+            if since > self.settings.probe_every and not await self._lives(idle=True):
+                self._doubt.set()
+                return 0
             return await self._shooter.stream(planned, take, count=count)
         finally:
             self.busy = False

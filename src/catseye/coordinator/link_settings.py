@@ -19,6 +19,7 @@ class LinkSettings:
     """Times in s.
 
     first_wait, longest_wait  before a connection is tried again
+    growth        of that wait: who was away for long is found again within a third of that time more
     probe_every, probe_timeout  VER asks whether it lives
     slow          round trip beyond which a link is called slow
     clock_limit   how far its clock may be off before it is set
@@ -31,6 +32,7 @@ class LinkSettings:
 
     first_wait: float = 0.2
     longest_wait: float = 30.0
+    growth: float = 1.33
     probe_every: float = 2.0
     probe_timeout: float = 2.0
     slow: float = 0.25

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import SECONDS_PER_DAY
+from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request
 from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
 
@@ -148,7 +149,10 @@ class LiveReduction(Protocol):
         """Why the last epoch gave nothing."""
         ...
 
-    def weather(self, read: LiveWeather) -> object: ...
+    def weather(self, read: LiveWeather) -> str | None:
+        """Why a reading is not believed; nothing where it is."""
+        ...
+
     def posture(self, read: LivePosture) -> None: ...
     def shot(self, shot: LiveShot) -> ShotVerdict: ...
     def begin(self, ticks: int) -> "EpochJob | None":
@@ -163,6 +167,10 @@ class LiveReduction(Protocol):
     def uncertainty(self) -> dict[str, NDArray[Any]]:
         """Covariances (3, 3), m^2, of points as known by now."""
         ...
+
+
+class NotDurable(InputError):
+    """Entries that are not on the disk yet: they stay in line, and are written when that is possible."""
 
 
 class JournalWriter(Protocol):

@@ -1,6 +1,7 @@
 """A ranger's shots: point at a target or follow it, trigger, take amplitude and phase, take the samples."""
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing, suppress
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from catseye.coordinator.link import RangerLink
 
 Sent = tuple[int, "asyncio.Future[Reply]"]  # TID, and what will be answered
+SURELY = 12  # ticks, 10 ms: a start stamp so long ago is over by the ranger's clock, too
+IN_HAND = 0.05  # s of it for replies and samples, which are over when the next shot is asked for
+LONGEST_WAY = 5_000  # ticks, 4.3 s: what is planned farther apart waits for something else
 GAP = 0.02  # s between two buffers of a stream, at most
 AHEAD = 2  # triggers on their way: the next runs while the last is answered
 KINDS = (  # what a ranger's refusal of a move is called, by a word in it
@@ -50,6 +54,7 @@ class Shooter:
     def __init__(self, link: "RangerLink", herald: Herald, clock: Clock):
         self._link, self._herald, self._clock = link, herald, clock
         self.aimed: int | None = None
+        self._before: PlannedShot | None = None
         self._stream: int | None = None  # TID of the stream that runs
         self._heard: asyncio.Queue[Reply] = asyncio.Queue()
 
@@ -168,7 +173,9 @@ class Shooter:
                 self._pointed(reply)
                 self.aimed = number
             return planned.begin_ticks if planned.begin_ticks > ticks_now(self._clock) else None
-        begin = max(planned.begin_ticks, ticks_now(self._clock) + round(settings.lead * TICKS_PER_SECOND))
+        trip = 0.0 if math.isnan(link.round_trip) else link.round_trip
+        ahead = trip + max(settings.lead, self._way_to(planned) - IN_HAND)
+        begin = max(planned.begin_ticks, ticks_now(self._clock) + round(ahead * TICKS_PER_SECOND))
         late = (begin - planned.begin_ticks) / TICKS_PER_SECOND
         if late > settings.latest:
             raise Refused("late", f"its turn came {late:.1f} s late (limit {settings.latest:g} s)")
@@ -176,7 +183,17 @@ class Shooter:
         more = settings.slack + (count - 1) * (planned.duration + GAP)
         request = track(planned, number, begin, more)
         self._pointed(await link.sure(request, settings.probe_timeout + settings.buffer_timeout))
+        late = (ticks_now(self._clock) - begin) / TICKS_PER_SECOND
+        if late > settings.slack:  # the track would be over before the buffer is: nothing would return
+            raise Refused("late", f"TRK was answered {late:.2f} s after its shot's time (limit {settings.slack:g} s)")
         return begin
+
+    def _way_to(self, planned: PlannedShot) -> float:
+        """s that the plan leaves the mirror from the shot before to this: it needs them when it is late, too."""
+        before, self._before = self._before, planned
+        if before is None or not 0 < planned.begin_ticks - before.begin_ticks < LONGEST_WAY:
+            return 0.0
+        return (planned.begin_ticks - before.begin_ticks) / TICKS_PER_SECOND - before.duration
 
     async def _tell_of(self, number: int) -> None:
         """A cube that the ranger was not told of at first."""
@@ -200,7 +217,7 @@ class Shooter:
     def _trigger(self, planned: PlannedShot, begin: int | None) -> Trigger:
         request = Request("CMEAS", ("2", str(self._number(planned.target))), ticks=begin)
         measured = self._link.send(request)
-        waits = begin is not None and begin > ticks_now(self._clock)
+        waits = begin is not None and begin + SURELY > ticks_now(self._clock)
         return Trigger(begin, measured, None if waits else self._link.send(Request("BUF")))
 
     async def _shot(self, planned: PlannedShot, trigger: Trigger) -> LiveShot:

@@ -33,7 +33,7 @@ from catseye.coordinator.vigil import Vigil
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
-from catseye.records.live import Happening, LivePosture
+from catseye.records.live import Happening, LivePosture, LiveWeather
 from catseye.records.site_folder import SiteFolder
 
 WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
@@ -45,14 +45,14 @@ class ZiySettings:
 
     posture_every   the reduction and the journal get no more postures than one each
     idle            before it is asked again what to do, where nothing can be done
-    passive_every   between two epochs in passive mode
+    epoch_every     between two epochs where no round is planned: streams alone, passive mode
     grace           past a round's end, for shots under way, before the next is planned without their rangers
     leave           for lasers to be switched off at the end
     """
 
     posture_every: float = 0.1
     idle: float = 0.25
-    passive_every: float = 10.0
+    epoch_every: float = 10.0
     grace: float = 0.4
     leave: float = 3.0
 
@@ -90,12 +90,14 @@ class Coordinator:
         self._guard = guard
         self.listeners: list[Callable[[Entry], None]] = []
         self._herald = Herald("coordinator", clock, self._happened)
+        self._stations: dict[str, Herald] = {}
         self.intake = Intake(
             live,
             journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
             herald=Herald("journal", clock, self._happened),
+            doubted=self._doubted,
         )
         asked = commands or (lambda ranger: commands_of_ranger(site, ranger))
         later = [t.name for t in site.targets.values() if t.type == "prism" and t.frame == "reflector"]
@@ -196,6 +198,7 @@ class Coordinator:
     # Rounds ---------------------------------------------------------------------------------------------------------
 
     async def _rounds(self) -> None:
+        loop, next_epoch = asyncio.get_running_loop(), 0.0
         while True:
             self.intake.flush()  # the planner shall know how the last shots were
             now = ticks_now(self.clock)
@@ -206,18 +209,18 @@ class Coordinator:
                 self.firing.begin(planned)
             if not stopped:
                 self.firing.begin_streams()
-            if self._solving is None or self._solving.done():
+            due = planned is not None or loop.time() >= next_epoch
+            if due and (self._solving is None or self._solving.done()):
                 if self._solving is not None:
                     self._solving.result()  # an epoch's own failure is told; anything else is the program's
-                self._solving = asyncio.get_running_loop().create_task(self._solve(now), name="epoch")
-            asked_again = asyncio.get_running_loop().time() + self.settings.idle
+                self._solving = loop.create_task(self._solve(now), name="epoch")
+                next_epoch = loop.time() + self.settings.epoch_every
+            asked_again = loop.time() + self.settings.idle
             if planned is not None and planned.shots:
                 left = (planned.end_ticks - ticks_now(self.clock)) / TICKS_PER_SECOND
                 await self.firing.done(tuple(planned.shots), max(self.settings.idle, left + self.settings.grace))
-            elif self.mode == "passive":
-                asked_again += self.settings.passive_every
             # a round may be over at once: nothing in it, or nothing that may be fired
-            await asyncio.sleep(max(0.0, asked_again - asyncio.get_running_loop().time()))
+            await asyncio.sleep(max(0.0, asked_again - loop.time()))
 
     def _planned(self, now: int) -> Round | None:
         state = self.state(now)
@@ -238,7 +241,7 @@ class Coordinator:
             self.posture,
             self.firing.ready(now),
             {name: link.counts for name, link in self.links.items() if link.counts is not None},
-            self.firing.suspensions.lines(now),
+            self.firing.resting(now),
             {name: (now - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()},
             self._live.place,
             self._live.uncertainty(),
@@ -248,6 +251,7 @@ class Coordinator:
         answer = await self.intake.solve(now)
         if answer is not None:
             self.answer = answer
+            self.firing.fitted(answer.used, answer.rejected)
 
     # What comes in --------------------------------------------------------------------------------------------------
 
@@ -262,6 +266,11 @@ class Coordinator:
             self.posture = read
             self._guard.telescope(read)
             self.intake.take(read)
+
+    def _doubted(self, read: LiveWeather, why: str) -> None:
+        """What the reduction thinks of a station's reading."""
+        herald = self._stations.setdefault(read.station, Herald(read.station, self.clock, self._happened))
+        herald.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
         """Another client's shot, in passive mode."""

@@ -24,6 +24,7 @@ FIRST_CLIENT_TID = 1000  # 0 to 999 belong to the ZY
 LONGEST_REQUEST = 1024  # bytes without the line's end
 LONGEST_REPLY = 2**18  # a buffer of 65 536 samples in base64 has 174 764
 MOST_PARAMETERS = 32
+LONG = 512  # characters, from which on arrays are faster than str
 COMMAND = re.compile(r"[A-Za-z][A-Za-z0-9]{0,15}")
 STAMP = re.compile(r"([0-9]{1,5})\.([0-9]{8})")  # as all are that a program writes
 DIGITS = re.compile(r"[0-9]{1,10}")
@@ -254,9 +255,15 @@ def _tid(text: str) -> int:
 
 
 def _printable(body: str) -> None:
-    if not (body.isascii() and body.isprintable()):
+    if not body.isascii() or not (_all_shown(body) if len(body) > LONG else body.isprintable()):
         at = next(i for i, letter in enumerate(body) if not " " <= letter <= "~")
         raise InputError(f"character {at + 1} is {body[at]!a} (expected printable ASCII)")
+
+
+def _all_shown(body: str) -> bool:
+    """`isprintable` of ASCII, ten times as fast for a buffer's line."""
+    codes = np.frombuffer(body.encode("ascii"), dtype=np.uint8)
+    return bool(codes.min() >= ord(" ") and codes.max() <= ord("~"))
 
 
 def _body(body: str) -> tuple[str, str]:

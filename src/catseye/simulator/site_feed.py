@@ -74,7 +74,6 @@ class SiteFeed:
         self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
         self._network: Network = network or Sockets()
         self._weather_ns = round(weather_every * PER_SECOND)
-        self._last_weather: dict[str, bytes] = {}
         self._listener: Listener | None = None
         self.clients: set[FeedConnection] = set()
         self.port = 0
@@ -112,11 +111,11 @@ class SiteFeed:
             await asyncio.sleep((step - now % step) / PER_SECOND)
 
     def greeting(self) -> bytes:
-        """What a new client hears: who this is, and the last weather."""
+        """What a new client hears: who this is, and the weather, read now: what is older than 5 s nobody would use."""
         ticks = nanoseconds_to_ticks(self.clock.now_ns())
         hello = Reply("HELLO", None, (f"This is SITE {self.name} ver. {VERSION}",), 0, ticks)
         connected = Reply("CONNECT", True, (str(self.port),), 0, ticks)
-        return b"".join([_line(hello), _line(connected), *self._last_weather.values()])
+        return b"".join([_line(hello), _line(connected), *self._weather(ticks)])
 
     def _joining(self) -> "FeedConnection":
         return FeedConnection(self)
@@ -126,7 +125,7 @@ class SiteFeed:
             client.write(data)
 
     def _weather(self, ticks: int) -> list[bytes]:
-        self._last_weather.clear()
+        told = []
         for station in self.stations:
             read = self.world.weather(station, self.world.seconds(ticks * TICK_NS))
             values = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
@@ -134,8 +133,8 @@ class SiteFeed:
                 said = (
                     f"{v:.{digits}f}" if np.isfinite(v) else "none" for v, digits in zip(values, (3, 3, 2), strict=True)
                 )
-                self._last_weather[station] = _line(Reply("WX", True, (station, *said), 0, ticks))
-        return list(self._last_weather.values())
+                told.append(_line(Reply("WX", True, (station, *said), 0, ticks)))
+        return told
 
     def _posture(self, ticks: int) -> bytes:
         """The place at exactly the stamp's time."""

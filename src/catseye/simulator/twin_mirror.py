@@ -286,7 +286,8 @@ class TwinMirror:
         with self._axis(k) as axis:
             axis.chip.seeking = False
         if not self.axes.index_found(k):
-            self._stop_abruptly(k)
+            with self._axis(k) as axis:
+                axis.chip.stop("off")  # it may lean on a stop: a filter that winds up would miss the next home
             self.homing[k] = "failed"
             return
         at = self.axes.axis(k).chip.index_position

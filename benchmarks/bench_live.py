@@ -1,0 +1,230 @@
+"""A coordinator of 18 streaming rangers: its share of a core, the time from a buffer to its durable acknowledgement.
+
+python benchmarks/bench_live.py [--seconds 30] [--rangers 18] [--heads fast|twin] [--postgresql URL] [--json]
+
+The rangers are the twin's, in a process of their own, on sockets; 128 ms buffers back to back. `fast`: their heads have
+the buffers ready (returns of the twin's truth), so that the generator does not take the second core; `twin`: the
+twin's own heads. This process is the coordinator with all it has: links, guard, reduction, an epoch each 10 s, journal
+with buffers, its own port; its share of a core is that of the process, all threads. Time counts from the end of a
+buffer, by its stamp (in steps of 0.9 ms), until the entry is told as durable. Lost: fired, by the heads' own count,
+and not in the journal.
+
+Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3 with
+a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
+"""
+
+import argparse
+import asyncio
+import base64
+import json
+import os
+import sqlite3
+import sys
+import tempfile
+import time
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from catseye.coordinator.journal_entries import AnsweredShot
+from catseye.coordinator.journal_reader import JournalReader
+from catseye.gateways.live_coordinator import LiveCoordinator, Orders
+from catseye.records.site_folder import REFERENCE
+from load_scene import LoadChild, load_site, lost_and_doubled
+
+TICK = 864e-6  # s
+LONGEST_START, SETTLED, DRAINED = 60.0, 14.0, 2.0  # s
+PEER_SECONDS = 10.0
+BUFFER_BYTES = 16_384
+
+
+@dataclass(frozen=True)
+class Result:
+    """Of one run: shots a second a ranger; % of a core; ms from a buffer's end until it is durable; shots by count."""
+
+    name: str
+    rate: float
+    cpu_percent: float
+    ms_a_shot: float
+    p50_ms: float
+    p90_ms: float
+    p99_ms: float
+    max_ms: float
+    shots: int
+    lost: int | None = None
+    doubled: int | None = None
+
+
+def result(name: str, late: list[float], cpu: float, wall: float, rangers: int, **counts: int) -> Result:
+    quantiles = (float(v) * 1e3 for v in np.percentile(late, [50, 90, 99, 100]))
+    n = len(late)
+    return Result(name, n / wall / rangers, 100.0 * cpu / wall, 1e3 * cpu / n, *quantiles, n, **counts)
+
+
+async def coordinated(child: LoadChild, site: Any, journal: str, name: str, seconds: float) -> Result:
+    """The coordinator; first a round that gives each ranger a reference and a target, then streams."""
+    late: list[float] = []
+    targets: dict[str, str] = {}
+    before = child.report()["fired"]
+    running = LiveCoordinator(
+        site, Orders(journal=journal, port=0), addresses=child.addresses, feed=child.feed, clock=child.clock
+    )
+
+    def entry(entry: Any) -> None:
+        if isinstance(entry, AnsweredShot):
+            shot = entry.shot
+            late.append(child.clock.now_ns() * 1e-9 - shot.ticks * TICK - shot.duration)
+            if entry.status == "used" and shot.target != REFERENCE:
+                targets[shot.ranger] = shot.target
+
+    running.ziy.listeners.append(entry)
+    task = asyncio.create_task(running.run())
+    began = time.monotonic()
+    while len(targets) < len(child.addresses) and time.monotonic() - began < LONGEST_START:
+        await asyncio.sleep(0.2)
+    for ranger in child.addresses:
+        running.ziy.stream(ranger, targets.get(ranger, REFERENCE))
+    await asyncio.sleep(SETTLED)  # the round that was planned before comes to its end
+    late.clear()
+    cpu, wall = time.process_time(), time.perf_counter()
+    await asyncio.sleep(seconds)
+    cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, list(late)
+    for ranger in child.addresses:
+        running.ziy.stream(ranger, None)
+    running.ziy.mode = "hold"  # streams under way come to their end
+    while any(link.busy for link in running.ziy.links.values()):
+        await asyncio.sleep(0.1)
+    await asyncio.sleep(DRAINED)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    fired = {name: ticks[len(before[name]) :] for name, ticks in child.report()["fired"].items()}
+    lost, doubled = lost_and_doubled(fired, JournalReader(journal))
+    return result(name, measured, cpu, wall, len(child.addresses), lost=lost, doubled=doubled)
+
+
+async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as_json: bool) -> Result:
+    """What a user would write: a task a ranger, a commit a shot."""
+    late: list[float] = []
+    turn = np.exp(1j * 2.0 * np.pi * np.arange(BUFFER_BYTES // 2) / 64) * 2.0 / (BUFFER_BYTES // 2)
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("CREATE TABLE shots (ranger TEXT, stamp TEXT, amplitude REAL, phase REAL, samples)")
+
+        async def listen(ranger: str) -> None:
+            at = child.addresses[ranger]
+            reader, writer = await asyncio.open_connection(at.host, at.ports[0], limit=2**20)
+            writer.write(b"1000\tCIL 0\n1001\tSTM 0, 100000\n")
+            try:
+                while line := await reader.readline():
+                    _, stamp, body = line.decode().rstrip().split("\t") if b"\t" in line else ("", "", "")
+                    if not body.startswith("BUF 1"):
+                        continue
+                    _, _, cycles, _, hertz, volts, _, text = body.split(", ")
+                    samples = np.frombuffer(base64.b64decode(text), dtype="<i2")
+                    found = complex(turn @ samples) * float(volts)
+                    kept = json.dumps(samples.tolist()) if as_json else samples.tobytes()
+                    row = (ranger, stamp, abs(found), float(np.angle(found)), kept)
+                    database.execute("INSERT INTO shots VALUES (?, ?, ?, ?, ?)", row)
+                    database.commit()
+                    day, rest = stamp.split(".")
+                    ticks = int(day) * 10**8 + int(rest)
+                    late.append(child.clock.now_ns() * 1e-9 - ticks * TICK - int(cycles) / int(hertz))
+            finally:
+                writer.close()
+
+        tasks = [asyncio.create_task(listen(ranger)) for ranger in child.addresses]
+        await asyncio.sleep(3.0)
+        late.clear()
+        cpu, wall = time.process_time(), time.perf_counter()
+        await asyncio.sleep(seconds)
+        cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, list(late)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    return result(name, measured, cpu, wall, len(child.addresses))
+
+
+def machine(folder: Path) -> dict[str, float]:
+    """What no program here can be faster than: a flush of one buffer to the disk, copying it, its base64."""
+    raw = os.urandom(BUFFER_BYTES)
+    text = base64.b64encode(raw)
+    spent = []
+    with (folder / "flushed").open("wb", buffering=0) as file:
+        for _ in range(200):
+            file.write(raw)
+            began = time.perf_counter()
+            os.fsync(file.fileno())
+            spent.append(time.perf_counter() - began)
+    taken = {}
+    for name, job in (("copy_us", lambda: bytearray(raw)), ("base64_us", lambda: base64.b64decode(text))):
+        best = float("inf")
+        for _ in range(20):
+            began = time.perf_counter()
+            for _ in range(50):
+                job()
+            best = min(best, (time.perf_counter() - began) / 50)
+        taken[name] = best * 1e6
+    return {
+        "flush_p50_ms": float(np.median(spent)) * 1e3,
+        "flush_p99_ms": float(np.percentile(spent, 99)) * 1e3,
+        **taken,
+    }
+
+
+async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
+    site = load_site(options.rangers)
+    found = []
+    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        places = [("catseye, SQLite", str(folder / "night.db"))]
+        if options.postgresql:
+            places.append(("catseye, PostgreSQL", options.postgresql))
+        for name, place in places:
+            found.append(await coordinated(child, site, place, name, options.seconds))
+        for name, as_json in (("asyncio, JSON, a commit each", True), ("asyncio, bytes, a commit each", False)):
+            path = folder / f"{len(found)}.db"
+            found.append(await by_hand(child, path, name, min(options.seconds, PEER_SECONDS), as_json=as_json))
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--rangers", type=int, default=18)
+    parser.add_argument("--heads", choices=("fast", "twin"), default="fast")
+    parser.add_argument("--postgresql", metavar="URL", help="an empty database")
+    parser.add_argument("--folder", type=Path, help="where the journals are written and removed again")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        found = asyncio.run(measured(options, folder))
+        limits = machine(folder)
+    load = os.getloadavg()[0]
+    if options.json:
+        sys.stdout.write(
+            json.dumps({"results": [asdict(each) for each in found], "machine": limits, "load": load}) + "\n"
+        )
+        return
+    ours = found[0]
+    sys.stdout.write(
+        f"{options.rangers} rangers, {options.heads} heads, {options.seconds:g} s; load of the machine {load:.1f}\n"
+    )
+    head = ("shots/s", "% of a core", "ms a shot", "ratio", "p50 ms", "p90", "p99", "max", "lost", "doubled")
+    sys.stdout.write(f"{'':<32}" + "".join(f"{each:>12}" for each in head) + "\n")
+    for r in found:
+        row = [f"{r.rate:.2f}", f"{r.cpu_percent:.1f}", f"{r.ms_a_shot:.2f}", f"{r.ms_a_shot / ours.ms_a_shot:.1f} x"]
+        row += [f"{v:.1f}" for v in (r.p50_ms, r.p90_ms, r.p99_ms, r.max_ms)]
+        row += ["" if v is None else str(v) for v in (r.lost, r.doubled)]
+        sys.stdout.write(f"  {r.name:<30}" + "".join(f"{each:>12}" for each in row) + "\n")
+    sys.stdout.write(
+        f"machine: a flush of {BUFFER_BYTES} bytes {limits['flush_p50_ms']:.1f} ms (99th percentile "
+        f"{limits['flush_p99_ms']:.1f}), a copy {limits['copy_us']:.1f} us, base64 {limits['base64_us']:.0f} us\n"
+    )
+
+
+if __name__ == "__main__":
+    main()

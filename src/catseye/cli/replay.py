@@ -1,0 +1,53 @@
+"""The command that gives a journal to the reduction again."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.terminal import ProgressLine, say, wrapped
+
+JournalArgument = Annotated[str, typer.Argument(metavar="JOURNAL", help="File, or postgresql://USER@HOST/DATABASE.")]
+RunName = Annotated[
+    str | None, typer.Option("--run", metavar="RUN", help="Number, or the beginning of its uuid.  [default: the last]")
+]
+
+
+def run_of(text: str | None) -> int | str | None:
+    """As a journal's reader takes it."""
+    return int(text) if text is not None and text.isdecimal() else text
+
+
+@app.command(
+    epilog="\b\nExample: catseye replay night.db\nCalibrated anew: catseye replay night.db --calibrations sites/ours"
+)
+def replay(
+    journal: JournalArgument,
+    run: RunName = None,
+    calibrations: Annotated[
+        Path | None,
+        typer.Option(
+            "--calibrations", metavar="SITE_DIR", help="Records of the site to reduce with, in place of its own."
+        ),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A run again: the same to the last bit, or how far other calibrations move each point."""
+    from catseye.gateways.live_replay import replay_object, replay_passages, replayed
+
+    progress = ProgressLine(quiet)
+    try:
+        found = replayed(journal, run_of(run), calibrations, progress)
+    finally:
+        progress.clear()
+    if json:
+        from catseye.gateways.objects import json_line
+
+        say(json_line(replay_object(found)))
+    elif not quiet:
+        for title, text in replay_passages(found):
+            say(wrapped(title, text))
+    if calibrations is None and not found.same:
+        raise SystemExit(1)

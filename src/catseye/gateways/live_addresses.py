@@ -1,0 +1,60 @@
+"""addresses.toml: where each ranger of a site is, and its feed.
+
+format = "catseye-addresses-1"
+feed = "10.1.0.2:5250"                                # may be left out
+
+[[ranger]]
+name = "ZY101"
+host = "10.1.8.1"
+ports = [5240, 5241]                                  # these unless said
+"""
+
+from pathlib import Path
+
+from catseye.coordinator.link_settings import Address
+from catseye.ranger.server import PORTS
+from catseye.records.reading import Folder, toml_of
+from catseye.records.refusal import refusal, shown
+from catseye.records.site_folder import SiteFolder
+from catseye.records.toml_fields import Fields
+
+FORMAT = "catseye-addresses-1"
+LAST_PORT = 65_535
+
+
+def read_addresses(path: Path, site: SiteFolder) -> tuple[dict[str, Address], tuple[str, int] | None]:
+    """Addresses by ranger, and the feed's. A site's ranger that is not in it is not of this coordinator.
+
+    Raises InputError with file, place, value and what was expected.
+    """
+    name = path.name
+    values = toml_of(Folder(path.parent).text(name), name)
+    top = Fields(name, "top", values)
+    if top.text("format") != FORMAT:
+        raise refusal(name, f"format = {shown(values['format'])} (expected {FORMAT!r})")
+    found: dict[str, Address] = {}
+    for table in top.tables("ranger"):
+        ranger = table.text("name")
+        if ranger not in site.rangers:
+            raise table.refuse(f"name = {shown(ranger)} is no ranger of the site (expected {', '.join(site.rangers)})")
+        if ranger in found:
+            raise table.refuse(f"name = {shown(ranger)} stands there twice (expected once)")
+        found[ranger] = Address(table.text("host"), _ports(table))
+    if not found:
+        raise refusal(name, "names no ranger (expected [[ranger]] with name and host)")
+    return found, None if not top.has("feed") else _feed(top)
+
+
+def _ports(table: Fields) -> tuple[int, int]:
+    value = table.take("ports", list, "two ports", list(PORTS))
+    if len(value) != 2 or not all(isinstance(v, int) and 1 <= v <= LAST_PORT for v in value):
+        raise table.refuse(f"ports = {shown(value)} (expected two, 1 to {LAST_PORT})")
+    return value[0], value[1]
+
+
+def _feed(top: Fields) -> tuple[str, int]:
+    text = top.text("feed")
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or not 1 <= int(port) <= LAST_PORT:
+        raise top.refuse(f"feed = {shown(text)} (expected HOST:PORT)")
+    return host.strip("[]"), int(port)

@@ -1,0 +1,89 @@
+"""A living command's event loop: Ctrl-C and termination end it in order, and by force where order takes too long."""
+
+import asyncio
+import os
+import signal
+import threading
+from collections.abc import Callable, Coroutine
+from types import FrameType
+from typing import Any, Generic, TypeVar
+
+from catseye.simulator.virtual_time import VirtualLoop
+
+T = TypeVar("T")
+LONGEST_END = 4.5  # s from the signal until the process is gone: the contract allows five
+NUMBERS = (signal.SIGINT, signal.SIGTERM)
+
+
+class FastLoop(VirtualLoop):
+    """Virtual time in a loop that can be closed though threads have worked for it."""
+
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:
+        with self.outside():  # the threads end in real time
+            await super().shutdown_default_executor()
+
+
+class LiveRun(Generic[T]):
+    """One coroutine, run until it ends or a signal asks for its end.
+
+    work           makes the coroutine; a signal cancels it, once
+    loop_factory   of the loop; asyncio's own if None
+
+    The first signal cancels; a second one, or 4.5 s, leave at once in the way that `interruption` has.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[], Coroutine[Any, Any, T]],
+        *,
+        loop_factory: Callable[[], asyncio.AbstractEventLoop] | None = None,
+    ):
+        self._work, self._factory = work, loop_factory
+        self._before: dict[int, Any] = {}
+        self._task: asyncio.Task[T] | None = None
+        self._alarm: threading.Timer | None = None
+        self.signal = 0  # that ended it; 0 of none
+
+    def result(self) -> T | None:
+        """What the coroutine gave; None where a signal ended it before it gave anything."""
+        with asyncio.Runner(loop_factory=self._factory) as runner:
+            loop = runner.get_loop()
+
+            async def watched() -> T:
+                self._task = asyncio.current_task()
+                if self.signal:  # it came before there was anything to cancel
+                    raise asyncio.CancelledError
+                return await self._work()
+
+            def caught(number: int, frame: FrameType | None) -> None:
+                if self.signal:
+                    self._leave(number)
+                self.signal = number
+                self._alarm = threading.Timer(LONGEST_END, self._leave, (number,))
+                self._alarm.daemon = True
+                self._alarm.start()
+                if self._task is not None:
+                    loop.call_soon_threadsafe(self._task.cancel)
+
+            self._before = {number: signal.signal(number, caught) for number in NUMBERS}
+            try:
+                return runner.run(watched())
+            except asyncio.CancelledError:
+                return None
+            finally:
+                runner.close()
+                self._restore()
+
+    def _leave(self, number: int) -> None:
+        """At once: as this process leaves on signals otherwise, its undoings with it."""
+        before = self._before.get(number)
+        if callable(before) and before is not signal.default_int_handler:
+            before(number, None)
+        os._exit(128 + number)
+
+    def _restore(self) -> None:
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm.join()
+        for number, before in self._before.items():
+            signal.signal(number, before)

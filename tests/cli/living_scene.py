@@ -1,0 +1,91 @@
+"""A small living site for the commands: Green Bank with few prisms on its dish, and a run of it in virtual time."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+from catseye.records.site_folder import site_files
+from simulator.living_scene import site
+
+RUN = (sys.executable, "-P", "-c", "from catseye.cli.main import run; run()")
+SOON = 5.0  # s, the contract's
+PATIENCE = 90.0  # s for a process to come up on a machine that is busy
+
+
+def write_site(folder: Path) -> Path:
+    """The small site's folder."""
+    for path, text in site_files(site()).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    return folder
+
+
+@cache
+def small_site() -> Path:
+    """Written once a process; the system's temporary directory is emptied by the system."""
+    return write_site(Path(_kept().name) / "site")
+
+
+@cache
+def recorded() -> Path:
+    """The journal of 24 s, in virtual time."""
+    journal = Path(_kept().name) / "night.db"
+    words = ["simulate", str(small_site()), "--fast", "--minutes", "0.4", "--journal", str(journal), "--quiet"]
+    subprocess.run([*RUN, *words], check=True, timeout=PATIENCE)
+    return journal
+
+
+@cache
+def _kept() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory(prefix="catseye-test-")
+
+
+@contextmanager
+def started(*words, home=None, stdin=subprocess.DEVNULL):
+    """A command in a process of its own; its temporary files in `home`. Killed at the end if it is there still."""
+    place = {**os.environ, "OPENBLAS_NUM_THREADS": "1"} | ({} if home is None else {"TMPDIR": str(home)})
+    process = subprocess.Popen(
+        [*RUN, *map(str, words)],
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=place,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        if process.stdin is not None and process.stdin.closed:
+            process.stdin = None
+        process.communicate()
+
+
+def ended(process, number):
+    """Status after a signal, within the contract's time, and what the process still said."""
+    process.send_signal(number)
+    since = time.monotonic()
+    said = process.communicate(timeout=4 * SOON)
+    assert time.monotonic() - since < SOON
+    return process.returncode, *said
+
+
+def processes_with(text):
+    """Ids of the processes whose command line holds a text, but for this one."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdecimal() and int(folder.name) != os.getpid():
+            try:
+                line = (folder / "cmdline").read_bytes()
+                state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+            except OSError:
+                continue
+            if text.encode() in line and state != "Z":
+                found.append(int(folder.name))
+    return found

@@ -1,0 +1,62 @@
+"""A site as a service: its twin is started again when it dies, and SIGTERM is how it ends."""
+
+import json
+import os
+import signal
+import socket
+
+import pytest
+
+from cli.living_scene import ended, processes_with, small_site, started
+
+
+def free_base():
+    """A base above which nobody is likely to listen: one that the system gave away, and what follows it."""
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        return min(taken.getsockname()[1], 60_000)
+
+
+def read_until(process, kind):
+    while True:
+        row = json.loads(process.stderr.readline())
+        if row["kind"] == kind:
+            return row
+
+
+def test_a_twin_that_is_started_again_needs_ports_that_stay(catseye):
+    status, _, err = catseye("serve", "gbt", "--twin", "--port-base", "0")
+    assert status == 2
+    assert "needs ports that stay" in " ".join(err.split())
+
+
+def test_a_site_that_is_not_there_is_named(catseye):
+    status, _, err = catseye("serve", "nowhere", "--twin")
+    assert status == 1
+    assert "nowhere" in err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
+def test_a_twin_that_dies_comes_back_and_the_end_is_clean(tmp_path, number, status):
+    words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
+    words += ["--start", "60635.125", "--journal", tmp_path / "site.db"]
+    with started(*words, home=tmp_path) as process:
+        read_until(process, "listens")
+        read_until(process, "epoch")
+        children = [pid for pid in processes_with("--leave-with-stdin") if parent_of(pid) == process.pid]
+        assert len(children) == 1
+        os.kill(children[0], signal.SIGKILL)
+        assert "started again" in read_until(process, "child")["text"]
+        read_until(process, "lost")
+        read_until(process, "epoch")
+        code, out, _ = ended(process, number)
+    assert (code, out) == (status, "")
+    assert processes_with(str(tmp_path)) == []
+    left = [path.name for path in tmp_path.iterdir()]
+    assert "site.db" in left
+    assert "site.db.writer" not in left
+
+
+def parent_of(pid):
+    with open(f"/proc/{pid}/stat") as stream:
+        return int(stream.read().rpartition(")")[2].split()[1])

@@ -1,0 +1,76 @@
+"""The one way in: what the journal says late is acknowledged all the same."""
+
+import asyncio
+from concurrent.futures import Future
+
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.intake import Intake
+from catseye.coordinator.parts import NotDurable
+from catseye.records.live import Happening
+from catseye.simulator.world_clock import ManualClock
+
+NOTE = Happening(1, "ZY101", "ready", "ZY101 is ready")
+NEXT = Happening(2, "ZY102", "ready", "ZY102 is ready")
+
+
+class SlowJournal:
+    """A journal without trouble by the time that its refusal is heard: it was away, and is back."""
+
+    trouble = None
+
+    def __init__(self):
+        self.given, self.futures = [], []
+
+    def append(self, *items):
+        self.given += items
+        self.futures.append(Future())
+        if not items:  # all before it are durable by now
+            self.futures[-1].set_result(1)
+        return self.futures[-1]
+
+
+def intake_of(journal, published):
+    clock = ManualClock(60_635.125)
+    herald = Herald("journal", clock, lambda said: None)
+    return Intake(None, journal, judged=None, publish=published.append, herald=herald)
+
+
+async def settled():
+    """What the journal's thread has said goes through the loop twice."""
+    await asyncio.sleep(0.0)
+    await asyncio.sleep(0.0)
+
+
+def test_what_was_not_durable_in_time_is_made_known_once_it_is():
+    async def story():
+        journal, published = SlowJournal(), []
+        intake = intake_of(journal, published)
+        intake.take(NOTE)
+        intake.flush()
+        journal.futures[0].set_exception(NotDurable("kept, and written when that is possible"))
+        await settled()
+        assert published == []
+        assert intake.trouble is not None  # nothing is fired while what was fired is not safe
+        intake._retry()
+        await settled()
+        assert published == [NOTE]
+        assert intake.trouble is None
+        assert journal.given == [NOTE]  # not sent again: the journal has it
+
+    asyncio.run(story())
+
+
+def test_what_is_durable_late_is_made_known_in_the_journals_order():
+    async def story():
+        journal, published = SlowJournal(), []
+        intake = intake_of(journal, published)
+        for note in (NOTE, NEXT):
+            intake.take(note)
+            intake.flush()
+        journal.futures[0].set_exception(NotDurable("kept, and written when that is possible"))
+        await settled()
+        journal.futures[1].set_result(2)  # the journal is back, and has written both
+        await settled()
+        assert published == [NOTE, NEXT]
+
+    asyncio.run(story())

@@ -1,0 +1,88 @@
+"""Many rangers at once, in a process of their own, on sockets: each shot that was fired is in the journal, and once.
+
+What counts is the heads' own count of what they fired. Timing is not asserted, machines differ: it is measured by
+benchmarks/bench_live.py.
+"""
+
+import asyncio
+import time
+
+import pytest
+
+from catseye.coordinator.journal import Journal
+from catseye.coordinator.journal_entries import AnsweredShot, Run
+from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.ziy import Coordinator
+from catseye.gateways.live_sun import SiteGuard
+from catseye.gateways.live_warm import initialising_commands
+from catseye.reduction.live import Live
+from load_scene import EverySecond, LoadChild, load_site, lost_and_doubled
+
+TARGETS = 4
+ROUND = 10.0  # s
+LONGEST = 60.0  # s until all rangers are ready, or at rest
+
+
+async def once_a_second(child, site, place, seconds):
+    """The rangers shoot once a second for so long; entries as they were acknowledged."""
+    live, acknowledged = Live(site), []
+    journal = Journal.open(place, run=Run(site), clock=child.clock)
+    ziy = Coordinator(
+        site,
+        addresses=child.addresses,
+        live=live,
+        planner=EverySecond(site, live, seconds=round(ROUND)),
+        guard=SiteGuard(site),
+        journal=journal,
+        clock=child.clock,
+        feed=child.feed,
+        mode="hold",
+        commands=initialising_commands(site),
+    )
+    ziy.listeners.append(acknowledged.append)
+    task = asyncio.create_task(ziy.run())
+    await until(lambda: all(link.connected for link in ziy.links.values()), task)
+    ziy.set_mode("active")
+    await until(lambda: all(link.state == "ready" for link in ziy.links.values()), task)
+    await asyncio.wait([task], timeout=seconds)
+    ziy.set_mode("hold")  # what is under way comes to its end, nothing more is begun
+    await until(lambda: not any(link.busy for link in ziy.links.values()), task)
+    ziy.intake.flush()
+    await until(lambda: ziy.intake.acknowledged == ziy.intake.numbered, task)
+    counted = child.report()["fired"]
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    return [entry for entry in acknowledged if isinstance(entry, AnsweredShot)], counted
+
+
+async def until(true, task):
+    began = time.monotonic()
+    while not true():
+        assert time.monotonic() - began < LONGEST
+        done, _ = await asyncio.wait([task], timeout=0.1)
+        assert not done
+
+
+def held(rangers, seconds, place):
+    """Shots a ranger; nothing lost, nothing doubled, nothing told that is not there."""
+    site = load_site(rangers, targets=TARGETS)
+    with LoadChild(rangers, targets=TARGETS) as child:
+        told, fired = asyncio.run(once_a_second(child, site, place, seconds))
+    assert sorted(fired) == list(site.rangers)
+    assert lost_and_doubled(fired, JournalReader(place)) == (0, 0)
+    assert sorted((a.shot.ranger, a.shot.ticks) for a in told) == sorted((r, t) for r in fired for t in fired[r])
+    assert [a.shot.number for a in told] == list(range(1, len(told) + 1))
+    assert all(a.shot.samples is not None for a in told)
+    assert {a.status for a in told} <= {"used", "reference"}
+    return [len(ticks) for ticks in fired.values()]
+
+
+def test_forty_rangers_at_a_shot_a_second_lose_none_and_double_none(tmp_path):
+    shots = held(40, 20.0, tmp_path / "load.db")
+    assert min(shots) >= 5  # of 20: that it measured at all, on whatever machine
+
+
+@pytest.mark.slow
+def test_two_hundred_rangers_hold_a_shot_a_second_for_ten_minutes(tmp_path):
+    shots = held(200, 600.0, tmp_path / "load.db")
+    assert min(shots) >= 0.9 * 600 * (ROUND - 1.0) / ROUND  # a round's lead and planning take a second of ten
