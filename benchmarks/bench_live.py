@@ -9,8 +9,8 @@ with buffers, its own port; its share of a core is that of the process, all thre
 buffer, by its stamp (in steps of 0.9 ms), until the entry is told as durable. Lost: fired, by the heads' own count,
 and not in the journal.
 
-Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3 with
-a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
+Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3
+with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
 """
 
 import argparse

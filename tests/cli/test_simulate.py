@@ -76,7 +76,7 @@ def what_was_said(reader):
     with reader:
         solutions = [solution.text for _, solution in reader.solutions(1)]
         return solutions, [
-            (s.shot.ticks, s.shot.ranger, s.shot.samples.tobytes(), s.range_) for _, s in reader.shots(1)
+            (s.shot.ticks, s.shot.ranger, s.shot.samples.tobytes(), repr(s.range_)) for _, s in reader.shots(1)
         ]
 
 

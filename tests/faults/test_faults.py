@@ -65,7 +65,7 @@ NIGHTS = {
     ],
     "no answer": [
         Expected("hung-ranger ZY105 22 45", ("lost",), 8.0, over="lost-over", back=45.0, most=0.1),
-        Expected("drifting-clock ZY109 22 70", ("clock-free",), 0.5, over="clock-free-over", back=2.0, least=0.7),
+        Expected("drifting-clock ZY109 22 70", ("clock-free",), 0.5, over="clock-free-over", back=2.0, least=0.4),
         Expected("lying-station WX2 42 75", ("weather-doubted",), 12.0, over="weather-doubted-over", back=12.0),
     ],
     "mirror": [

@@ -15,7 +15,8 @@ FORMS = "csv|fits|campaign"
 
 
 @app.command(
-    epilog="\b\nExample: catseye export night.db --to campaign --out night, and then: catseye reduce night --out report"
+    epilog="\b\nExample: catseye export night.db --to campaign --out night\n"
+    "The campaign is for: catseye reduce night --out report"
 )
 def export(
     journal: JournalArgument,

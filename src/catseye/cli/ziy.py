@@ -58,7 +58,8 @@ Host = Annotated[str | None, typer.Option("--host", help="Address of its own por
 
 
 @app.command(
-    epilog="\b\nExample: catseye ziy gbt --journal night.db, where catseye zy gbt --twin is running\n"
+    epilog="\b\nExample: catseye ziy gbt --journal night.db\n"
+    "Its rangers: catseye zy gbt --twin\n"
     "Then ask it: nc 127.0.0.1 5260"
 )
 def ziy(

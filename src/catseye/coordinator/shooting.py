@@ -174,7 +174,8 @@ class Shooter:
                 self.aimed = number
             return planned.begin_ticks if planned.begin_ticks > ticks_now(self._clock) else None
         trip = 0.0 if math.isnan(link.round_trip) else link.round_trip
-        ahead = trip + max(settings.lead, self._way_to(planned) - IN_HAND)
+        way = self._way_to(planned)
+        ahead = trip + (max(settings.lead, way - IN_HAND) if trip > settings.slow else settings.lead)
         begin = max(planned.begin_ticks, ticks_now(self._clock) + round(ahead * TICKS_PER_SECOND))
         late = (begin - planned.begin_ticks) / TICKS_PER_SECOND
         if late > settings.latest:
