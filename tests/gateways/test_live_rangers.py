@@ -55,7 +55,7 @@ def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is
 
     async def story():
         served = RangersServed(
-            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, addresses=52_400
+            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, addresses=24_100
         )
         heard = asyncio.Queue()
         task = asyncio.create_task(served.serve(heard.put_nowait))
@@ -74,7 +74,7 @@ def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is
 
     at = asyncio.run(story())
     assert set(at.rangers) == set(names)
-    assert at.feed == ("127.0.0.1", 52_400)
+    assert at.feed == ("127.0.0.1", 24_100)
 
 
 def test_the_warming_clock_never_passes_the_one_that_it_becomes():

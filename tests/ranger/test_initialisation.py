@@ -191,8 +191,8 @@ def test_addresses_are_those_of_the_brief(gbt):
     loopback = ranger_addresses(gbt, "loopback")
     assert loopback["ZY101"] == ("127.0.8.1", 5240, 5241)
     assert loopback["ZY118"] == ("127.0.8.18", 5240, 5241)
-    assert ranger_addresses(gbt)["ZY102"] == ("127.0.0.1", 52_420, 52_421)
+    assert ranger_addresses(gbt)["ZY102"] == ("127.0.0.1", 24_120, 24_121)
     assert feed_address("loopback") == ("127.0.0.1", 5250)
-    assert feed_address() == ("127.0.0.1", 52_400)
+    assert feed_address() == ("127.0.0.1", 24_100)
     with pytest.raises(InputError, match="port base 65500 gives ports to 65681"):
         ranger_addresses(gbt, 65_500)

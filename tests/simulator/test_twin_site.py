@@ -107,8 +107,8 @@ def test_only_the_heads_given_are_served_and_a_stranger_is_refused(few):
     running = Running(few, ["ZY102", "ZY104"])
     running.run(lambda world: asyncio.sleep(0.1))
     assert running.site.addresses == {
-        "ZY102": ("127.0.0.1", 52_420, 52_421),
-        "ZY104": ("127.0.0.1", 52_440, 52_441),
+        "ZY102": ("127.0.0.1", 24_120, 24_121),
+        "ZY104": ("127.0.0.1", 24_140, 24_141),
     }
     with pytest.raises(InputError, match="ZY999 is no ranger"):
         TwinSite(few, {"ZY999": None}, world_faults=FaultBoard(), seconds=lambda: 0.0)

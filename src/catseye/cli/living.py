@@ -19,7 +19,7 @@ CONDITIONS = "night|windy-day|dewy-night"  # as in catseye.gateways.live_world, 
 MODES = "active|passive|hold"
 FILTERS = "random_walk|constant_velocity"
 MOTION = "track 145.3 45"
-PORT_BASE = 52_400  # as in catseye.ranger.addresses
+PORT_BASE = 24_100  # as in catseye.ranger.addresses
 PORT = 5260
 
 

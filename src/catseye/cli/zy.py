@@ -49,7 +49,7 @@ def _pair(text: str) -> tuple[int, int]:
 
 @app.command(
     epilog="\b\nExample: catseye zy gbt ZY101 --twin\n"
-    "A person at it: nc 127.0.0.1 52410\n"
+    "A person at it: nc 127.0.0.1 24110\n"
     "A real one: catseye zy sites/ours ZY101 --head our.heads:card --host 0.0.0.0 --ports 5240,5241"
 )
 def zy(

@@ -1,4 +1,4 @@
-"""The journal's writer: what happened, in order, durable. A thread of its own; one commit for all that came in 5 ms.
+"""The journal's writer: what happened, in order, durable. A thread of its own; one commit for all that came in some ms.
 
 What an `append` holds stands in one transaction. Where the database cannot take it (disk full, server gone), an alarm
 is told, the entries wait, and it is tried again until it can: what the reduction was fed is what is journalled, once.

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.coordinator.feed import MotionScript
+from catseye.coordinator.guard import SafetyGuard
 from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import Run
 from catseye.coordinator.link_settings import Address
@@ -23,7 +24,6 @@ from catseye.coordinator.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
 from catseye.gateways.live_settings import settings_object
-from catseye.gateways.live_sun import SiteGuard
 from catseye.gateways.live_warm import initialising_commands
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.network import Network
@@ -140,7 +140,7 @@ class LiveCoordinator:
         solids = None if orders.solids is None else read_record(orders.solids, Solids)
         plan = replace(RoundSettings(), period=orders.round_s, settle=SETTLE)
         self.planner = RoundPlanner(site, keep_clear=keep_clear, solids=solids, settings=plan)
-        self.guard = SiteGuard(site, keep_clear=keep_clear, interlocks=locks)
+        self.guard = SafetyGuard(site, keep_clear=keep_clear, interlocks=locks)
         self._journal = self._opened(clock, seed, virtual, tell)
         self.ziy = Coordinator(
             site,

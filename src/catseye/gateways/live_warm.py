@@ -8,9 +8,9 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from catseye.coordinator.guard import SafetyGuard
 from catseye.coordinator.preparation import Preparation
 from catseye.errors import InputError
-from catseye.gateways.live_sun import SiteGuard
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
@@ -88,7 +88,7 @@ async def warm(
         ranger.disconnect(CLIENT)
         await asyncio.sleep(0.0)
     clock.release()
-    now, guard = nanoseconds_to_ticks(clock.now_ns()), SiteGuard(site)
+    now, guard = nanoseconds_to_ticks(clock.now_ns()), SafetyGuard(site)
     guard.telescope(posture(now))
     for name, ranger in rangers.items():
         sun = tuple(f"{v:.7f}" for v in guard.sun_vector(name, now))

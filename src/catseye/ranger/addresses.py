@@ -12,7 +12,7 @@ from catseye.errors import InputError
 from catseye.ranger.server import LOOPBACK, PORTS
 from catseye.records.site_folder import SiteFolder
 
-PORT_BASE = 52_400
+PORT_BASE = 24_100
 FEED_PORT = 5250
 COORDINATOR_PORT = 5260
 STRIDE = 10
