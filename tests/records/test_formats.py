@@ -7,6 +7,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.records.beam import BeamTrain
+from catseye.records.interlock import Interlocks
 from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import Mirror, MirrorGeometry
 from catseye.records.monument import Monument, MonumentGeometry
@@ -44,6 +45,7 @@ RECORDS: dict[str, type[Record]] = {
     "acoustic-1.toml": AcousticSheet,
     "refractometer-1.toml": PathSheet,
     "beam-1.toml": BeamTrain,
+    "interlocks-1.toml": Interlocks,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (Benchmark, 6),
@@ -74,7 +76,7 @@ def test_released_buffers_still_load():
 
 
 def test_every_file_kept_here_is_tested():
-    elsewhere = {"frames-1.npy", "network-1.toml"}  # the last in test_network_toml
+    elsewhere = {"frames-1.npy", "network-1.toml", "journal-1.db"}  # test_network_toml, test_journal_reader
     assert {path.name for path in FORMATS.iterdir()} == {*RECORDS, *TABLES, *elsewhere}
 
 

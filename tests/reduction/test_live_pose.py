@@ -25,13 +25,14 @@ STAYS = np.zeros(3), np.zeros(3)
 small = st.floats(-1.0, 1.0)
 
 
-def aperture(step=1.0):
+def aperture(rings=20, spokes=50):
     """Points (n, 2) and weights (n,): a plane fitted to ways over a disc tilts by the mean of their
     slopes weighted with R^2 - r^2 (integrate x p by parts)."""
-    grid = np.arange(-50.0 + 0.5 * step, 50.0, step)
-    xy = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-    weight = 2500.0 - np.sum(xy**2, axis=1)
-    return xy[weight > 0.0] + (0.0, 54.0), weight[weight > 0.0] / weight[weight > 0.0].sum()
+    nodes, weights = np.polynomial.legendre.leggauss(rings)
+    r, angle = 25.0 * (nodes + 1.0), 2.0 * np.pi * (np.arange(spokes) + 0.3) / spokes
+    xy = (r[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
+    weight = np.repeat(weights * r * (2500.0 - r**2), spokes)
+    return xy + (0.0, 54.0), weight / weight.sum()
 
 
 XY, WEIGHT = aperture()
