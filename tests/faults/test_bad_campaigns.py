@@ -271,7 +271,10 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
         ),
         "site.toml: weather_station = [] has 0 values (expected 1)",
     ),
-    "unknown frame": (set_key(TRIPLET, "frame", '"dish"'), "frame = 'dish' (expected 'ground', 'alidade' or 'reflector')"),
+    "unknown frame": (
+        set_key(TRIPLET, "frame", '"dish"'),
+        "frame = 'dish' (expected 'ground', 'alidade' or 'reflector')",
+    ),
     "unknown type of target": (
         set_key("targets.toml", "type", '"cube"'),
         "target['DP001'].type = 'cube' (expected 'prism' or 'hollow')",

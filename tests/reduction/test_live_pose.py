@@ -32,7 +32,7 @@ def aperture(rings=20, spokes=50):
     r, angle = 25.0 * (nodes + 1.0), 2.0 * np.pi * (np.arange(spokes) + 0.3) / spokes
     xy = (r[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
     weight = np.repeat(weights * r * (2500.0 - r**2), spokes)
-    return xy + (0.0, 54.0), weight / weight.sum()
+    return xy + np.array([0.0, 54.0]), weight / weight.sum()
 
 
 XY, WEIGHT = aperture()
