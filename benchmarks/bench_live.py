@@ -23,7 +23,7 @@ import sys
 import tempfile
 import time
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,7 @@ BUFFER_BYTES = 16_384
 
 @dataclass(frozen=True)
 class Result:
-    """Of one run: shots a second a ranger; % of a core; ms from a buffer's end until it is durable; shots by count."""
+    """Of one run: shots a second a ranger; % of a core, also of the process of epochs; ms until durable."""
 
     name: str
     rate: float
@@ -58,6 +58,7 @@ class Result:
     shots: int
     lost: int | None = None
     doubled: int | None = None
+    solving_percent: float | None = None
 
 
 def result(name: str, late: list[float], cpu: float, wall: float, rangers: int, **counts: int) -> Result:
@@ -91,9 +92,10 @@ async def coordinated(child: LoadChild, site: Any, journal: str, name: str, seco
         running.ziy.stream(ranger, targets.get(ranger, REFERENCE))
     await asyncio.sleep(SETTLED)  # the round that was planned before comes to its end
     late.clear()
-    cpu, wall = time.process_time(), time.perf_counter()
+    cpu, solving, wall = time.process_time(), solver_cpu(running), time.perf_counter()
     await asyncio.sleep(seconds)
     cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, list(late)
+    solving = solver_cpu(running) - solving
     for ranger in child.addresses:
         running.ziy.stream(ranger, None)
     running.ziy.mode = "hold"  # streams under way come to their end
@@ -104,7 +106,14 @@ async def coordinated(child: LoadChild, site: Any, journal: str, name: str, seco
     await asyncio.gather(task, return_exceptions=True)
     fired = {name: ticks[len(before[name]) :] for name, ticks in child.report()["fired"].items()}
     lost, doubled = lost_and_doubled(fired, JournalReader(journal))
-    return result(name, measured, cpu, wall, len(child.addresses), lost=lost, doubled=doubled)
+    found = result(name, measured, cpu, wall, len(child.addresses), lost=lost, doubled=doubled)
+    return replace(found, solving_percent=100.0 * solving / wall)
+
+
+def solver_cpu(running: LiveCoordinator) -> float:
+    """s of the process that solves epochs."""
+    used = Path(f"/proc/{running.solver_pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(used[11]) + int(used[12])) / os.sysconf("SC_CLK_TCK")
 
 
 async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as_json: bool) -> Result:
@@ -213,10 +222,29 @@ def main() -> None:
     sys.stdout.write(
         f"{options.rangers} rangers, {options.heads} heads, {options.seconds:g} s; load of the machine {load:.1f}\n"
     )
-    head = ("shots/s", "% of a core", "ms a shot", "ratio", "p50 ms", "p90", "p99", "max", "lost", "doubled")
+    head = (
+        "shots/s",
+        "% of a core",
+        "epochs %",
+        "ms a shot",
+        "ratio",
+        "p50 ms",
+        "p90",
+        "p99",
+        "max",
+        "lost",
+        "doubled",
+    )
     sys.stdout.write(f"{'':<32}" + "".join(f"{each:>12}" for each in head) + "\n")
     for r in found:
-        row = [f"{r.rate:.2f}", f"{r.cpu_percent:.1f}", f"{r.ms_a_shot:.2f}", f"{r.ms_a_shot / ours.ms_a_shot:.1f} x"]
+        solving = "" if r.solving_percent is None else f"{r.solving_percent:.1f}"
+        row = [
+            f"{r.rate:.2f}",
+            f"{r.cpu_percent:.1f}",
+            solving,
+            f"{r.ms_a_shot:.2f}",
+            f"{r.ms_a_shot / ours.ms_a_shot:.1f} x",
+        ]
         row += [f"{v:.1f}" for v in (r.p50_ms, r.p90_ms, r.p99_ms, r.max_ms)]
         row += ["" if v is None else str(v) for v in (r.lost, r.doubled)]
         sys.stdout.write(f"  {r.name:<30}" + "".join(f"{each:>12}" for each in row) + "\n")

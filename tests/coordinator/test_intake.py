@@ -3,12 +3,15 @@
 import asyncio
 from concurrent.futures import Future
 
+import pytest
+
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.intake import Intake
 from catseye.coordinator.parts import NotDurable
-from catseye.records.live import Happening
+from catseye.records.live import Happening, LiveWeather
 from catseye.simulator.world_clock import ManualClock
 
+CLOCK = ManualClock(60_635.125)
 NOTE = Happening(1, "ZY101", "ready", "ZY101 is ready")
 NEXT = Happening(2, "ZY102", "ready", "ZY102 is ready")
 
@@ -30,8 +33,7 @@ class SlowJournal:
 
 
 def intake_of(journal, published):
-    clock = ManualClock(60_635.125)
-    herald = Herald("journal", clock, lambda said: None)
+    herald = Herald("journal", CLOCK, lambda said: None)
     return Intake(None, journal, judged=None, publish=published.append, herald=herald)
 
 
@@ -72,5 +74,22 @@ def test_what_is_durable_late_is_made_known_in_the_journals_order():
         journal.futures[1].set_result(2)  # the journal is back, and has written both
         await settled()
         assert published == [NOTE, NEXT]
+
+    asyncio.run(story())
+
+
+def test_a_mistake_while_what_came_is_handled_ends_the_coordinator_and_is_not_just_a_line_in_a_log():
+    class Mistaken:
+        def weather(self, read):
+            raise ZeroDivisionError("a mistake in the reduction")
+
+    async def story():
+        intake = Intake(
+            Mistaken(), SlowJournal(), judged=None, publish=None, herald=Herald("journal", CLOCK, lambda said: None)
+        )
+        intake.broken = asyncio.get_running_loop().create_future()
+        intake.take(LiveWeather("WX1", 1, 10.0, 930.0, 50.0))
+        with pytest.raises(ZeroDivisionError, match="a mistake in the reduction"):
+            await asyncio.wait_for(intake.broken, 5.0)
 
     asyncio.run(story())

@@ -139,12 +139,34 @@ def test_old_readings_are_forgotten_and_new_ones_kept():
     np.testing.assert_allclose(followed.at(mjd(t))[0], 1e-4 * t, rtol=0, atol=1e-9)
 
 
-def test_a_copy_stays_as_it_was():
-    followed = track([0.0, 1.0], lambda t: t, lambda t: 0.5, lambda t: (1.0, 0.0))
-    copied = followed.copy()
-    followed.add(LivePosture(ticks(0.5), 99.0, 0.5))
-    assert float(copied.at(mjd(0.5))[0]) == pytest.approx(0.5, abs=1e-6)
-    assert len(copied) == 2
+def test_readings_between_two_times_stay_as_they_were():
+    times = np.arange(0.0, 100.0, 0.5)
+    followed = track(times, lambda t: 1e-3 * t**2 % (2 * np.pi), lambda t: 0.5, lambda t: (2e-3 * t, 0.0))
+    asked = np.array([40.0, 41.23, 44.9])
+    expected = followed.at(mjd(asked))[0]
+    part = followed.between(mjd(40.0), mjd(44.9))
+    assert 14 <= len(part) <= 20  # 10 of them, and a gap of 2 s each side
+    followed.add(LivePosture(ticks(41.25), 99.0, 0.5))
+    turns = (part.at(mjd(asked))[0] - expected) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.rint(turns[0]), rtol=0, atol=1e-12)
+    beyond = followed.between(mjd(500.0), mjd(510.0))
+    assert 2 <= len(beyond) <= 3
+    assert beyond.latest == followed.latest
+
+
+def test_a_track_is_the_same_whatever_was_asked_while_it_grew():
+    asked, silent, late = PostureTrack(), PostureTrack(), np.random.default_rng(3).permutation(300)
+    order = np.concatenate([np.arange(0, 2000), 2000 + late, np.arange(2300, 4000)])  # across several turns
+    for k in order:
+        read = LivePosture(ticks(0.1 * k), (0.01 * k) % (2 * np.pi), 0.5 + 1e-5 * k, 0.1, 1e-4)
+        for each in (asked, silent):
+            each.add(read)
+        asked.at(mjd(0.1 * k))
+    times = mjd(np.linspace(0.0, 399.9, 1777))
+    np.testing.assert_array_equal(asked.at(times), silent.at(times))
+    np.testing.assert_allclose(
+        np.diff(silent.at(mjd(0.1 * np.arange(4000.0)))[0]), 0.01, rtol=0, atol=1e-4
+    )  # stamps have steps
 
 
 # [PARKER04] eq. 2.44: facts/gbt-site.md, mm; half of the last printed digit is 0.5 um

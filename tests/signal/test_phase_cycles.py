@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.stats import f as fisher
 from scipy.stats import f_oneway
 
 from catseye.errors import ValidityError
-from catseye.signal.cycle_scatter import BATCHES, cycle_phasors
+from catseye.signal.cycle_scatter import BATCHES, CycleScatter, cycle_phasors, moments, variance_across
 from catseye.signal.phase import detect
 
 
@@ -101,3 +103,15 @@ def test_with_a_few_cycles_no_dropout_is_told():
     single[2] = 0.0
     assert int(detect(made(single, 16), 16).scatter.dropped) == 0
     assert int(detect(made(np.append(single, 1.0), 16), 16).scatter.dropped) == 1
+
+
+@settings(max_examples=60)
+@given(m=st.integers(2, 60), seed=st.integers(0, 10**6), slow=st.booleans(), lit=st.booleans())
+def test_one_buffer_without_arrays_is_the_same(m, seed, slow, lit):
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(1, m)) + 1j * rng.normal(size=(1, m))
+    noise = noise + 3.0 * np.repeat(rng.normal(size=(1, 8)), -(-m // 8), axis=1)[:, :m] if slow else noise
+    total, between = moments(noise - noise.mean())
+    phasor = complex(*rng.normal(size=2)) if lit else 0j
+    found = CycleScatter(np.array([m]), total, between, np.zeros(1, dtype=int)).variance(np.array([phasor]))[0][0, 1]
+    assert variance_across(total[0], between[0], m, phasor) == pytest.approx(found, rel=1e-12, abs=1e-15)

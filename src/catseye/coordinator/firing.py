@@ -78,10 +78,11 @@ class Firing:
                 self._start(ranger, self._list(ranger, shots, planned.end_ticks))
 
     def begin_streams(self) -> None:
-        """Streams that are asked for and do not run."""
-        for ranger, target in self.streams.items():
-            if self._free(ranger, ticks_now(self._clock)):
-                self._start(ranger, self._stream(ranger, target))
+        """Streams that are asked for and do not run; spread over a buffer's length, or all would come in one moment."""
+        for k, ranger in enumerate(self._links):
+            if ranger in self.streams and self._free(ranger, ticks_now(self._clock)):
+                late = self._links[ranger].sampling.duration * k / len(self._links)
+                self._start(ranger, self._stream(ranger, self.streams[ranger], late))
 
     async def done(self, rangers: Sequence[str], seconds: float) -> None:
         """Wait until rangers are done with what they have, or so long."""
@@ -165,8 +166,9 @@ class Firing:
             if not await self._fire(planned, 1) and not self._failed(ranger, planned.target):
                 return
 
-    async def _stream(self, ranger: str, target: str) -> None:
-        """One target again and again."""
+    async def _stream(self, ranger: str, target: str, late: float) -> None:
+        """One target again and again, first in so many s."""
+        await asyncio.sleep(late)
         while self.streams.get(ranger) == target and self._may_go_on(ranger):
             try:
                 planned = self._aim(ranger, target)

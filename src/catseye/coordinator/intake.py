@@ -6,7 +6,7 @@ posture are dropped, shots that were on their way wait in line, and nothing is a
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -14,13 +14,14 @@ from typing import Any
 
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
-from catseye.coordinator.parts import JournalWriter, LiveReduction, NotDurable
+from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
 
-TOGETHER = 0.002  # s in which what arrives is handled at once: the journal's commit gathers more
+TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back
 MOST_HELD = 2000  # happenings kept while the journal is away
+Solver = Callable[[EpochJob], Awaitable[Any]]
 Entry = Any  # AnsweredShot | LiveWeather | LivePosture | Happening | Solution | ...
 
 
@@ -31,6 +32,9 @@ class Intake:
     publish    called with each entry when it is durable
     herald     says what goes wrong with the journal; that itself is journalled when it can be
     doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
+    solver     solves an epoch beside the loop; None: in a thread
+
+    `broken` is done when handling what came failed by a mistake of ours: nothing more is measured then.
     """
 
     def __init__(
@@ -42,7 +46,10 @@ class Intake:
         publish: Callable[[Entry], None],
         herald: Herald,
         doubted: Callable[[LiveWeather, str], None] = lambda read, why: None,
+        solver: Solver | None = None,
     ):
+        self._solver = solver or _in_a_thread
+        self.broken: asyncio.Future[None] | None = None
         self._live, self._journal, self._herald = live, journal, herald
         self._judged, self._publish, self._doubted = judged, publish, doubted
         self._arrived: list[Entry] = []
@@ -72,7 +79,16 @@ class Intake:
                 return
         self._arrived.append(item)
         if self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(TOGETHER, self.flush)
+            self._timer = asyncio.get_running_loop().call_later(TOGETHER, self._gathered)
+
+    def _gathered(self) -> None:
+        """From the loop's timer, to which an exception is a line in a log: here it is the coordinator's end."""
+        try:
+            self.flush()
+        except Exception as problem:
+            if self.broken is None or self.broken.done():
+                raise
+            self.broken.set_exception(problem)
 
     def flush(self) -> None:
         """Handle what has come."""
@@ -86,7 +102,7 @@ class Intake:
                 self._write(tuple(entries))
 
     async def solve(self, ticks: int) -> Any | None:
-        """An epoch of all shots since the last, solved in a thread beside the loop; None where there is none.
+        """An epoch of all shots since the last, solved beside the loop; None where there is none.
 
         The journal has both instants, when its shots were taken out and when its answer was taken in: shots that are
         fed between belong to the next epoch, in a replay too.
@@ -101,7 +117,7 @@ class Intake:
         self._fresh, self._solving = 0, True
         self._write((Document(ticks, EPOCH_BEGUN, ""),))
         try:
-            found = await asyncio.get_running_loop().run_in_executor(None, job.solve)
+            found = await self._solver(job)
         finally:
             self._solving = False
         self.flush()
@@ -206,6 +222,10 @@ class Intake:
             self._herald.standing("journal-away", None, over="the journal is back: measuring goes on")
         else:
             self._see_to_journal()
+
+
+async def _in_a_thread(job: EpochJob) -> Any:
+    return await asyncio.get_running_loop().run_in_executor(None, job.solve)
 
 
 def _later(loop: asyncio.AbstractEventLoop, call: Callable[..., None], *given: Any) -> None:

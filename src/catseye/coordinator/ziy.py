@@ -14,7 +14,7 @@ from catseye.coordinator.decode import measurement_of, shot_of
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
 from catseye.coordinator.herald import Herald
-from catseye.coordinator.intake import Entry, Intake
+from catseye.coordinator.intake import Entry, Intake, Solver
 from catseye.coordinator.link import RangerLink
 from catseye.coordinator.link_settings import Address, LinkSettings, Wanted
 from catseye.coordinator.modes import Mode
@@ -63,6 +63,7 @@ class Coordinator:
     addresses     of the rangers
     feed          host and port of the site's feed, a script of a known motion, or None: no posture is ever known
     mode          active: plans and fires; passive: hears what another client has measured; hold: connected, no more
+    solver        solves epochs beside the loop; None: in a thread
     commands      what initialises a ranger; None: from the site's records
     """
 
@@ -84,6 +85,7 @@ class Coordinator:
         feeds: FeedSettings | None = None,
         seed: int = 0,
         network: Any = None,
+        solver: Solver | None = None,
     ):
         self.site, self.clock, self.mode, self.settings = site, clock, mode, settings or ZiySettings()
         self._live, self._planner, self._journal = live, planner, journal
@@ -98,6 +100,7 @@ class Coordinator:
             publish=self._publish,
             herald=Herald("journal", clock, self._happened),
             doubted=self._doubted,
+            solver=solver,
         )
         asked = commands or (lambda ranger: commands_of_ranger(site, ranger))
         later = [t.name for t in site.targets.values() if t.type == "prism" and t.frame == "reflector"]
@@ -165,9 +168,10 @@ class Coordinator:
             self._spawn(play(self._script, self.clock, self._posed, self.settings.posture_every), "script")
         self._spawn(Vigil(self.links, self._guard, clock=self.clock, herald=self._herald).run(), "vigil")
         self._spawn(self._rounds(), "rounds")
-        self.firing.broken = asyncio.get_running_loop().create_future()
+        self.firing.broken, self.intake.broken = (asyncio.get_running_loop().create_future() for _ in range(2))
         try:
-            ended, _ = await asyncio.wait([*self._tasks, self.firing.broken], return_when=asyncio.FIRST_COMPLETED)
+            parts = [*self._tasks, self.firing.broken, self.intake.broken]
+            ended, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
             for part in ended:
                 await part  # none ends by itself: what it raises, a mistake of ours, is the coordinator's
         finally:
@@ -223,8 +227,10 @@ class Coordinator:
             await asyncio.sleep(max(0.0, asked_again - loop.time()))
 
     def _planned(self, now: int) -> Round | None:
+        if self.posture is None or not self.firing.ready(now):
+            return None
         state = self.state(now)
-        if state is None or not state.ready:
+        if state is None:
             return None
         try:
             return self._planner.round(state)

@@ -1,6 +1,7 @@
 """A coordinator put together: reduction, planner, guard, journal, its own port; run until cancelled."""
 
 import asyncio
+import gc
 import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -24,6 +25,7 @@ from catseye.coordinator.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
 from catseye.gateways.live_settings import settings_object
+from catseye.gateways.live_solver import SolverProcess
 from catseye.gateways.live_warm import initialising_commands
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.network import Network
@@ -36,7 +38,7 @@ from catseye.records.solids import Solids
 from catseye.reduction.live import Live, LiveSettings
 
 SWITCH = 0.0005  # s after which a thread gives way: epochs are solved beside the loop, which must not wait for them
-GROUP = 0.002  # s that a commit waits for more; what comes while one is written is in the next
+GROUP = 0.0005  # s that a commit waits for more; what comes while one is written is in the next
 SETTLE = 0.35  # s from the end of a planned move to its buffer: a mirror that begins to follow a line swings so long
 Filter = Literal["random_walk", "constant_velocity"]
 Feed = tuple[str, int] | MotionScript | None
@@ -110,7 +112,7 @@ class LiveCoordinator:
     addresses   of the rangers, by name; those that are not in it are not of this coordinator
     feed        host and port, a motion known beforehand, or None
     seed        of a simulated site, for the journal
-    virtual     its loop's time is not the machine's
+    virtual     its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
     tell        told of the journal's trouble at once, by any thread
 
     Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
@@ -142,6 +144,7 @@ class LiveCoordinator:
         self.planner = RoundPlanner(site, keep_clear=keep_clear, solids=solids, settings=plan)
         self.guard = SafetyGuard(site, keep_clear=keep_clear, interlocks=locks)
         self._journal = self._opened(clock, seed, virtual, tell)
+        self._solver = None if virtual else SolverProcess(self.live.site)
         self.ziy = Coordinator(
             site,
             addresses=addresses,
@@ -155,6 +158,7 @@ class LiveCoordinator:
             commands=initialising_commands(site),
             seed=seed or 0,
             network=network,
+            solver=None if self._solver is None else self._solver.solve,
         )
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
@@ -177,6 +181,11 @@ class LiveCoordinator:
         )
         return WaitingJournal(journal) if virtual else journal
 
+    @property
+    def solver_pid(self) -> int | None:
+        """Of the process that solves epochs."""
+        return None if self._solver is None else self._solver.pid
+
     async def run(self, started: Callable[[], None] = lambda: None) -> None:
         """Measure until cancelled; everything is switched off and closed then, within five seconds.
 
@@ -187,11 +196,16 @@ class LiveCoordinator:
         try:
             await self.server.start()
             started()
-            if not self._virtual:  # beside the loop, while the mirrors go to their first targets
-                loading = asyncio.ensure_future(asyncio.to_thread(_load_kernel))
+            if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
+                loading = asyncio.gather(asyncio.to_thread(self._solver.start), asyncio.to_thread(_load_kernel))
+                gc.collect()
+                gc.freeze()  # a site of thousands of records is looked through at each full collection: 40 ms
             await self.ziy.run()
         finally:
             await asyncio.gather(*([] if loading is None else [loading]), return_exceptions=True)
+            if self._solver is not None:
+                self._solver.stop()
+            gc.unfreeze()
             sys.setswitchinterval(before)
             await self.server.stop()
             if self._journal is not None:

@@ -22,6 +22,7 @@ from catseye.reduction.live_bodies import bodies_of, lasting_names
 from catseye.reduction.live_epoch import Epoch, campaign_of, frames_of_points, solve_epoch
 from catseye.reduction.live_jitter import Jitter
 from catseye.reduction.live_pose import LivePose, live_pose
+from catseye.reduction.live_repeats import joined_repeats
 from catseye.reduction.live_shots import Line, RangerNow, ShotAnswer, Taken, answer, taken
 from catseye.reduction.live_state import (
     USUAL,
@@ -79,7 +80,7 @@ class EpochAnswer:
     names         of the points, sorted; monuments' fixed points are "ZY101-F"
     x             (n, 3) m, ground frame
     covariance    (3n, 3n) m^2
-    shots         how many took part at each point
+    shots         how many took part at each point; repeats that were joined count once
     used          numbers of the shots that took part
     rejected      number: why not, for the others of the epoch; references included
     variance_factor, degrees_of_freedom   of the shots and what was carried to them
@@ -126,6 +127,8 @@ class EpochJob:
     rows: list[Taken]
     weather: list[LiveWeather]
     motion: Motion
+    places: dict[str, Array]
+    index: float
     azimuth: float
     elevation: float
     carried: Carried | None
@@ -137,17 +140,14 @@ class EpochJob:
         """The epoch, or why there is none."""
         with threadpool_limits(limits=1, user_api="blas"):
             try:
+                site = self.motion.site
+                rows = joined_repeats(self.rows, self._lengths, site.site.ranging.modulation_hz, self.index)
                 campaign = campaign_of(
-                    self.motion.site,
-                    self.rows,
-                    self.weather,
-                    azimuth=self.azimuth,
-                    elevation=self.elevation,
-                    mjd=self.motion.epoch,
+                    site, rows, self.weather, azimuth=self.azimuth, elevation=self.elevation, mjd=self.motion.epoch
                 )
                 return solve_epoch(
                     campaign,
-                    self.rows,
+                    rows,
                     self.motion,
                     self.rules,
                     carried=self.carried,
@@ -156,6 +156,12 @@ class EpochJob:
                 )
             except CatseyeError as problem:
                 return str(problem)
+
+    def _lengths(self, ranger: str, target: str, mjd: Array) -> Array:
+        """Predicted distances, m; NaN where nobody knows."""
+        if ranger not in self.places or target not in self.places:
+            return np.full(len(mjd), np.nan)
+        return self.motion.distances(ranger, target, self.places, mjd)
 
 
 class Live:
@@ -212,7 +218,8 @@ class Live:
             run=run if abs(run) < 0.5 * math.pi else 0.0,
         )
         stamped = abs(run) * shot.if_hz * TICK_SECONDS / math.sqrt(12.0)  # rad: a stamp has steps of 0.864 ms
-        row = replace(row, u_across=math.hypot(row.u_across, stamped * abs(row.phasor)))
+        u_across = math.hypot(row.u_across, stamped * abs(row.phasor))
+        row = replace(row, u_across=u_across, shot=replace(shot, samples=None))  # the epoch needs its phase alone
         said = answer(
             row,
             now,
@@ -277,19 +284,23 @@ class Live:
         rows, self._pending = self._rows(ticks), []
         mjd = ticks / TICKS_PER_DAY
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
-        motion = Motion(
-            self.site, self.track.copy(), self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path
-        )
+        times = [r.mjd for r in rows if r.shot.target != REFERENCE]
+        told = self.track.between(min([mjd, *times]), max([mjd, *times]))
+        motion = Motion(self.site, told, self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path)
+        known = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._own.keys()
+        places = {name: self._own[name] for name in sorted(known)}
         carried = self._carried_to(ticks, elevation)
         rules = self.settings.reduction
-        return EpochJob(rows, weather, motion, azimuth, elevation, carried, self.lasting, ticks, rules)
+        return EpochJob(
+            rows, weather, motion, places, self._index, azimuth, elevation, carried, self.lasting, ticks, rules
+        )
 
     def take_in(self, job: "EpochJob", found: "Epoch | str") -> EpochAnswer | None:
         """What `job.solve()` found becomes what is known; None where it found nothing, `failed` says why."""
         if isinstance(found, str):
             self.failed = found
             return None
-        return self._take_in(found, job.rows, job.motion, job.azimuth, job.elevation)
+        return self._take_in(found, job.motion, job.azimuth, job.elevation)
 
     def solve(self, ticks: int) -> EpochAnswer | None:
         """`begin`, `EpochJob.solve` and `take_in` in one."""
@@ -303,9 +314,7 @@ class Live:
 
     # Inside ----------------------------------------------------------------------------------------------------------
 
-    def _take_in(
-        self, epoch: Epoch, rows: Sequence[Taken], motion: Motion, azimuth: float, elevation: float
-    ) -> EpochAnswer:
+    def _take_in(self, epoch: Epoch, motion: Motion, azimuth: float, elevation: float) -> EpochAnswer:
         found = epoch.coordinates
         self.number += 1
         self.jitter.learn(found.ranges, self.bodies)
@@ -324,15 +333,13 @@ class Live:
         pose = None
         if self.number >= self.settings.reference_after:
             pose = live_pose(self.carried, self.bodies, self.site)
-        number = [r.shot.number for r in rows]
-        used = {number[int(k)] for k, on in zip(ranges.shot, ranges.used, strict=True) if on}
-        rejected = {number[k]: reason for k, reason in epoch.reasons.items()}
-        for k, on in zip(ranges.shot, ranges.used, strict=True):
+        rows = epoch.rows
+        used = [n for k, on in zip(ranges.shot, ranges.used, strict=True) if on for n in rows[int(k)].numbers]
+        rejected = {n: reason for k, reason in epoch.reasons.items() for n in rows[k].numbers}
+        for row, on in enumerate(ranges.used):
             if not on:
-                row = int(np.flatnonzero(ranges.shot == k)[0])
-                rejected[number[int(k)]] = (
-                    f"reflected: range {ranges.residual[row] * 1e3:+.3f} mm off, w {ranges.standardised[row]:.1f}"
-                )
+                text = f"range {ranges.residual[row] * 1e3:+.3f} mm off, w {ranges.standardised[row]:.1f}"
+                rejected |= dict.fromkeys(rows[int(ranges.shot[row])].numbers, f"reflected: {text}")
         return EpochAnswer(
             self.number,
             self.last_ticks,
@@ -342,7 +349,7 @@ class Live:
             found.x,
             found.covariance,
             tuple(int(n) for n in found.shots),
-            tuple(sorted(used)),
+            tuple(sorted(set(used))),
             dict(sorted(rejected.items())),
             found.variance_factor,
             found.degrees_of_freedom,

@@ -36,13 +36,13 @@ Array = NDArray[np.float64]
 class Epoch:
     """What an epoch's adjustment gave.
 
-    campaign      its shots as a campaign; the posture is that of the epoch
+    rows          its shots, repeats joined
     coordinates   in the ground frame, at the epoch
     carried       all that lasts
     reasons       row of the shots: why it was left out
     """
 
-    campaign: Campaign
+    rows: tuple[Taken, ...]
     coordinates: Coordinates
     carried: Carried
     reasons: dict[int, str]
@@ -146,7 +146,7 @@ def solve_epoch(
         ticks=ticks,
         elevation=float(motion.track.at(motion.epoch)[1]),
     )
-    return Epoch(campaign, found, seen if carried is None else with_unseen(carried, seen), reasons)
+    return Epoch(tuple(rows), found, seen if carried is None else with_unseen(carried, seen), reasons)
 
 
 def frames_at(network: Network, motion: Motion) -> dict[str, Transform]:

@@ -7,7 +7,7 @@ last good reference. The epoch's solution uses the phases, not these ranges.
 import cmath
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
@@ -19,9 +19,10 @@ from catseye.records.live import LiveShot
 from catseye.records.mirror import Mirror
 from catseye.records.site import Adc
 from catseye.records.site_folder import REFERENCE
-from catseye.reduction.ranges import Detected, Phases, judged_phases
+from catseye.reduction.ranges import Detected, Phases, why_not
 from catseye.reduction.settings import Settings
 from catseye.signal.buffers import shortest_run
+from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
 
 USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
 U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
@@ -54,7 +55,7 @@ class ShotAnswer:
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """A shot with its phase, kept for the epoch: a row of `Phases`."""
+    """A shot with its phase, kept for the epoch: a row of `Phases`; `repeats`: numbers of those that it stands for."""
 
     shot: LiveShot
     mjd: float
@@ -65,6 +66,12 @@ class Taken:
     harmonics: NDArray[np.float64]
     largest: float
     reason: str
+    repeats: tuple[int, ...] = ()
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Its own number, or those of all repeats that it stands for."""
+        return self.repeats or (self.shot.number,)
 
 
 @dataclass
@@ -94,56 +101,85 @@ def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual
     Where the samples did not travel the ranger's own amplitude and phase count, their noise a guess (`U_UNSEEN_VOLT`),
     and clipping and dropouts are not seen.
     """
-    detected = Detected.empty(1)
-    cycles, samples = np.array([shot.cycles]), np.array([shot.samples_per_cycle])
+    seen = _Seen()
     if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
         told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
-        detected.wrong[0] = f"wrong length: {told} {shot.cycles * shot.samples_per_cycle}"
+        seen.wrong = f"wrong length: {told} {shot.cycles * shot.samples_per_cycle}"
     elif shot.samples is not None:
         leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
-        _detect(shot, shot.samples, detected, adc.bits, run, leaked)
+        _detect(shot, shot.samples, seen, adc.bits, run, leaked)
     elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
-        detected.wrong[0] = "no samples: neither the buffer came nor what the ranger made of it"
+        seen.wrong = "no samples: neither the buffer came nor what the ranger made of it"
     else:
-        detected.raw[0] = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
-        detected.u_phasor[0], detected.largest[0] = U_UNSEEN_VOLT, shot.amplitude
-    phases = judged_phases(detected, cycles, samples, [mirror], settings, lambda amplitude: np.full(1, usual))
-    reason = phases.reason[0]
-    across = float(phases.u_across[0]) if shot.samples is not None else U_UNSEEN_VOLT
+        seen.raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
+        seen.u_phasor, seen.largest = U_UNSEEN_VOLT, shot.amplitude
+    phasor = seen.raw - mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+    sampling = shot.cycles, shot.samples_per_cycle
+    reason = why_not(seen.raw, phasor, seen.u_phasor, seen.clipped, seen.largest, sampling, mirror, settings, usual)
+    across = seen.u_phasor
+    if shot.samples is None:
+        across = U_UNSEEN_VOLT
+    elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer tell too little of one quadrature's own scatter
+        across = math.sqrt(variance_across(seen.total, seen.between, shot.cycles, phasor))
     return Taken(
         shot,
         shot.middle_mjd,
-        complex(phases.phasor[0]),
-        float(phases.u_phasor[0]),
+        phasor,
+        seen.u_phasor,
         across,
-        float(phases.offset[0]),
-        phases.harmonics[0],
-        float(phases.largest[0]),
-        detected.wrong[0] or reason,
+        seen.offset,
+        np.array(seen.harmonics),
+        seen.largest,
+        seen.wrong or reason,
     )
 
 
-def _detect(shot: LiveShot, samples: NDArray[np.int16], into: Detected, bits: int, run: float, leaked: complex) -> None:
-    """Row 0 of `into` from a buffer, compiled; what is wrong with it in words, by the plain form."""
+@dataclass
+class _Seen:
+    """What detection found in one buffer, V: `Detected` of one, without arrays."""
+
+    raw: complex = 0j
+    u_phasor: float = 0.0
+    offset: float = 0.0
+    harmonics: tuple[float, float] = (0.0, 0.0)
+    largest: float = 0.0
+    clipped: int = 0
+    total: Sequence[float] = (0.0, 0.0, 0.0)
+    between: Sequence[float] = (0.0, 0.0, 0.0)
+    wrong: str = ""
+
+
+def _detect(shot: LiveShot, samples: NDArray[np.int16], into: _Seen, bits: int, run: float, leaked: complex) -> None:
+    """A buffer, compiled; what is wrong with it in words, by the plain form."""
     from catseye.signal import buffer_kernel as kernel
 
     n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
     ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
     found, still = np.zeros(16), np.zeros(8)
     if m < 2:  # a single cycle's noise comes from its overtones: rare, and not here
-        into.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+        _plainly(samples, into, n, volts, bits)
         return
     kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, found, still)
-    clipped, longest, dropped = found[kernel.CLIPPED], found[kernel.LONGEST], found[kernel.DROPPED]
-    if clipped or dropped or longest >= shortest_run(n):
-        into.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
-    mean, moments = (found[0:2], found[kernel.TOTAL :]) if run == 0.0 else (still[0:2], still[2:])
-    into.raw[0] = complex(mean[0], mean[1]) * volts + (leaked if run else 0.0)
-    into.u_phasor[0] = math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts
-    into.offset[0], into.clipped[0] = found[kernel.OFFSET] * volts, int(clipped)
-    into.harmonics[0] = found[kernel.SECOND : kernel.SECOND + 2] * volts
-    into.largest[0] = max(-found[kernel.LOW], found[kernel.HIGH]) * volts
-    into.total[0], into.between[0] = moments[:3] * volts**2, moments[3:] * volts**2
+    out, stand = found.tolist(), still.tolist()
+    if out[kernel.CLIPPED] or out[kernel.DROPPED] or out[kernel.LONGEST] >= shortest_run(n):
+        _plainly(samples, into, n, volts, bits)
+    mean, moments = (out[0:2], out[kernel.TOTAL :]) if run == 0.0 else (stand[0:2], stand[2:])
+    into.raw = complex(mean[0], mean[1]) * volts + (leaked if run else 0.0)
+    into.u_phasor = math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts
+    into.offset, into.clipped = out[kernel.OFFSET] * volts, int(out[kernel.CLIPPED])
+    into.harmonics = out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts
+    into.largest = max(-out[kernel.LOW], out[kernel.HIGH]) * volts
+    into.total, into.between = ([v * volts**2 for v in part] for part in (moments[:3], moments[3:6]))
+
+
+def _plainly(samples: NDArray[np.int16], into: _Seen, n: int, volts: float, bits: int) -> None:
+    """By the form of the campaigns."""
+    found = Detected.empty(1)
+    found.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+    into.raw, into.u_phasor, into.offset = complex(found.raw[0]), float(found.u_phasor[0]), float(found.offset[0])
+    into.harmonics = float(found.harmonics[0, 0]), float(found.harmonics[0, 1])
+    into.largest, into.clipped, into.wrong = float(found.largest[0]), int(found.clipped[0]), found.wrong[0]
+    into.total, into.between = found.total[0].tolist(), found.between[0].tolist()
 
 
 def phases_of(rows: list[Taken]) -> Phases:

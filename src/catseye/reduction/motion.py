@@ -31,24 +31,31 @@ class PostureTrack:
     def __init__(self) -> None:
         self._ticks: list[int] = []
         self._reads: dict[int, LivePosture] = {}
-        self._table: Array | None = None
+        self._table = np.empty((5, 0))  # s from the first, angles, rates; columns beyond the readings are room
+        self._turns, self._filled = 0, 0  # of azimuth before the last column; columns
 
     def add(self, read: LivePosture) -> None:
         """One more reading; a second one of an instant replaces the first. Old ones are forgotten."""
+        if self._ticks and read.ticks <= self._ticks[-1]:
+            self._filled = 0
         if read.ticks not in self._reads:
             insort(self._ticks, read.ticks)
         self._reads[read.ticks] = read
-        self._table = None
-        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * KEPT / SECONDS_PER_DAY * TICKS_PER_DAY:
-            first = bisect_right(self._ticks, self._ticks[-1] - round(KEPT / SECONDS_PER_DAY * TICKS_PER_DAY))
+        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * KEPT / TICK_SECONDS:
+            first = bisect_right(self._ticks, self._ticks[-1] - round(KEPT / TICK_SECONDS))
             for gone in self._ticks[:first]:
                 del self._reads[gone]
             del self._ticks[:first]
+            self._filled = 0
 
-    def copy(self) -> "PostureTrack":
-        """The readings of now, to which nothing is added."""
+    def between(self, first: float, last: float) -> "PostureTrack":
+        """The readings of now that matter from MJD to MJD, to which nothing is added: those within, and a gap more."""
+        gap = LONGEST_GAP / SECONDS_PER_DAY
+        i = max(bisect_right(self._ticks, (first - gap) * TICKS_PER_DAY) - 1, 0)
+        j = bisect_right(self._ticks, (last + gap) * TICKS_PER_DAY) + 1
         same = PostureTrack()
-        same._ticks, same._reads, same._table = list(self._ticks), dict(self._reads), self._columns()
+        same._ticks = self._ticks[min(i, max(len(self._ticks) - 2, 0)) : j]
+        same._reads = {k: self._reads[k] for k in same._ticks}
         return same
 
     def __len__(self) -> int:
@@ -106,13 +113,20 @@ class PostureTrack:
         return np.asarray(near)
 
     def _columns(self) -> Array:
-        if self._table is None:
-            reads = [self._reads[k] for k in self._ticks]
-            seconds = np.array([k - self._ticks[0] for k in self._ticks]) * SECONDS_PER_DAY / TICKS_PER_DAY
-            azimuth = np.unwrap([r.azimuth for r in reads])
-            rest = [[r.elevation for r in reads], [r.azimuth_rate for r in reads], [r.elevation_rate for r in reads]]
-            self._table = np.array([seconds, azimuth, *rest])
-        return self._table
+        """(5, n): all readings; only those that are new are filled in, whatever was asked between them."""
+        if self._filled < len(self._ticks):
+            if len(self._ticks) > self._table.shape[1]:
+                self._table = np.concatenate([self._table, np.empty((5, len(self._ticks) + 64))], axis=1)
+            reads = [self._reads[k] for k in self._ticks[max(self._filled - 1, 0) :]]
+            azimuth = np.array([r.azimuth for r in reads])
+            before = self._turns if self._filled else 0
+            turns = before - np.concatenate([[0], np.cumsum(np.rint(np.diff(azimuth) / TWO_PI))])
+            seconds = np.array([r.ticks - self._ticks[0] for r in reads]) * SECONDS_PER_DAY / TICKS_PER_DAY
+            new = self._table[:, len(self._ticks) - len(reads) : len(self._ticks)]
+            new[0], new[1], new[2] = seconds, azimuth + TWO_PI * turns, [r.elevation for r in reads]
+            new[3], new[4] = [r.azimuth_rate for r in reads], [r.elevation_rate for r in reads]
+            self._turns, self._filled = int(turns[-1]), len(self._ticks)
+        return self._table[:, : self._filled]
 
     def _angle(self, table: Array, i: NDArray[np.int64], t: Array, angle: int, rate: int) -> Array:
         """[Hermite] cubic in each interval, straight with the end's rate outside of all."""
@@ -219,6 +233,14 @@ class Motion:
         pairs = [(own, self.bodies.get(target, "")) for target in targets]
         u = [0.0 if a == b else np.hypot(self.jitter_mm.get(a, 0.0), self.jitter_mm.get(b, 0.0)) for a, b in pairs]
         return (np.array(u) * MILLIMETRE) ** 2
+
+    def distances(self, a: str, b: str, places: Mapping[str, Array], mjd: Array) -> Array:
+        """(m,) m between two points of given places (3,), each in its own frame, at times (m,)."""
+        if self.frames[a] == self.frames[b]:
+            return np.full(len(mjd), np.linalg.norm(places[b] - places[a]))
+        azimuth, elevation = self.track.at(mjd)
+        there = [ground_from(self.site, self.frames[n], azimuth, elevation).points(places[n]) for n in (a, b)]
+        return np.asarray(np.linalg.norm(there[1] - there[0], axis=-1))
 
     def carried(self, names: tuple[str, ...], mjd: Array) -> tuple[Array, Array]:
         """Turn (m, 3, 3) and shift (m, 3), m, of each named point, ground axes, from the epoch to its time (m,).

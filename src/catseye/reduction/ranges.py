@@ -1,5 +1,6 @@
 """From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
@@ -183,31 +184,60 @@ def judged_phases(
     scatter = CycleScatter(cycles, detected.total, detected.between, np.zeros(n, dtype=np.int64))
     enough = cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
     u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), u_phasor)
-    u_dark = np.hypot(u_phasor, [m.u_leakage_volt for m in mirrors])
-    amplitude = np.abs(phasor)
-    usual = usual_of(amplitude)
-    reason = []
-    for k in range(n):
-        limit = settings.smallest_return * u_dark[k]
-        if clipped[k]:
-            reason.append(f"clipped: {clipped[k]} samples at the converter's end ({largest[k]:.2f} V)")
-        elif not np.isfinite(limit):
-            reason.append(
-                f"noise unknown: {cycles[k]} cycles of {samples_per_cycle[k]} samples show no scatter "
-                "(expected at least 2 cycles, or 8 samples)"
-            )
-        elif amplitude[k] < limit:
-            reason.append(
-                f"blocked: return {amplitude[k]:.4f} V, below the limit of {limit:.4f} V (usual {usual[k]:.2f} V)"
-            )
-        elif abs(raw[k]) < limit:
-            reason.append(
-                f"dead: the samples hold {abs(raw[k]):.4f} V, not even the leakage of "
-                f"{mirrors[k].leakage_amplitude_volt:.4f} V: converter or cable"
-            )
-        else:
-            reason.append(detected.wrong[k])
+    usual = usual_of(np.abs(phasor))
+    reason = [
+        why_not(
+            complex(raw[k]),
+            complex(phasor[k]),
+            float(u_phasor[k]),
+            int(clipped[k]),
+            float(largest[k]),
+            (int(cycles[k]), int(samples_per_cycle[k])),
+            mirrors[k],
+            settings,
+            float(usual[k]),
+        )
+        or detected.wrong[k]
+        for k in range(n)
+    ]
     return Phases(phasor, u_phasor, u_across, detected.offset, detected.harmonics, largest, tuple(reason))
+
+
+def why_not(
+    raw: complex,
+    phasor: complex,
+    u_phasor: float,
+    clipped: int,
+    largest: float,
+    sampling: tuple[int, int],
+    mirror: Mirror,
+    settings: Settings,
+    usual: float,
+) -> str:
+    """Why a buffer's phase cannot be used, "" where it can.
+
+    raw, phasor   V, with leakage in it and without
+    clipped       samples at the converter's end
+    largest       V
+    sampling      cycles and samples a cycle
+    usual         V, for the text
+    """
+    limit = settings.smallest_return * math.hypot(u_phasor, mirror.u_leakage_volt)
+    if clipped:
+        return f"clipped: {clipped} samples at the converter's end ({largest:.2f} V)"
+    if not math.isfinite(limit):
+        return (
+            f"noise unknown: {sampling[0]} cycles of {sampling[1]} samples show no scatter "
+            "(expected at least 2 cycles, or 8 samples)"
+        )
+    if abs(phasor) < limit:
+        return f"blocked: return {abs(phasor):.4f} V, below the limit of {limit:.4f} V (usual {usual:.2f} V)"
+    if abs(raw) < limit:
+        return (
+            f"dead: the samples hold {abs(raw):.4f} V, not even the leakage of "
+            f"{mirror.leakage_amplitude_volt:.4f} V: converter or cable"
+        )
+    return ""
 
 
 def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:

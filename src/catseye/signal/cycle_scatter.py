@@ -19,7 +19,10 @@ buffers: see `walk` and the calibration "oscillator". Noise with a colour below 
 larger claim.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -64,17 +67,40 @@ class CycleScatter:
 
     def variance(self, phasor: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(..., 2) V^2, of the mean along and across the phasor, and (..., 2) its degrees of freedom; NaN for m = 1."""
-        from scipy.special import fdtri
-
         m = np.asarray(self.cycles)[..., None]
-        batched = m >= FEWEST_FOR_BATCHES
-        limit = np.where(batched, fdtri(BATCHES - 1, np.where(batched, m - BATCHES, 1), 1.0 - ALARM), np.inf)
+        limit = np.vectorize(colour_limit, otypes=[float])(m)
         coloured = self.colour(phasor) > limit
         with np.errstate(invalid="ignore", divide="ignore"):
             white = _turned(self.total, phasor) / ((m - 1.0) * m)
             slow = _turned(self.between, phasor) / ((BATCHES - 1.0) * m)
         degrees = np.where(coloured, BATCHES - 1.0, np.where(m > 1, m - 1.0, np.nan))
         return np.where(coloured, slow, white), degrees
+
+
+@cache
+def colour_limit(cycles: int) -> float:
+    """The colour beyond which a buffer of so many cycles has not white noise; infinite where it has no batches."""
+    from scipy.special import fdtri
+
+    return float(fdtri(BATCHES - 1, cycles - BATCHES, 1.0 - ALARM)) if cycles >= FEWEST_FOR_BATCHES else math.inf
+
+
+def variance_across(total: Sequence[float], between: Sequence[float], cycles: int, phasor: complex) -> float:
+    """V^2, of one buffer's mean across its phasor: `CycleScatter.variance` without arrays.
+
+    total, between   (3) V^2, as there
+    cycles           m, at least 2
+    """
+    size = abs(phasor)
+    c, s = (phasor.real / size, phasor.imag / size) if size > 0.0 else (1.0, 0.0)
+    within = max(s * s * total[0] + c * c * total[1] - 2.0 * s * c * total[2], 0.0)
+    white = within / ((cycles - 1.0) * cycles)
+    if cycles < FEWEST_FOR_BATCHES:
+        return white
+    batches = max(s * s * between[0] + c * c * between[1] - 2.0 * s * c * between[2], 0.0)
+    rest = (within - batches) / (cycles - BATCHES)
+    coloured = batches / (BATCHES - 1) > colour_limit(cycles) * rest
+    return batches / ((BATCHES - 1.0) * cycles) if coloured else white
 
 
 def cycle_phasors(samples: ArrayLike, samples_per_cycle: int, volts_per_code: float = 1.0) -> NDArray[np.complex128]:
