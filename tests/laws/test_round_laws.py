@@ -73,7 +73,11 @@ def moves_of(planned, told):
 
 
 def violations(moves, own, looks=17):
-    """How many moves come into the cone (those that begin in it: nearer than they began), and how many into a box."""
+    """How many moves come into the cone, and how many into a box.
+
+    Moves that begin in the cone or the guard's margin of it, where the Sun or the telescope brought the beam: how many
+    do not leave it, or come nearer by the mirror's own turn (the telescope's, 0.3 deg/s at most, is not the planner's).
+    """
     into_sun = into_box = 0
     ticks = np.array([m[3] for m in moves])
     low, high = ticks.min() - 20_000, ticks.max() + 20_000
@@ -92,9 +96,10 @@ def violations(moves, own, looks=17):
             apart = angle(u, sun)
             up = suns[:, 2].max() > np.sin(-1.99 * DEGREE)
             begins = apart[:, 0] < CONE + 0.16 * DEGREE  # inside the guard's margin: it may leave, and come no nearer
+            turned = angle(beams(name, counts, own, np.repeat(times[:, :1], counts.shape[1], axis=1)), sun[:, :1])
             bad = np.where(
                 begins,
-                (apart[:, -1] < CONE) | (apart.min(axis=1) < apart[:, 0] - 0.01 * DEGREE),
+                (apart[:, -1] < CONE) | (turned.min(axis=1) < turned[:, 0] - 0.01 * DEGREE),
                 apart.min(axis=1) < CONE - SLACK,
             )
             into_sun += int(np.sum(bad & up))

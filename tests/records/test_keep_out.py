@@ -19,7 +19,7 @@ def read(tmp_path, text):
 def test_the_example_in_metres_and_radians():
     kept = read_record(EXAMPLE, KeepOut)
     room, path, tower = kept.boxes()
-    assert room.centre.tolist() == [107.5, -21.0, 4.5]
+    assert room.centre.tolist() == [147.5, -21.0, 4.5]
     assert room.size.tolist() == [25.0, 18.0, 9.0]
     assert path.turn == pytest.approx(np.pi / 6)
     assert [b.length for b in (room, path, tower)] == [400.0] * 3

@@ -165,16 +165,16 @@ def test_nothing_is_told_beyond_the_time_looked_ahead(monkeypatch):
 
 
 def test_boxes_are_named_and_never_become_free():
-    target = np.array([107.0, -21.0, 4.0])  # in the control room
+    target = np.array([147.0, -21.0, 4.0])  # in the control room
     own = guard(boxes=boxes()[:1])
     verdict = own.pointing(MORNING, counts(STATION, target))
     assert "hits control-room; a box does not go away (people work behind the windows): choose" in verdict.reason
     assert verdict.free_at_mjd is None
-    over = counts(STATION, [95.0, -21.0, 9.3])  # 0.3 m above its near edge, and rising
+    over = counts(STATION, [135.0, -21.0, 9.3])  # 0.3 m above its near edge, and rising
     near = own.pointing(MORNING, over)
     assert near.allowed
     wide = replace(own, margin_counts=(200, 200)).pointing(MORNING, over)
-    assert "0.11 deg from control-room (limit 1.61 deg for the servo)" in wide.reason
+    assert "0.10 deg from control-room (limit 1.61 deg for the servo)" in wide.reason
 
 
 def test_the_sun_behind_a_box_does_not_promise_a_time():

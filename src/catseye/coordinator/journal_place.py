@@ -7,6 +7,7 @@ import sqlite3
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from sqlalchemy import Connection, Engine, NullPool, create_engine, event
@@ -86,8 +87,8 @@ def writing_engine(place: Place, *, create: bool = False) -> Engine:
         connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
 
     @event.listens_for(engine, "begin")
-    def begin(connection: object) -> None:
-        connection.exec_driver_sql("BEGIN IMMEDIATE")  # type: ignore[attr-defined]
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
 
     return engine
 
@@ -96,12 +97,13 @@ def reading_engine(place: Place) -> Engine:
     """Connections that only read, each transaction one state of the journal."""
     if place.url is not None:
         return _server_engine(place.url).execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
-    whole = not Path(f"{place.path}-wal").exists() and not os.access(place.path.absolute().parent, os.W_OK)  # type: ignore[union-attr]
+    path = Path(str(place.path))
+    whole = not Path(f"{path}-wal").exists() and not os.access(path.absolute().parent, os.W_OK)
     engine = _file_engine(place, "mode=ro&immutable=1" if whole else "mode=ro")
 
     @event.listens_for(engine, "begin")
-    def begin(connection: object) -> None:
-        connection.exec_driver_sql("BEGIN")  # type: ignore[attr-defined]
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN")
 
     return engine
 
@@ -130,11 +132,11 @@ def _server_engine(url: URL) -> Engine:
         ) from None
 
     @event.listens_for(engine, "connect")
-    def durable(connection: object, _: object) -> None:
-        with connection.cursor() as cursor:  # type: ignore[attr-defined]
+    def durable(connection: Any, _: object) -> None:  # psycopg's, which need not be installed
+        with connection.cursor() as cursor:
             if cursor.execute("SHOW synchronous_commit").fetchone()[0] == "off":
                 cursor.execute("SET synchronous_commit TO on")
-        connection.commit()  # type: ignore[attr-defined]
+        connection.commit()
 
     return engine
 

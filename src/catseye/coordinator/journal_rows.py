@@ -31,9 +31,9 @@ def rows_of(item: Item, buffers: bool) -> Rows:
     if maker is None:
         raise InputError(f"a {type(item).__name__} cannot be journalled (expected a shot, reading, happening, ...)")
     table, row = maker(item)
-    if table == "shots" and buffers and item.shot.samples is not None:  # type: ignore[union-attr]
-        samples = np.array(item.shot.samples, dtype="<i2")  # type: ignore[union-attr]
-        return [(table, row), ("buffers", {"samples": samples, "lag": item.shot.samples_per_cycle})]  # type: ignore[union-attr]
+    if buffers and isinstance(item, AnsweredShot) and item.shot.samples is not None:
+        samples = np.array(item.shot.samples, dtype="<i2")
+        return [(table, row), ("buffers", {"samples": samples, "lag": item.shot.samples_per_cycle})]
     return [(table, row)]
 
 

@@ -39,6 +39,7 @@ from catseye.reduction.live import Live, LiveSettings
 
 SWITCH = 0.0005  # s after which a thread gives way: epochs are solved beside the loop, which must not wait for them
 GROUP = 0.0005  # s that a commit waits for more; what comes while one is written is in the next
+SOLVER_AFTER = 4.0  # s
 SETTLE = 0.35  # s from the end of a planned move to its buffer: a mirror that begins to follow a line swings so long
 Filter = Literal["random_walk", "constant_velocity"]
 Feed = tuple[str, int] | MotionScript | None
@@ -181,6 +182,11 @@ class LiveCoordinator:
         )
         return WaitingJournal(journal) if virtual else journal
 
+    async def _start_solver(self, solver: SolverProcess) -> None:
+        """Seconds before the first epoch, but not before the rangers are initialised: it loads for a second or two."""
+        await asyncio.sleep(SOLVER_AFTER)
+        await asyncio.to_thread(solver.start)
+
     @property
     def solver_pid(self) -> int | None:
         """Of the process that solves epochs."""
@@ -197,12 +203,14 @@ class LiveCoordinator:
             await self.server.start()
             started()
             if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
-                loading = asyncio.gather(asyncio.to_thread(self._solver.start), asyncio.to_thread(_load_kernel))
+                loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
                 gc.collect()
                 gc.freeze()  # a site of thousands of records is looked through at each full collection: 40 ms
             await self.ziy.run()
         finally:
-            await asyncio.gather(*([] if loading is None else [loading]), return_exceptions=True)
+            if loading is not None:
+                loading.cancel()
+                await asyncio.gather(loading, return_exceptions=True)
             if self._solver is not None:
                 self._solver.stop()
             gc.unfreeze()

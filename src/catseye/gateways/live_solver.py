@@ -10,6 +10,7 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 from functools import partial
 from typing import Any, BinaryIO
@@ -32,6 +33,7 @@ class SolverProcess:
     def __init__(self, site: SiteFolder):
         self._site = site
         self._process: subprocess.Popen[bytes] | None = None
+        self._changing, self._ended = threading.Lock(), False
 
     @property
     def pid(self) -> int | None:
@@ -39,12 +41,15 @@ class SolverProcess:
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Begin it, and give it the site: some 0.1 s; what it needs it loads by itself."""
-        self._process = subprocess.Popen(
-            PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-        )  # its own session: Ctrl-C is for us, who end it in our turn
-        with suppress(OSError):  # whoever asks it first finds out that it died
-            _send(self._process.stdin, dumped(self._site, None))
+        """Begin it, if it does not run, and give it the site: some 0.1 s; what it needs it loads by itself."""
+        with self._changing:
+            if self._process is not None or self._ended:
+                return
+            self._process = subprocess.Popen(
+                PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+            )  # its own session: Ctrl-C is for us, who end it in our turn
+            with suppress(OSError):  # whoever asks it first finds out that it died
+                _send(self._process.stdin, dumped(self._site, None))
 
     async def solve(self, job: EpochJob) -> Any:
         """What `job.solve()` gives, from the process; where that died, from here."""
@@ -52,12 +57,17 @@ class SolverProcess:
         try:
             return await loop.run_in_executor(None, partial(self._asked, job))
         except (EOFError, OSError):
-            self.stop()
+            self._discard()
             await loop.run_in_executor(None, self.start)
         return await loop.run_in_executor(None, job.solve)
 
     def stop(self) -> None:
-        """End it, whatever it does."""
+        """End it, whatever it does, for good."""
+        with self._changing:
+            self._ended = True
+        self._discard()
+
+    def _discard(self) -> None:
         process, self._process = self._process, None
         if process is None:
             return
