@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal_entries import AnsweredShot, Command, Solution
 from catseye.errors import EstimationError, InputError
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
-from coordinator.link_scene import MemoryJournal, run, until
+from coordinator.link_scene import COMMANDS, MemoryJournal, run, until
 from coordinator.ziy_scene import ListLive, ListPlanner, Site, posture, weather
 
 
@@ -51,6 +51,29 @@ def test_the_journals_order_is_that_in_which_the_reduction_was_fed():
             kept = [(type(x), x.ticks) for x in rows if isinstance(x, LiveShot | LiveWeather | LivePosture)]
             assert fed == kept
             assert {kind for kind, _ in fed} == {LiveShot, LiveWeather, LivePosture}
+
+    run(story)
+
+
+def test_what_was_commanded_is_journalled_with_what_came_of_it():
+    async def story():
+        async with Site() as site:
+            await until(lambda: site.live.epochs >= 2)
+            await site.served["ZY102"].stop()  # what is under way there has no reply
+            await until(lambda: any(c.ok is None for c in of(site.journal.rows, Command)))
+            told = of(site.journal.rows, Command)
+        for ranger in site.names:
+            mine = [c for c in told if c.ranger == ranger]
+            words = [c.line.rpartition("\t")[2].split()[0] for c in mine]
+            assert {request.command for request in COMMANDS} <= set(words)  # what it was initialised with
+            shots = [s for s in of(site.journal.rows, AnsweredShot) if s.shot.ranger == ranger]
+            assert words.count("CMEAS") >= len(shots) > 3
+            assert len({c.tid for c in mine}) == len(mine)
+            assert not {"VER", "BUF"} & set(words)  # asking is not commanding
+        assert [c.ranger for c in told if c.ok is None] == ["ZY102"]
+        assert all(len(c.reply) <= 200 for c in told)
+        lit = [c for c in told if c.line.endswith("\tPS 1")]
+        assert {(c.reply.partition(",")[0], c.ok) for c in lit} == {("1", True)}
 
     run(story)
 

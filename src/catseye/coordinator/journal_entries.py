@@ -45,9 +45,10 @@ class AnsweredShot:
 
 @dataclass(frozen=True)
 class Command:
-    """A line sent to a ranger and its reply; a reply that never came is empty and `ok` None.
+    """A line sent to a ranger and its first reply; a reply that never came is empty and `ok` None.
 
     ticks   of the reply, or of now where none came
+    reply   its values, 200 characters of them; none of a buffer's
     """
 
     ticks: int

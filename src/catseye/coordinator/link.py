@@ -7,11 +7,14 @@ wait has an end, and a connection that is gone is made again: after 0.2 s, then 
 import asyncio
 import random
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 from catseye.coordinator.clock_watch import ClockWatch
 from catseye.coordinator.greeting import Greeting, first_of
 from catseye.coordinator.herald import Herald
+from catseye.coordinator.journal_entries import Command
 from catseye.coordinator.link_settings import Address, LinkSettings, Wanted
 from catseye.coordinator.parts import Clock, PlannedShot, SafetyGuard, Tell, ticks_now
 from catseye.coordinator.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
@@ -21,11 +24,12 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.head import Sampling
-from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, stamp_text
+from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, stamp_text
 from catseye.ranger.status import Status
 from catseye.records.live import LiveShot
 
 State = Literal["down", "connected", "preparing", "ready"]
+LONGEST_KEPT = 200  # characters of a reply, in the journal
 LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
 MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
 
@@ -39,6 +43,7 @@ class RangerLink:
     wanted       "listen": ask and hear only, on the second port; "hold": connected, nothing sent that changes it;
                  "measure": made ready, and `fire` serves
     heard        called with what another client made it say (CMEAS ...)
+    commanded    called with each request that was sent and does something, and with what came of it
     seed         of the waits' jitter
     network      where connections are made, as ZyClient's; None: TCP
     """
@@ -55,6 +60,7 @@ class RangerLink:
         tell: Tell,
         wanted: Wanted = "measure",
         heard: Callable[["RangerLink", Reply], None] | None = None,
+        commanded: Callable[[Command], None] | None = None,
         settings: LinkSettings | None = None,
         seed: int = 0,
         network: Any = None,
@@ -68,7 +74,7 @@ class RangerLink:
         self.counts: tuple[float, float] | None = None
         self.busy, self.shots, self.failures = False, 0, 0  # failures in a row
         self.round_trip = float("nan")
-        self._guard, self._clock, self._heard_by = guard, clock, heard
+        self._guard, self._clock, self._heard_by, self._commanded = guard, clock, heard, commanded
         self.settings = settings or LinkSettings()
         self._herald = Herald(ranger, clock, tell)
         self._shooter = Shooter(self, self._herald, clock)
@@ -253,11 +259,28 @@ class RangerLink:
         """Send a request past the guard; its TID and a future of its reply. Raises InputError, as `sure`."""
         if self._client is None:
             raise InputError("not connected")
-        if not COMMANDS[request.command].only_asks(request):
+        asks = COMMANDS[request.command].only_asks(request)
+        if not asks:
             said = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
             if said is not None:
                 raise Refused("refused", f"{request.command}: {said}")
-        return self._client.request(request.command, *request.parameters, ticks=request.ticks)
+        tid, future = self._client.request(request.command, *request.parameters, ticks=request.ticks)
+        if not asks and self._commanded is not None:
+            future.add_done_callback(partial(self._done, tid, format_request(replace(request, tid=tid))))
+        return tid, future
+
+    def _done(self, tid: int, line: str, future: "asyncio.Future[Reply]") -> None:
+        """What came of a request is told; one that nobody waits for any more had no reply."""
+        reply = None if future.cancelled() else future.result()
+        if self._commanded is None:
+            return
+        if reply is None:
+            self._commanded(Command(ticks_now(self._clock), self.ranger, tid, line))
+            return
+        text = "" if reply.command == "BUF" else reply.text[:LONGEST_KEPT]  # samples have a table of their own
+        came = reply.ticks is not None  # the client answers itself where the connection is lost
+        ticks = reply.ticks if reply.ticks is not None else ticks_now(self._clock)
+        self._commanded(Command(ticks, self.ranger, tid, line, text, reply.ok if came else None))
 
     async def _ask(self, request: Request, timeout: float) -> Reply:
         """A reply, f = 0 where there was none in time, or it must not be sent."""

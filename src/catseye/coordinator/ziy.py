@@ -115,6 +115,7 @@ class Coordinator:
                 tell=self._happened,
                 wanted=WANTED[mode],
                 heard=self._overheard,
+                commanded=self.intake.take,
                 settings=links,
                 seed=seed,
                 network=network,
