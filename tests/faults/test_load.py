@@ -15,6 +15,7 @@ from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import AnsweredShot, Run
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.coordinator.ziy import Coordinator
+from catseye.gateways.live_solver import SolverProcess
 from catseye.gateways.live_warm import initialising_commands
 from catseye.reduction.live import Live
 from load_scene import EverySecond, LoadChild, load_site, lost_and_doubled
@@ -27,6 +28,8 @@ LONGEST = 60.0  # s until all rangers are ready, or at rest
 async def once_a_second(child, site, place, seconds):
     """The rangers shoot once a second for so long; what was acknowledged, and what the heads counted."""
     live, acknowledged = Live(site), []
+    solver = SolverProcess(live.site)
+    solver.start()
     journal = Journal.open(place, run=Run(site), clock=child.clock)
     ziy = Coordinator(
         site,
@@ -39,6 +42,7 @@ async def once_a_second(child, site, place, seconds):
         feed=child.feed,
         mode="hold",
         commands=initialising_commands(site),
+        solver=solver.solve,
     )
     ziy.listeners.append(lambda entry: acknowledged.extend(told(entry)))
     task = asyncio.create_task(ziy.run())
@@ -53,6 +57,7 @@ async def once_a_second(child, site, place, seconds):
     counted = child.report()["fired"]
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
+    solver.stop()
     return acknowledged, counted
 
 
