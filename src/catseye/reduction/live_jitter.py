@@ -1,9 +1,14 @@
 """How much the bodies shake, learnt from how their ranges scatter within an epoch: wind, vibration.
 
 A share of the shots' variance that nobody calibrates, and that changes with the wind: estimated epoch by epoch from the
-residuals, v^2 against what their redundancy and all other variance leave of it, and forgotten again.
+residuals, and forgotten again.
 
-Source: [FOERSTNER16] chapter 4, variance components, one step an epoch; prior weight and forgetting are ours.
+A residual is r times its shot's own deviation, and as much of what the state was off as the shot could correct. A state
+that moved as it was loosened makes E v^2 = r sigma^2 of both; one that moved less, as in most nights, r^2 sigma^2. The
+second is taken: careful by 1 / sqrt(r) at most, where the first would let what shakes vanish whenever the state is
+quiet. Shots count by 1 / u^4, as a variance's estimate has it: a weak return knows nothing of a shaking of 0.1 mm.
+
+Source: [FOERSTNER16] chapter 4, variance components, one step an epoch; prior weight, forgetting and floor are ours.
 """
 
 from collections.abc import Mapping
@@ -16,7 +21,8 @@ from catseye.reduction.coordinates import RangeShots
 
 PRIOR_DEGREES = 20.0  # redundant shots that the setting is worth at first
 FORGETTING = 0.9  # an epoch
-LEAST = 0.005 * MILLIMETRE  # m
+LEAST = 0.25  # of what is usual: a lucky epoch is no calm
+QUIET = 0.03 * MILLIMETRE  # m, what else a strong return is uncertain by: it counts whole
 
 
 @dataclass
@@ -33,9 +39,8 @@ class Jitter:
     @property
     def mm(self) -> dict[str, float]:
         """Body: mm."""
-        return {
-            body: max((s / w) ** 0.5 if s > 0.0 else 0.0, LEAST) / MILLIMETRE for body, (s, w) in self._sums.items()
-        }
+        found = {body: (s / w) ** 0.5 / MILLIMETRE if s > 0.0 else 0.0 for body, (s, w) in self._sums.items()}
+        return {body: max(u, LEAST * self.usual_mm[body]) for body, u in found.items()}
 
     def learn(self, ranges: RangeShots, bodies: Mapping[str, str]) -> None:
         """Take in an epoch's ranges.
@@ -51,8 +56,9 @@ class Jitter:
                 continue
             shaken = max((a, b), key=lambda body: now.get(body, -1.0))
             rest = ranges.u_range[k] ** 2 - now[shaken]  # everything but the one that shakes more
-            r = float(np.clip(ranges.redundancy[k], 0.0, 1.0))
-            seen[shaken].append((float(ranges.residual[k]) ** 2 - r * max(rest, 0.0), r))
+            r = float(np.clip(ranges.redundancy[k], 0.0, 1.0)) ** 2
+            weight = min(1.0, ((now[shaken] + QUIET**2) / float(ranges.u_range[k]) ** 2) ** 2)
+            seen[shaken].append((weight * (float(ranges.residual[k]) ** 2 - r * max(rest, 0.0)), weight * r))
         for body, rows in seen.items():
             s, w = self._sums[body]
             s, w = FORGETTING * s + sum(v for v, _ in rows), FORGETTING * w + sum(r for _, r in rows)
