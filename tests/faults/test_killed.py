@@ -253,4 +253,5 @@ def test_killed_at_a_hundred_moments_a_server_loses_and_doubles_nothing(server, 
     kinds = mixed(OF_A_SERVER, 4)
     times, counts = killed(server.database("hundred"), tmp_path, kinds, seed=4, server=server)
     assert_quick(times)
-    assert counts[0] > 5 * len(kinds)  # a database that is down holds up what a file would have taken: 642 on a busy machine
+    # A database that is down holds up what a file would have taken: 642 on a busy machine.
+    assert counts[0] > 5 * len(kinds)
