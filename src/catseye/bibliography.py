@@ -763,4 +763,60 @@ SOURCES: dict[str, Source] = {
         locator="Journal of Modern Optics 35 (12), pages 1907-1918",
         used="delay between pulse and phase front behind a lens",
     ),
+    "TPOINT11": Source(
+        title="P. T. Wallace, TPOINT, a telescope pointing analysis system, version 18.20, 2011",
+        locator="Tpoint Software, 10 December 2011",
+        used="names and senses of the pointing terms; the text format of pointing data",
+    ),
+    "GBTPM01": Source(
+        title="Green Bank Telescope, pointing series in use and its fit of 28-30 December 2001",
+        locator="National Radio Astronomy Observatory, Green Bank, public pages; no report number is known here",
+        used="the series, its coefficients and sky rms",
+        errata=("does not print which way the corrections are added; AN and AW lean as named if encoders less sky",),
+    ),
+    "RUZE65": Source(
+        title="J. Ruze, Lateral-feed displacement in a paraboloid, 1965",
+        locator="IEEE Transactions on Antennas and Propagation 13 (5), pages 660-665",
+        used="the beam deviation factor",
+    ),
+    "RUZE66": Source(
+        title="J. Ruze, Antenna tolerance theory: a review, Proceedings of the IEEE 54, 1966",
+        locator="doi:10.1109/PROC.1966.4784",
+        used="the gain of a reflector with random errors",
+    ),
+    "BAARS07": Source(
+        title="J. W. M. Baars, The Paraboloidal Reflector Antenna in Radio Astronomy and Communication, Springer, 2007",
+        locator="doi:10.1007/978-0-387-69734-5",
+        used="geometry of the paraboloid, path errors of a displaced surface",
+    ),
+    "NOLL76": Source(
+        title="R. J. Noll, Zernike polynomials and atmospheric turbulence, 1976",
+        locator="doi:10.1364/JOSA.66.000207",
+        used="eqs. 1, 2 and table I: the polynomials, their numbers and their normalisation",
+    ),
+    "THIBOS02": Source(
+        title="L. N. Thibos and others, Standards for reporting the optical aberrations of eyes, 2002",
+        locator="doi:10.3928/1081-597X-20020901-30",
+        used="the single number of a Zernike term as ANSI Z80.28 counts",
+    ),
+    "STEIN99": Source(
+        title="M. L. Stein, Interpolation of Spatial Data: Some Theory for Kriging, Springer, 1999",
+        locator="doi:10.1007/978-1-4612-1494-6",
+        used="best linear unbiased prediction, Matern's covariances",
+    ),
+    "SCARGLE82": Source(
+        title="J. D. Scargle, Studies in astronomical time series analysis II: unevenly spaced data, 1982",
+        locator="doi:10.1086/160554",
+        used="the power of a wave at uneven times",
+    ),
+    "BRINCKER01": Source(
+        title="R. Brincker, L. Zhang and P. Andersen, Modal identification by frequency domain decomposition, 2001",
+        locator="doi:10.1088/0964-1726/10/3/303",
+        used="singular vectors of the spectral matrix are mode shapes",
+    ),
+    "BENDAT10": Source(
+        title="J. S. Bendat and A. G. Piersol, Random Data, 4th edition, Wiley, 2010",
+        locator="doi:10.1002/9781118032428",
+        used="chapter 9: scatter of a ratio of amplitudes from the coherence",
+    ),
 }

@@ -6,12 +6,16 @@ from pathlib import Path
 import pytest
 
 from catseye.errors import InputError
+from catseye.records.actuators import ActuatorCorrection, ActuatorPosition
 from catseye.records.beam import BeamTrain
 from catseye.records.interlock import Interlocks
 from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import Mirror, MirrorGeometry
 from catseye.records.monument import Monument, MonumentGeometry
+from catseye.records.panel_instrument import PanelInstrument
+from catseye.records.panel_layout import PanelCorner
 from catseye.records.path_temperature import PathTemperature
+from catseye.records.pointing_model import PointingModel
 from catseye.records.reading import Folder, read_record
 from catseye.records.record import Record
 from catseye.records.recording import AcousticSheet
@@ -46,12 +50,17 @@ RECORDS: dict[str, type[Record]] = {
     "refractometer-1.toml": PathSheet,
     "beam-1.toml": BeamTrain,
     "interlocks-1.toml": Interlocks,
+    "panel-instrument-1.toml": PanelInstrument,
+    "pointing-series-1.toml": PointingModel,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (Benchmark, 6),
     "weather-1.csv": (WeatherSample, 5),
     "shots-1.csv": (Shot, 5),
     "path-temperatures-1.csv": (PathTemperature, 3),
+    "panel-layout-1.csv": (PanelCorner, 8),
+    "actuators-1.csv": (ActuatorCorrection, 4),
+    "actuator-positions-1.csv": (ActuatorPosition, 3),
 }
 
 
@@ -77,6 +86,7 @@ def test_released_buffers_still_load():
 
 def test_every_file_kept_here_is_tested():
     elsewhere = {"frames-1.npy", "network-1.toml", "journal-1.db"}  # test_network_toml, test_journal_reader
+    elsewhere |= {"stars-1.dat", "tilts-1.csv"}  # test_star_offsets, test_pointing_files
     assert {path.name for path in FORMATS.iterdir()} == {*RECORDS, *TABLES, *elsewhere}
 
 

@@ -21,6 +21,7 @@ ROOMS = (
     *("air", "sound", "refractometer", "acoustic", "networks", "explain", "calibrate", "certificate"),
     *("baseline", "link", "point", "triplet", "glass", "beam", "safety", "plot"),
     *("zy", "ziy", "simulate", "serve", "replay", "export"),
+    *("pose", "surface", "pointing", "structure", "panels"),
 )
 
 app = typer.Typer(

@@ -41,6 +41,7 @@ class NormalEquations:
     _scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
     _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _order: tuple[np.ndarray, ...] = ()
+    _pattern: csc_array | None = None
 
     @classmethod
     def of(cls, rows: Sequence[Rows], moving: np.ndarray, size: int, sparse: bool | None) -> "NormalEquations":
@@ -152,10 +153,7 @@ class NormalEquations:
     def _factorise_sparse(self) -> None:
         from catseye.estimation.sparse_kernel import numeric, solve, symbolic
 
-        normal = csc_array((self.size, self.size))
-        for r, j in zip(self.rows, self._jacobians, strict=True):
-            normal = normal + _gram(r, j, self.size)
-        normal = csc_array(normal)[:, self.moving][self.moving]
+        normal = self._on_pattern()[:, self.moving][self.moving]
         diagonal = normal.diagonal()
         unheld = diagonal <= 0.0
         self._scale = 1.0 / np.sqrt(np.where(unheld, 1.0, diagonal))
@@ -192,9 +190,32 @@ class NormalEquations:
             if none.any():
                 self._set_floating(directions @ turned[:, none])
 
+    def _on_pattern(self) -> csc_array:
+        """N (n, n) with an entry for each two parameters that meet in a row, also where their products cancel to zero.
+
+        Sums of sparse matrices leave zeros out; a covariance is wanted of such pairs as of others.
+        """
+        if self._pattern is None:
+            ones = [_gram(r, np.ones_like(j), self.size) for r, j in zip(self.rows, self._jacobians, strict=True)]
+            self._pattern = csc_array(sum(ones, csc_array((self.size, self.size))))
+            self._pattern.sort_indices()
+        found = csc_array((self.size, self.size))
+        for r, j in zip(self.rows, self._jacobians, strict=True):
+            found = csc_array(found + _gram(r, j, self.size))
+        found.sort_indices()
+        data = np.zeros(self._pattern.nnz)
+        data[np.searchsorted(_places(self._pattern), _places(found))] = found.data
+        return csc_array((data, self._pattern.indices, self._pattern.indptr), shape=found.shape)
+
     def _set_floating(self, directions: np.ndarray) -> None:
         self._floating = np.zeros((directions.shape[1], self.size))
         self._floating[:, self.moving] = directions.T
+
+
+def _places(matrix: csc_array) -> np.ndarray:
+    """Column times rows plus row of each entry, rising where indices are sorted."""
+    rows, columns = matrix.shape
+    return np.repeat(np.arange(columns, dtype=np.int64), np.diff(matrix.indptr)) * rows + matrix.indices
 
 
 def _gram(r: Rows, j: np.ndarray, size: int) -> csr_array:

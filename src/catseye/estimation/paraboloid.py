@@ -1,6 +1,8 @@
-"""The paraboloid of known focal length that fits points best: where it stands, how far each point lies off it."""
+"""The paraboloid that fits points best: where it stands, its focal length, how far each point lies off it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -8,9 +10,14 @@ from catseye.errors import EstimationError
 from catseye.geometry.frame import Transform
 from catseye.geometry.rotation import from_vector, skew
 
-FREE = 5  # a turn about its own axis leaves a paraboloid unchanged
+Free = Literal["vertex", "axis", "focal-length"]
+Measure = Literal["normal", "half-path"]
+PARAMETERS: dict[str, int] = {"vertex": 3, "axis": 2, "focal-length": 1}
+POSE: tuple[Free, ...] = ("vertex", "axis")  # a turn about its own axis leaves a paraboloid unchanged
 CONVERGED_STEP = 1e-10  # m and rad: a tenth of a nanometre at a metre's arm
 ITERATIONS = 30
+SQUARE = 500  # points to which matrices of their number are multiplied; beyond it the product costs seconds
+DEPENDENT = 1e-10  # of a column's length: what is left of a parameter beside those before it
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +31,15 @@ class ParaboloidFit:
     local                (k, 3) m, the points in the fitted paraboloid's frame
     deviation            (k,) m, normal to the surface, positive towards the focus
     deviation_covariance (k, k) m^2, from the points' covariance, the fit's own uncertainty included
+    focal_length         m, fitted or held
+    u_focal_length       m, 0 where held
+    free                 what was fitted
+    parameter_covariance (p, p) m and rad: vertex x, y, z along the outer frame's axes, tilts about the nominal
+                         paraboloid's x and y, focal length; of these what was fitted
+    normal               (k, 3) unit normals, outer frame
+    design               (k, p) by how much a parameter lowers a deviation
+    gain                 (p, k) parameters from deviations
+    along                (k, k) m^2, covariance of the points along their normals, without the fit
     """
 
     translation: np.ndarray
@@ -33,73 +49,223 @@ class ParaboloidFit:
     local: np.ndarray
     deviation: np.ndarray
     deviation_covariance: np.ndarray
+    focal_length: float
+    u_focal_length: float
+    free: tuple[str, ...]
+    parameter_covariance: np.ndarray
+    normal: np.ndarray
+    design: np.ndarray
+    gain: np.ndarray
+    along: np.ndarray
+
+    @property
+    def cos_incidence(self) -> np.ndarray:
+        """(k,) of light along the axis: the normals' component along it."""
+        return cosine(self.local, self.focal_length)
+
+    @property
+    def half_path(self) -> np.ndarray:
+        """(k,) m, deviation times the cosine of the incidence: half of what it shortens the path to the focus by."""
+        return self.deviation * self.cos_incidence
+
+    @property
+    def half_path_covariance(self) -> np.ndarray:
+        """(k, k) m^2."""
+        c = self.cos_incidence
+        return self.deviation_covariance * c[:, None] * c
 
 
 def fit_paraboloid(
-    points: np.ndarray, covariance: np.ndarray, nominal: Transform, focal_length: float
+    points: np.ndarray,
+    covariance: np.ndarray,
+    nominal: Transform,
+    focal_length: float,
+    *,
+    free: Sequence[str] = POSE,
+    weights: np.ndarray | None = None,
+    measure: Measure = "normal",
 ) -> ParaboloidFit:
-    """Least squares of the normal deviations, unweighted, over translation and the two tilts.
+    """Least squares of deviations over what is free of vertex, axis and focal length.
 
-    points         (k, 3) m, in the frame `nominal.to`, at least 5
-    covariance     (3k, 3k) m^2, of the points; it does not weigh them, it is carried through
+    points         (k, 3) m, in the frame `nominal.to`, at least as many as parameters
+    covariance     (3k, 3k) or, points independent of each other, (k, 3, 3) m^2; does not weigh, is carried through
     nominal        outer frame from the nominal paraboloid's: vertex at its origin, axis along its z
-    focal_length   m, held
+    focal_length   m, held, or where the search begins
+    free           of "vertex" (its three coordinates), "axis" (two tilts), "focal-length"; the rest is held as nominal
+    weights        (k,) 0 or more, of squares; 1 without
+    measure        what is squared: the "normal" deviation or the "half-path" error
 
-    Unweighted, because the surface's own errors, some tenths of a millimetre, are larger than the points' uncertainty.
-    The deviation is (z - r^2/4f) / sqrt(1 + r^2/4f^2), which differs from the distance to the nearest point of the
-    surface by deviation^2 / 8f at most: 2 nm for a millimetre on f = 60 m. Raises EstimationError for fewer than five
-    points and for points that do not hold the five parameters.
+    Unweighted by the covariance, because the surface's own errors, some tenths of a millimetre, are larger than the
+    points' uncertainty. The deviation is (z - r^2/4f) / sqrt(1 + r^2/4f^2), which differs from the distance to the
+    nearest point of the surface by deviation^2 / 8f at most: 2 nm for a millimetre on f = 60 m. The half-path error is
+    that times cos i = 1 / sqrt(1 + r^2/4f^2). Raises EstimationError for too few points and for points that do not
+    hold the parameters.
     """
     points = np.asarray(points, dtype=float)
-    k = len(points)
-    if k < FREE:
-        raise EstimationError(f"a paraboloid of known focal length needs {FREE} points, {k} given")
+    free = ordered(free)
+    k, count = len(points), sum(PARAMETERS[name] for name in free)
+    weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
+    if (seen := int(np.count_nonzero(weights))) < count:
+        what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
+        raise EstimationError(f"{what} needs {count} points, {seen} given")
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
-    translation, turn = np.zeros(3), np.zeros(2)
+    root = np.sqrt(weights)[:, None]
+    translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
     for _ in range(ITERATIONS):
-        local, normal, deviation = _deviation(points, nominal, translation, tilts @ turn, focal_length)
-        arm = points - nominal.translation - translation
-        design = np.concatenate([normal, -np.einsum("ki,kij,jt->kt", normal, skew(arm), tilts)], axis=1)
-        scale = np.linalg.norm(design, axis=0)
-        orthogonal, triangle = np.linalg.qr(design / scale)
-        if np.min(np.abs(np.diag(triangle))) < 1e-10:
-            raise EstimationError(
-                f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis"
-            )
-        gain = np.linalg.solve(triangle, orthogonal.T) / scale[:, None]
+        _, normal, deviation, cos = _deviation(points, nominal, translation, tilts @ turn, focal)
+        design = _design(points - nominal.translation - translation, normal, tilts, cos, free)
+        scaled = root * (cos[:, None] if measure == "half-path" else 1.0)
+        gain = _gain(design, scaled, k)
         step = gain @ deviation
-        translation, turn = translation + step[:3], turn + step[3:]
-        if np.max(np.abs(step)) < CONVERGED_STEP:
+        at = 0
+        for name in free:
+            part = step[at : at + PARAMETERS[name]]
+            at += len(part)
+            if name == "vertex":
+                translation = translation + part
+            elif name == "axis":
+                turn = turn + part
+            else:
+                focal = focal + float(part[0])
+        if not 0.0 < focal < np.inf:
+            raise EstimationError(f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer")
+        if count == 0 or np.max(np.abs(step)) < CONVERGED_STEP:
             break
     else:
         raise EstimationError(f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad")
-    local, normal, deviation = _deviation(points, nominal, translation, tilts @ turn, focal_length)
-    blocks = covariance.reshape(k, 3, k, 3)
-    along = np.einsum("ki,kimj,mj->km", normal, blocks, normal)
-    expand = np.zeros((6, FREE))
-    expand[:3, :3], expand[3:, 3:] = np.eye(3), tilts
-    rest = np.eye(k) - design @ gain
-    carried = expand @ gain
-    rotation = from_vector(tilts @ turn)
+    local, normal, deviation, _ = _deviation(points, nominal, translation, tilts @ turn, focal)
+    along = covariance_along(covariance, normal)
+    carried = _expansion(free, tilts) @ gain
+    parameters = gain @ along @ gain.T
     return ParaboloidFit(
         translation=translation,
         rotation=tilts @ turn,
         covariance=carried @ along @ carried.T,
-        frame=Transform(nominal.to, nominal.from_, rotation @ nominal.rotation, nominal.translation + translation),
+        frame=Transform(
+            nominal.to,
+            nominal.from_,
+            from_vector(tilts @ turn) @ nominal.rotation,
+            nominal.translation + translation,
+        ),
         local=local,
         deviation=deviation,
-        deviation_covariance=rest @ along @ rest.T,
+        deviation_covariance=without(along, design, gain),
+        focal_length=focal,
+        u_focal_length=float(np.sqrt(parameters[-1, -1])) if "focal-length" in free else 0.0,
+        free=free,
+        parameter_covariance=parameters,
+        normal=normal,
+        design=design,
+        gain=gain,
+        along=along,
     )
+
+
+def ordered(free: Sequence[str]) -> tuple[str, ...]:
+    """What is free, in the order of the parameters; EstimationError for a name that is none of them."""
+    for name in free:
+        if name not in PARAMETERS:
+            raise EstimationError(f"{name!r} is not a part of a paraboloid (expected {', '.join(PARAMETERS)})")
+    return tuple(name for name in PARAMETERS if name in free)
+
+
+def cosine(local: np.ndarray, focal_length: float) -> np.ndarray:
+    """(k,) cosine of the incidence at points (k, 3) m of a paraboloid's frame: of tan i = r/2f."""
+    return 1.0 / np.sqrt(1.0 + np.sum(local[:, :2] ** 2, axis=1) / (2.0 * focal_length) ** 2)
+
+
+def covariance_along(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(k, k) m^2 of the points' components along unit vectors.
+
+    covariance   (3k, 3k) or (k, 3, 3) m^2
+    normal       (k, 3)
+    """
+    k = len(normal)
+    if covariance.shape == (k, 3, 3):
+        return np.diag(np.einsum("ki,kij,kj->k", normal, covariance, normal))
+    blocks = covariance.reshape(k, 3, k, 3)
+    return np.einsum("ki,kimj,mj->km", normal, blocks, normal, optimize=True)
+
+
+def without(covariance: np.ndarray, design: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """(1 - design gain) covariance (1 - design gain)^T, (k, k) m^2.
+
+    covariance   (k, k) m^2
+    design       (k, p)
+    gain         (p, k)
+    """
+    if len(design) <= SQUARE:  # as a square: never below zero, also where nothing is left
+        rest = np.eye(len(design)) - design @ gain
+        return rest @ covariance @ rest.T
+    crossed = design @ (gain @ covariance)
+    return covariance - crossed - crossed.T + design @ (gain @ covariance @ gain.T) @ design.T
+
+
+def design_rows(fit: ParaboloidFit, places: np.ndarray, nominal: Transform) -> np.ndarray:
+    """(m, p) of `ParaboloidFit.design` at other places of the fitted surface.
+
+    fit       a fit
+    places    (m, 2) m, x and y in the fitted paraboloid's frame
+    nominal   outer frame from the nominal paraboloid's, as the fit took it
+    """
+    height = np.sum(places**2, axis=1) / (4.0 * fit.focal_length)
+    points = fit.frame.points(np.column_stack([places, height]))
+    turn, shift = fit.rotation, fit.translation
+    _, normal, _, cos = _deviation(points, nominal, shift, turn, fit.focal_length)
+    return _design(points - nominal.translation - shift, normal, nominal.rotation[:, :2], cos, fit.free)
+
+
+def _gain(design: np.ndarray, scaled: np.ndarray, k: int) -> np.ndarray:
+    """(p, k): the least squares of scaled * (deviation - design parameters), from the deviations."""
+    if not design.shape[1]:
+        return np.zeros((0, k))
+    rows = scaled * design
+    scale = np.linalg.norm(rows, axis=0)
+    orthogonal, triangle = np.linalg.qr(rows / scale)
+    if np.min(np.abs(np.diag(triangle))) < DEPENDENT:
+        raise EstimationError(f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis")
+    return np.linalg.solve(triangle, (orthogonal * scaled).T) / scale[:, None]
+
+
+def _design(
+    arm: np.ndarray, normal: np.ndarray, tilts: np.ndarray, cos: np.ndarray, free: tuple[str, ...]
+) -> np.ndarray:
+    """(k, p): a shift lowers the deviation by its part along the normal, a turn w by that of w x arm.
+
+    A longer focal length f lowers the surface z = r^2/4f by r^2/4f^2 = tan^2 i, so it raises the deviation by
+    tan^2 i cos i.
+    """
+    columns: list[np.ndarray] = []
+    if "vertex" in free:
+        columns.append(normal)
+    if "axis" in free:
+        columns.append(-np.einsum("ki,kij,jt->kt", normal, skew(arm), tilts))
+    if "focal-length" in free:
+        columns.append(-((1.0 - cos**2) / cos)[:, None])
+    return np.concatenate(columns, axis=1) if columns else np.zeros((len(arm), 0))
+
+
+def _expansion(free: tuple[str, ...], tilts: np.ndarray) -> np.ndarray:
+    """(6, p): translation and rotation vector in the outer frame from the parameters."""
+    made = np.zeros((6, sum(PARAMETERS[name] for name in free)))
+    at = 0
+    for name in free:
+        if name == "vertex":
+            made[:3, at : at + 3] = np.eye(3)
+        elif name == "axis":
+            made[3:, at : at + 2] = tilts
+        at += PARAMETERS[name]
+    return made
 
 
 def _deviation(
     points: np.ndarray, nominal: Transform, translation: np.ndarray, rotation: np.ndarray, focal_length: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points in the paraboloid's frame, unit normals in the outer frame, deviations along them."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points in the paraboloid's frame, unit normals in the outer frame, deviations along them, cosines."""
     axes = from_vector(rotation) @ nominal.rotation
     local = (points - nominal.translation - translation) @ axes
     slope = local[:, :2] / (2.0 * focal_length)
     length = np.sqrt(1.0 + np.sum(slope**2, axis=1))
     normal = np.concatenate([-slope, np.ones((len(points), 1))], axis=1) / length[:, None]
     height = local[:, 2] - np.sum(local[:, :2] ** 2, axis=1) / (4.0 * focal_length)
-    return local, normal @ axes.T, height / length
+    return local, normal @ axes.T, height / length, 1.0 / length

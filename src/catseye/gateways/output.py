@@ -25,6 +25,12 @@ FORMATS = (
     "catseye-refractometer-1",
     "catseye-beam-1",
     "catseye-journal-export-1",
+    "catseye-surface-1",
+    "catseye-pose-1",
+    "catseye-pointing-1",
+    "catseye-track-profile-1",
+    "catseye-structure-1",
+    "catseye-panels-1",
 )
 
 

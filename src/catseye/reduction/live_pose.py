@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.datum import motions
+from catseye.geometry.beam_deviation import aperture, prime_focus_tilt
 from catseye.records.site_folder import SiteFolder
 from catseye.reduction.live_state import REFERENCE_EPOCH, XYZ, Carried
 
 Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
-RINGS, SPOKES = 24, 64  # of the aperture: quadrature good to 1e-10
 OFFSETS = ("azimuth times cos E", "elevation", "focus")
 
 
@@ -118,15 +118,7 @@ def beam_per_feed_shift(site: SiteFolder) -> Array:
     """
     p = site.site.paraboloid
     f, radius = p.focal_length_mm * MILLIMETRE, p.aperture_radius_mm * MILLIMETRE
-    nodes, weights = np.polynomial.legendre.leggauss(RINGS)
-    rho, angle = 0.5 * radius * (nodes + 1.0), 2.0 * np.pi * np.arange(SPOKES) / SPOKES
-    inside = (rho[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
-    weight = np.repeat(weights * rho, SPOKES)
-    xy = inside + np.array(p.aperture_centre_mm) * MILLIMETRE
-    z = np.sum(xy**2, axis=1) / (4.0 * f)
-    way = -np.column_stack([xy, z - f]) / (f + z)[:, None]  # from the focus to the surface is f + z, exactly
-    moment = weight @ inside[:, 0] ** 2  # the same along y; a plane's parts are orthogonal on a disc
-    return np.asarray((weight[:, None] * inside).T @ way / moment)
+    return prime_focus_tilt(aperture(f, np.array(p.aperture_centre_mm) * MILLIMETRE, radius))
 
 
 def _referenced(carried: Carried, names: Sequence[str]) -> list[str]:

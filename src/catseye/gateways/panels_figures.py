@@ -1,0 +1,198 @@
+"""Figures of a crew's work as SVG text: maps of the dish, how corners lie, control chart, what turning did."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.reduction.panel_crew import members, sessions
+from catseye.reduction.panels import surface_rms
+
+if TYPE_CHECKING:
+    from catseye.reduction.panel_job import PanelWork
+    from catseye.reduction.panels import PanelHeights
+
+OUTSIDE = 1.03  # of the limits, so that edges are not cut
+
+
+def panel_figures(work: "PanelWork") -> dict[str, str]:
+    """Every figure by its name."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {"corners": svg(_corners(work)), "surface": svg(_surface(work.latest)), "lie": svg(_lie(work))}
+        drawn["control"] = svg(_control(work))
+        if work.setting is not None:
+            drawn["turning"] = svg(_turning(work))
+        return drawn
+
+
+def _views(work: "PanelWork") -> list[tuple[str, "PanelHeights"]]:
+    return [("as found", work.found)] + ([] if work.left is None else [("as left", work.left)])
+
+
+def _quads(found: "PanelHeights", shrink: float = 0.0) -> np.ndarray:
+    """(p, 4, 4, 2) m, the quarter of each panel that belongs to each of its corners."""
+    four = found.layout.xy[found.layout.quad]
+    middle = four.mean(axis=1, keepdims=True)
+    before, after = 0.5 * (four + np.roll(four, 1, axis=1)), 0.5 * (four + np.roll(four, -1, axis=1))
+    quarter = np.stack([before, four, after, np.broadcast_to(middle, four.shape)], axis=2)
+    return quarter + shrink * (quarter.mean(axis=2, keepdims=True) - quarter)
+
+
+def _patches(ax: Any, outlines: np.ndarray, values: np.ndarray, limit: float) -> Any:
+    from matplotlib.collections import PolyCollection
+
+    known = np.isfinite(values)
+    if not known.all():
+        ax.add_collection(PolyCollection(list(outlines[~known]), facecolor="#e9edf0", edgecolor="none"))
+    seen = PolyCollection(list(outlines[known]), array=values[known], cmap="RdBu_r", edgecolor="face", linewidth=0.1)
+    seen.set_clim(-limit, limit)
+    seen.set_rasterized(True)  # thousands of pieces: as a picture a tenth of the size
+    ax.add_collection(seen)
+    low, high = outlines.reshape(-1, 2).min(axis=0), outlines.reshape(-1, 2).max(axis=0)
+    pad = 0.02 * float(np.max(high - low))
+    ax.set_xlim(low[0] - pad, high[0] + pad)
+    ax.set_ylim(low[1] - pad, high[1] + pad)
+    ax.set_aspect("equal")
+    ax.grid(False)
+    ax.set_xlabel("x (m)")
+    ax.set_ylabel("y from the vertex (m)")
+    return seen
+
+
+def _limit(values: np.ndarray) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return max(float(np.quantile(known, 0.98)), 1e-3) if len(known) else 1.0
+
+
+def _corners(work: "PanelWork") -> Figure:
+    views = _views(work)
+    wide = _shape(work.found)
+    figure = Figure(figsize=(9.4, (9.0 if len(views) == 1 else 4.6) / max(wide, 0.7) + 0.7), layout="constrained")
+    for ax, (name, found) in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        values = found.relative * 1e6
+        limit = _limit(values)
+        quarters = _quads(found).reshape(-1, 4, 2)
+        seen = _patches(ax, quarters, values.ravel(), limit)
+        ax.set_title(name)
+        bar = figure.colorbar(seen, ax=ax, orientation="horizontal", shrink=0.8, extend="both", pad=0.02)
+        bar.set_label("corner over its neighbours' mean (µm)")
+    return figure
+
+
+def _shape(found: "PanelHeights") -> float:
+    """Width over height of what is drawn."""
+    size = np.ptp(found.layout.xy, axis=0)
+    return float(np.clip(size[0] / max(size[1], 1e-9), 0.5, 3.0))
+
+
+def _surface(found: "PanelHeights") -> Figure:
+    wide = _shape(found)
+    figure = Figure(figsize=(9.4, 4.6 / max(wide, 0.7) + 0.7), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    rms, rest = surface_rms(found, found.departure)
+    values = rest.mean(axis=1) * 1e6
+    outline = found.layout.xy[found.layout.quad]
+    seen = _patches(left, outline, values, _limit(values))
+    left.set_title(f"Panels' mean departure, {rms * 1e6:.0f} µm rms of corners")
+    figure.colorbar(seen, ax=left, orientation="horizontal", shrink=0.8, extend="both", pad=0.02).set_label(
+        "from the best fit, towards the focus (µm)"
+    )
+    u = found.u_fit[:, 0] * 1e6
+    from matplotlib.collections import PolyCollection
+
+    spread = PolyCollection(list(outline), array=u, cmap="viridis", edgecolor="face", linewidth=0.1, rasterized=True)
+    spread.set_clim(0.0, float(np.quantile(u, 0.98)))
+    right.add_collection(spread)
+    right.set_xlim(left.get_xlim())
+    right.set_ylim(left.get_ylim())
+    right.set_aspect("equal")
+    right.grid(False)
+    right.set_xlabel("x (m)")
+    right.set_title("How well it is known")
+    figure.colorbar(spread, ax=right, orientation="horizontal", shrink=0.8, extend="max", pad=0.02).set_label(
+        "standard uncertainty of a panel's piston (µm)"
+    )
+    return figure
+
+
+def _lie(work: "PanelWork") -> Figure:
+    figure = Figure(figsize=(9.4, 3.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    goal = work.sheet.goal_um
+    for (name, found), colour in zip(_views(work), SERIES, strict=False):
+        size = np.sort(np.abs(found.relative[found.known])) * 1e6
+        if len(size):
+            left.step(np.maximum(size, 0.1), np.arange(1, len(size) + 1) / len(size), color=colour, label=name)
+        right.hist(
+            np.clip(found.u_relative[found.known] * 1e6, 0.0, 2.0 * goal), np.linspace(0.0, 2.0 * goal, 51),
+            color=colour, histtype="step", lw=1.3, label=name,
+        )  # fmt: skip
+    left.axvline(goal, color=BAD, lw=1.0, label=f"goal {goal:g} µm")
+    left.set_xscale("log")
+    left.set_ylim(0.0, OUTSIDE)
+    left.set_xlabel("corner off its neighbours' mean (µm)")
+    left.set_ylabel("share of corners below")
+    left.set_title("How corners lie")
+    left.legend(loc="best")
+    right.axvline(goal, color=BAD, lw=1.0)
+    right.set_xlabel("standard uncertainty of it (µm)")
+    right.set_ylabel("corners")
+    right.set_title("How well that is known")
+    right.legend(loc="best")
+    return figure
+
+
+def _control(work: "PanelWork") -> Figure:
+    views = _views(work)
+    figure = Figure(figsize=(9.4, 2.9 * len(views) + 0.3), layout="constrained")
+    panels = figure.subplots(len(views), 2, squeeze=False, gridspec_kw={"width_ratios": (2.4, 1.0)})
+    for (days, people), (name, found) in zip(panels, views, strict=True):
+        for ax, readers, title in (
+            (days, sessions(found), f"Sessions {name}"),
+            (people, members(found), f"Members {name}"),
+        ):
+            at = np.arange(len(readers))
+            value = np.array([r.variance_factor for r in readers])
+            low, high = np.array([r.low for r in readers]), np.array([r.high for r in readers])
+            ax.fill_between(
+                np.repeat(at, 2) + np.tile([-0.5, 0.5], len(at)), np.repeat(low, 2), np.repeat(high, 2),
+                color="#dfe9f3", lw=0, label="99.7 % of good ones",
+            )  # fmt: skip
+            good = np.array([r.in_control for r in readers])
+            ax.plot(at[good], value[good], "o", color=SERIES[0], ms=4)
+            ax.plot(at[~good], value[~good], "o", color=BAD, ms=5)
+            ax.axhline(1.0, color=FAINT, lw=0.8)
+            step = max(1, len(at) // 14)
+            many = len(at) > 6
+            ax.set_xticks(at[::step], [r.name for r in readers][::step], rotation=60 if many else 0, fontsize=7.5)
+            ax.set_title(title)
+            ax.margins(x=0.01)
+        days.set_ylabel("variance factor")
+        days.legend(loc="best")
+    return figure
+
+
+def _turning(work: "PanelWork") -> Figure:
+    done = work.setting
+    assert done is not None
+    figure = Figure(figsize=(9.4, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    wanted, got = done.wanted * 1e6, done.got * 1e6
+    left.plot(wanted, got, ".", color=SERIES[0], ms=2.5, alpha=0.5, rasterized=True)
+    ends = np.array([wanted.min(), wanted.max()])
+    left.plot(ends, ends, color=FAINT, lw=1.0, label="asked")
+    left.plot(ends, done.gain * ends, color=SERIES[1], lw=1.0, label=f"came: {done.gain:.3f} of it")
+    left.set_xlabel("change asked for (µm)")
+    left.set_ylabel("change that came (µm)")
+    left.set_title("What turning did")
+    left.legend(loc="best")
+    rest = got - done.gain * wanted
+    limit = max(float(np.quantile(np.abs(rest), 0.995)), 1.0)
+    right.hist(np.clip(rest, -limit, limit), 40, color=SERIES[0], alpha=0.8)
+    right.axvline(0.0, color=INK, lw=0.8)
+    right.set_xlabel("came less expected (µm)")
+    right.set_ylabel("corners")
+    right.set_title(f"Scatter {done.scatter * 1e6:.1f} µm rms")
+    return figure

@@ -1,0 +1,200 @@
+"""A crew's work as plain objects for JSON, and as passages for people."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from catseye.reduction.panel_crew import members, sessions, standing, zeros
+from catseye.reduction.panel_job import verdicts
+from catseye.reduction.panels import surface_rms
+
+if TYPE_CHECKING:
+    from catseye.reduction.panel_crew import Reader, Setting, Standing
+    from catseye.reduction.panel_job import PanelWork
+    from catseye.reduction.panels import Doubt, PanelHeights
+
+FORMAT = "catseye-panels-1"
+
+
+class Passage(NamedTuple):
+    title: str
+    text: str
+
+
+class Screw(NamedTuple):
+    """A row of the list of screws; SI but for what says its unit."""
+
+    panel: str
+    corner: str
+    x: float
+    y: float
+    readings: int
+    departure: float
+    u_departure: float
+    relative: float
+    u_relative: float
+    probability_within: float
+    turns: float
+    u_turns: float
+    verdict: str
+
+
+def screws(found: "PanelHeights") -> Iterable[Screw]:
+    """Every panel corner of the panels read, in the layout's order."""
+    layout, verdict = found.layout, verdicts(found)
+    for i, panel in enumerate(layout.panels):
+        for k in range(4):
+            c = layout.quad[i, k]
+            yield Screw(
+                panel,
+                layout.corners[c],
+                float(layout.xy[c, 0]),
+                float(layout.xy[c, 1]),
+                int(found.times[i, k]),
+                float(found.departure[i, k]),
+                float(found.u_departure[i, k]),
+                float(found.relative[i, k]),
+                float(found.u_relative[i, k]),
+                float(found.conforms[i, k]),
+                float(found.turns[i, k]),
+                float(found.u_turns[i, k]),
+                str(verdict[i, k]),
+            )
+
+
+def panels_object(work: "PanelWork") -> dict[str, Any]:
+    """What `catseye panels --json` prints: SI units."""
+    last = work.latest
+    return {
+        "format": FORMAT,
+        "instrument": {"name": work.sheet.name, "serial": work.sheet.serial},
+        "layout": {"panels": len(work.layout.panels), "corners": len(work.layout.corners)},
+        "goal": work.sheet.goal_um * 1e-6,
+        "as_found": _told(work.found),
+        "as_left": None if work.left is None else _told(work.left),
+        "setting": None if work.setting is None else _setting_object(work.setting),
+        "screws_from": "as_found" if work.left is None else "as_left",
+        "screws": [screw._asdict() for screw in screws(last)],
+        "actuators": {
+            name: {"mean_departure": last.actuator[c], "u": last.u_actuator[c]}
+            for c, name in enumerate(last.layout.corners)
+            if np.isfinite(last.actuator[c])
+        },
+        "panels": {
+            name: {"piston": last.fit[p, 0], "slope_x": last.fit[p, 1], "slope_y": last.fit[p, 2],
+                   "u_piston": last.u_fit[p, 0], "u_slope_x": last.u_fit[p, 1], "u_slope_y": last.u_fit[p, 2],
+                   "map_rms": work.maps[name].rms if name in work.maps else None}
+            for p, name in enumerate(last.layout.panels)
+        },
+        "notes": list(work.notes),
+    }  # fmt: skip
+
+
+def _told(found: "PanelHeights") -> dict[str, Any]:
+    return {
+        "panels": len(found.layout.panels),
+        "placements": int(np.sum(found.readings.corner >= 0)),
+        "readings": int(sum(f.active.sum() for f in found.solution.fits[: len(found.model.blocks)])),
+        "standing": asdict(standing(found)),
+        "surface_rms": surface_rms(found, found.departure)[0],
+        "surveyed": found.surveyed,
+        "variance_factor": found.variance_factor,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "members": [_reader_object(r) for r in members(found)],
+        "sessions": [_reader_object(r) for r in sessions(found)],
+        "zeros": {name: {"zero": value, "u": u} for name, value, u in zeros(found)},
+        "doubts": [asdict(d) for d in found.doubts],
+    }
+
+
+def _reader_object(reader: "Reader") -> dict[str, Any]:
+    return {**asdict(reader), "in_control": reader.in_control}
+
+
+def _setting_object(done: "Setting") -> dict[str, Any]:
+    return {
+        "corners": len(done.names),
+        "gain": done.gain,
+        "u_gain": done.u_gain,
+        "scatter": done.scatter,
+    }
+
+
+def micrometres(value: float, form: str = ".1f") -> str:
+    """A length in µm for people; a dash for what is not known.
+
+    >>> micrometres(2.54e-5)
+    '25.4'
+    """
+    return format(value * 1e6, form) if np.isfinite(value) else "-"
+
+
+def standing_text(one: "Standing", goal_um: float) -> str:
+    if not one.corners:
+        return "no corner where two panels were read"
+    true = micrometres(one.rms_true)
+    return (
+        f"{one.corners} panel corners lie {micrometres(one.rms)} µm rms about their neighbours' mean "
+        f"({true} µm without what the measurement scatters; median u {micrometres(one.median_u)} µm); "
+        f"{100 * one.within:.1f} % within ± {goal_um:g} µm as measured, {100 * one.expected_within:.1f} % expected in "
+        f"truth; surely within {one.surely}, surely not {one.surely_not}, undecided {one.undecided}"
+    )
+
+
+def doubt_text(one: "Doubt") -> str:
+    also = f"; {' or '.join(one.rivals)} would explain it as well" if one.rivals else ""
+    return (
+        f"{one.where}, {one.gauge}_mm by {one.member} at {one.corner} on {one.panel}: {micrometres(one.error, '+.0f')} "
+        f"µm off, w = {one.w:+.1f}{also}{'; left out' if one.out else ''}"
+    )
+
+
+def passages(work: "PanelWork") -> list[Passage]:
+    """What the command tells people."""
+    found, last = work.found, work.latest
+    goal = work.sheet.goal_um
+    told = [
+        Passage(
+            "The tool",
+            f"{work.sheet.name}, serial {work.sheet.serial}: {int(np.sum(found.readings.corner >= 0))} placements in "
+            f"{len(found.readings.sessions)} sessions on {len(found.layout.panels)} panels; variance factor "
+            f"{found.variance_factor:.3f} with {found.degrees_of_freedom:.0f} degrees of freedom",
+        ),
+        Passage("As found", standing_text(standing(found), goal)),
+    ]
+    if work.left is not None:
+        told.append(Passage("As left", standing_text(standing(work.left), goal)))
+    if work.setting is not None:
+        done = work.setting
+        told.append(
+            Passage(
+                "The turning",
+                f"{len(done.names)} corners moved {done.gain:.3f} (u {done.u_gain:.3f}) of what was asked; scatter "
+                f"{micrometres(done.scatter)} µm rms, turning and reading together",
+            )
+        )
+    verdict = verdicts(last)
+    turn = verdict == "turn"
+    largest = float(np.nanmax(np.abs(last.turns), initial=0.0)) if last.known.any() else 0.0
+    told.append(
+        Passage(
+            "The screws",
+            f"turn {int(turn.sum())}, leave {int((verdict == 'leave').sum())}, read first "
+            f"{int((verdict == 'read').sum())}; {int((verdict == 'alone').sum())} have no neighbour, so that only "
+            f"their actuator sets them; the largest turn is {largest:.2f}",
+        )
+    )
+    rms = surface_rms(last, last.departure)[0]
+    told.append(
+        Passage(
+            "The surface",
+            f"panel corners depart {rms * 1e6:.0f} µm rms from the best fit of the design, shift and tilt free"
+            + ("" if last.surveyed else "; without a survey this says little"),
+        )
+    )
+    for when, one in (("found", found), ("left", work.left)):
+        told += [Passage(f"Doubt, {when}", doubt_text(d)) for d in (() if one is None else one.doubts[:5])]
+    told += [Passage("Note", note) for note in work.notes]
+    return told

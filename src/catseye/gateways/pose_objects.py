@@ -1,0 +1,165 @@
+"""Poses and pointing offsets as plain objects for JSON, and as text for people."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.errors import InputError
+from catseye.estimation.pose import COMPONENTS
+from catseye.records.reading import Folder
+from catseye.reduction.pointing_offsets import COMPONENTS as BEAM
+from catseye.reduction.pointing_offsets import PointingOffset
+from catseye.reduction.pose import GroupPose
+
+FORMAT = "catseye-pose-1"
+WEAK_LEVEL = 0.01  # chance below which a group is said not to move as one
+
+
+class PoseResult(NamedTuple):
+    """What `catseye pose` found: the group's pose, and the beam where it was asked for."""
+
+    pose: GroupPose
+    beam: PointingOffset | None
+
+
+def pose_result_object(found: PoseResult) -> dict[str, Any]:
+    """A pose as `catseye pose --json` gives it: m and rad."""
+    group, pose = found.pose, found.pose.pose
+    posture = group.epoch.posture
+    moved, _ = pose.displacement(group.places)
+    return {
+        "format": FORMAT,
+        "group": group.group,
+        "epoch": group.epoch.campaign,
+        "against": group.against,
+        "posture": None
+        if posture is None
+        else {"azimuth_deg": posture[0] / DEGREE, "elevation_deg": posture[1] / DEGREE},
+        "frame": pose.frame,
+        "pivot": pose.pivot,
+        "translation": pose.translation,
+        "rotation": pose.rotation,
+        "u_translation": pose.u[:3],
+        "u_rotation": pose.u[3:],
+        "covariance": pose.covariance,
+        "covariance_order": list(COMPONENTS),
+        "matrix": pose.motion.matrix,
+        "status": pose.motion.status,
+        "chi2": pose.motion.pvv,
+        "degrees_of_freedom": pose.motion.degrees_of_freedom,
+        "p": pose.p,
+        "points": {
+            name: {"place": place, "displacement": d, "residual": r, "w": w}
+            for name, place, d, r, w in zip(pose.names, group.places, moved, pose.motion.residual, pose.w, strict=True)
+        },
+        "left_out": pose.left_out,
+        "missing": list(group.missing),
+        "pointing": None if found.beam is None else beam_object(found.beam),
+    }
+
+
+def beam_object(beam: PointingOffset) -> dict[str, Any]:
+    """Beam and focus: rad, rad, m, in that order everywhere."""
+    return {
+        "optics": beam.optics,
+        "order": list(BEAM),
+        "offset": beam.offset,
+        "u_offset": np.sqrt(np.maximum(np.diag(beam.covariance), 0.0)),
+        "covariance": beam.covariance,
+        "correction": beam.correction,
+        "terms": beam.terms,
+        "plate_scale": beam.plate_scale,
+        "beam_deviation": beam.beam_deviation,
+        "slopes": beam.slopes,
+        "relative": beam.relative,
+        "u_relative": np.sqrt(np.maximum(np.diag(beam.relative_covariance), 0.0)),
+    }
+
+
+def pose_rows(found: PoseResult) -> list[tuple[str, str, str, str]]:
+    """Component, value, standard uncertainty, unit, as people read them."""
+    pose = found.pose.pose
+    values = [*(pose.translation / MILLIMETRE), *(pose.rotation / ARCSECOND)]
+    us = [*(pose.u[:3] / MILLIMETRE), *(pose.u[3:] / ARCSECOND)]
+    units = ["mm"] * 3 + ["arcsec"] * 3
+    return [(c, f"{v:+.3f}", f"{u:.3f}", x) for c, v, u, x in zip(COMPONENTS, values, us, units, strict=True)]
+
+
+def beam_rows(beam: PointingOffset) -> list[tuple[str, str, str, str]]:
+    """The same of the beam, then its terms without uncertainty."""
+    u = np.sqrt(np.maximum(np.diag(beam.covariance), 0.0))
+    scale = (ARCSECOND, ARCSECOND, MILLIMETRE)
+    units = ("arcsec", "arcsec", "mm")
+    return [
+        (name, f"{v / s:+.3f}", f"{w / s:.3f}", unit)
+        for name, v, w, s, unit in zip(BEAM, beam.offset, u, scale, units, strict=True)
+    ]
+
+
+def pose_words(found: PoseResult) -> list[tuple[str, str]]:
+    """Titles and sentences for people, in order."""
+    group, pose = found.pose, found.pose.pose
+    pivot = ", ".join(f"{v:.3f}" for v in pose.pivot)
+    made = [
+        ("Group", f"{group.group}: {len(pose.names)} points, against {group.against}"),
+        ("Frame", f"{pose.frame}, turned about the pivot ({pivot}) m"),
+    ]
+    if pose.motion.degrees_of_freedom:
+        fits = "moves as one" if pose.p >= WEAK_LEVEL else "does not move as one: look at the residuals"
+        made.append(
+            (
+                "Rigid",
+                f"chi-square {pose.motion.pvv:.1f} with {pose.motion.degrees_of_freedom} degrees of freedom, "
+                f"p {pose.p:.2g}: the group {fits}",
+            )
+        )
+    if pose.motion.status != "converged":
+        made.append(("Status", pose.motion.status))
+    for name, w in pose.left_out.items():
+        made.append(("Left out", f"{name}: |w| {w:.1f}, it moved on its own"))
+    if group.missing:
+        some = ", ".join(group.missing[:6]) + (" ..." if len(group.missing) > 6 else "")
+        made.append(("Missing", f"{len(group.missing)} points of the group are not in both: {some}"))
+    if found.beam is not None:
+        across, along = found.beam.beam_deviation
+        made.append(
+            (
+                "Optics",
+                f"{found.beam.optics}; plate scale {found.beam.plate_scale * MILLIMETRE / ARCSECOND:.3f} arcsec a mm, "
+                f"of which a shift across comes to {across:.3f}, one in the plane of symmetry to {along:.3f}",
+            )
+        )
+    return made
+
+
+class TiltOfPose(NamedTuple):
+    """What a track profile takes from a written pose: file, azimuth (rad), turn (2,) and covariance (2, 2), rad."""
+
+    file: str
+    azimuth: float
+    turn: np.ndarray
+    covariance: np.ndarray
+
+
+def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
+    """The turns about the alidade's x and y of a pose.json written by `catseye pose`; InputError for another file."""
+    import json
+
+    try:
+        found = json.loads(folder.text(name))
+    except (ValueError, RecursionError) as problem:
+        raise InputError(f"{name}: is not JSON: {problem}") from problem
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        raise InputError(f"{name}: is no pose (expected format '{FORMAT}', as catseye pose --out writes it)")
+    if found.get("frame") != "alidade" or not found.get("posture"):
+        raise InputError(f"{name}: is in the frame {found.get('frame')!r} (expected 'alidade', with its posture)")
+    try:
+        turn = np.array(found["rotation"], dtype=float)[:2]
+        spread = np.array(found["covariance"], dtype=float)[3:5, 3:5]
+        azimuth = float(found["posture"]["azimuth_deg"]) * DEGREE
+    except (KeyError, TypeError, ValueError, IndexError) as problem:
+        raise InputError(f"{name}: rotation, covariance or posture cannot be read: {problem}") from problem
+    if turn.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*turn, *spread.ravel(), azimuth]).all():
+        raise InputError(f"{name}: rotation and covariance have other sizes (expected 3 and 6 x 6 numbers)")
+    return TiltOfPose(name, azimuth, turn, spread)

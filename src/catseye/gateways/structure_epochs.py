@@ -1,0 +1,245 @@
+"""Epochs of a structure: reductions in folders, a list of them, or the solutions of a journal; ranges at full rate."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.journal_reader import JournalReader
+from catseye.errors import InputError
+from catseye.records.columns import columns_of
+from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.reduction.structure_group import PlacesEpoch
+from catseye.reduction.vibration import RangeSeries
+
+RESULT, POSE = "coordinates.json", "pose.json"
+REQUIRED = ("reduction", "azimuth_deg", "elevation_deg")
+OPTIONAL = ("temperature_c", "mjd_utc")
+RECENT = 1800.0 / SECONDS_PER_DAY  # d: weather older or younger than this says nothing of an epoch
+CARRIED = (
+    "A journal's solutions carry one another on: they are not independent, and the model's own uncertainty is too "
+    "small; the epochs left out show by how much. Take one in some minutes with --every-s."
+)
+AIR = "Temperatures are the air's at the weather stations, which the steel follows late."
+
+
+@dataclass(frozen=True, eq=False)
+class ReadEpochs:
+    """Epochs, where they came from, and what people should know.
+
+    inputs   SHA-256 of each file read, by its name
+    """
+
+    epochs: tuple[PlacesEpoch, ...]
+    inputs: dict[str, str]
+    notes: tuple[str, ...] = ()
+
+
+def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpochs:
+    """Epochs of reductions.
+
+    sources   directories that `catseye reduce` wrote, or that hold such directories; coordinates.json files
+    listed    CSV with the columns reduction, azimuth_deg, elevation_deg and perhaps temperature_c and mjd_utc: a
+              directory or file, relative to it, and how the telescope stood; it counts before what the files say
+
+    Raises InputError for a file that is missing, is no reduction, or has no posture.
+    """
+    inputs: dict[str, str] = {}
+    epochs = [_epoch(place, {}, inputs) for source in sources for place in _results(source)]
+    if listed is not None:
+        try:
+            raw = listed.read_bytes()
+            table = columns_of(raw.decode("utf-8"), str(listed), REQUIRED, OPTIONAL)
+        except OSError as problem:
+            raise InputError(f"{listed}: {problem.strerror or problem}") from problem
+        except UnicodeDecodeError as problem:
+            raise InputError(f"{listed}: is no UTF-8 text (expected a CSV table)") from problem
+        inputs[listed.name] = hashlib.sha256(raw).hexdigest()
+        told = {name: table.numbers(name) for name in REQUIRED[1:]}
+        for name, (low, high) in (("azimuth_deg", (-540.0, 540.0)), ("elevation_deg", (-5.0, 95.0))):
+            table.check(name, (told[name] >= low) & (told[name] <= high), f"{low:g} to {high:g}")
+        told |= {name: table.numbers(name, float("nan")) for name in OPTIONAL if name in table.cells}
+        for row, name in enumerate(table.cells["reduction"]):
+            (place,) = _results(listed.parent / name)[:1] or [listed.parent / name]
+            epochs.append(_epoch(place, {key: float(v[row]) for key, v in told.items()}, inputs, name))
+    if not epochs:
+        raise InputError("there is no epoch (expected directories of `catseye reduce`, or --epochs LIST.csv)")
+    return ReadEpochs(tuple(epochs), inputs)
+
+
+def _results(source: Path) -> list[Path]:
+    """The coordinates.json that a path stands for."""
+    if source.is_file():
+        return [source]
+    if (source / RESULT).is_file():
+        return [source / RESULT]
+    found = sorted(source.glob(f"*/{RESULT}")) if source.is_dir() else []
+    if not found:
+        what = "holds no coordinates.json, nor do its directories" if source.is_dir() else "missing"
+        raise InputError(f"{source}: {what} (expected what `catseye reduce` wrote)")
+    return found
+
+
+def _epoch(place: Path, told: Mapping[str, float], inputs: dict[str, str], label: str = "") -> PlacesEpoch:
+    """One reduction, with its posture."""
+    document = _object(place, inputs)
+    posture = dict(told)
+    pose = place.parent / POSE
+    if "azimuth_deg" not in posture:
+        if not pose.is_file():
+            raise InputError(f"{place}: no {POSE} beside it says the posture (expected one, or --epochs LIST.csv)")
+        nominal = _object(pose, inputs).get("nominal_posture")
+        if not isinstance(nominal, dict) or not {"azimuth_deg", "elevation_deg"} <= set(nominal):
+            raise InputError(f"{pose}: nominal_posture is missing (expected azimuth_deg and elevation_deg)")
+        posture |= {key: float(nominal[key]) for key in ("azimuth_deg", "elevation_deg")}
+    provenance = place.parent / "provenance.json"
+    if np.isnan(posture.get("mjd_utc", np.nan)) and provenance.is_file():
+        campaign = _object(provenance, inputs).get("campaign")
+        if isinstance(campaign, dict) and isinstance(campaign.get("start_mjd_utc"), float):
+            posture["mjd_utc"] = campaign["start_mjd_utc"]
+    names, x, covariance = _places(document, place)
+    return PlacesEpoch(
+        label or place.parent.name,
+        posture.get("mjd_utc", float("nan")),
+        posture["azimuth_deg"] * DEGREE,
+        posture["elevation_deg"] * DEGREE,
+        posture.get("temperature_c", float("nan")),
+        names,
+        x,
+        covariance,
+    )
+
+
+def _object(place: Path, inputs: dict[str, str]) -> dict[str, Any]:
+    try:
+        raw = place.read_bytes()
+        found = json.loads(raw)
+    except OSError as problem:
+        raise InputError(f"{place}: {problem.strerror or problem}") from problem
+    except (ValueError, RecursionError) as problem:
+        raise InputError(f"{place}: is no JSON: {problem}") from problem
+    if not isinstance(found, dict):
+        raise InputError(f"{place}: holds no JSON object (expected one)")
+    inputs[f"{place.parent.name}/{place.name}"] = hashlib.sha256(raw).hexdigest()
+    return found
+
+
+def _places(document: Mapping[str, Any], place: Path) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """Names, coordinates and covariance of a coordinates.json."""
+    points, order, covariance = (document.get(key) for key in ("points", "covariance_order", "covariance"))
+    if not isinstance(points, dict) or not isinstance(order, list) or not isinstance(covariance, list):
+        raise InputError(f"{place}: points, covariance_order or covariance is missing (expected `catseye reduce`'s)")
+    names = tuple(points)
+    try:
+        x = np.array([[points[name][axis] for axis in "xyz"] for name in names], dtype=float)
+        whole = np.array(covariance, dtype=float)
+        at = [order.index(f"{name} {axis}") for name in names for axis in "xyz"]
+    except (KeyError, TypeError, ValueError) as problem:
+        raise InputError(f"{place}: points and covariance do not fit: {problem} (expected three each)") from problem
+    if whole.shape != (len(order), len(order)) or not np.isfinite(whole).all() or not np.isfinite(x).all():
+        raise InputError(f"{place}: covariance {whole.shape} of {len(order)} rows (expected a finite square)")
+    return names, x, whole[np.ix_(at, at)]
+
+
+def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: float = 0.0) -> ReadEpochs:
+    """The solutions of a run as epochs, with the mean of the stations' temperatures about them.
+
+    journal   file or URL
+    run       number or beginning of its uuid; the last
+    every_s   s, least between two epochs; 0 takes all
+
+    Raises InputError for no such run, and where no solution has points with a covariance.
+    """
+    with JournalReader(journal) as reader:
+        number = reader.run(run).run
+        weather: list[tuple[float, float]] = []
+        epochs: list[PlacesEpoch] = []
+        without = 0
+        for _, entry in reader.events(number, kinds=["solutions", "weather"], buffers=False):
+            if isinstance(entry, LiveWeather) and np.isfinite(entry.temperature_c):
+                weather.append((entry.ticks / TICKS_PER_DAY, entry.temperature_c))
+            elif isinstance(entry, Solution):
+                mjd = entry.ticks / TICKS_PER_DAY
+                if epochs and (mjd - epochs[-1].mjd) * SECONDS_PER_DAY < every_s:
+                    continue
+                made = _solved(entry, mjd)
+                without += made is None
+                epochs += [made] if made is not None else []
+        hashes = {f"run {number}: {path}": digest for path, digest in reader.run(number).hashes.items()}
+    if not epochs:
+        raise InputError(f"journal {journal}: run {number} has no solution with points and their covariance")
+    notes = [CARRIED, AIR]
+    if without:
+        notes.append(f"{without} solutions gave no points and were left out.")
+    times, warm = (np.array(v) for v in zip(*weather, strict=True)) if weather else (np.zeros(0), np.zeros(0))
+    return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes))
+
+
+def _solved(entry: Solution, mjd: float) -> PlacesEpoch | None:
+    answer, q = entry.answer, entry.covariance
+    names, x = answer.get("names"), answer.get("x")
+    numbers = (answer.get("azimuth"), answer.get("elevation"))
+    if not names or not x or q is None or q.shape != (3 * len(names),) * 2 or None in numbers:
+        return None
+    places = np.array(x, dtype=float)
+    if not np.isfinite(places).all():
+        return None
+    label = f"epoch {answer.get('number')}"
+    azimuth, elevation = (float(v) for v in numbers if v is not None)
+    return PlacesEpoch(label, mjd, azimuth, elevation, float("nan"), tuple(names), places, q)
+
+
+def _warmed(epoch: PlacesEpoch, times: np.ndarray, warm: np.ndarray) -> PlacesEpoch:
+    from dataclasses import replace
+
+    near = np.abs(times - epoch.mjd) <= RECENT
+    return replace(epoch, temperature_c=float(warm[near].mean())) if near.any() else epoch
+
+
+def read_range_series(
+    journal: str, points: Sequence[str], *, run: int | str | None = None, least: int = 64
+) -> tuple[tuple[RangeSeries, ...], dict[str, str], float]:
+    """The used ranges of a run by ranger and target, the hashes of its files, and the MJD of 0 s.
+
+    journal   file or URL
+    points    names of targets, or patterns
+    run       number or beginning of its uuid; the last
+    least     ranges: shorter series are left out
+
+    Raises InputError for no such run, no such target.
+    """
+    with JournalReader(journal) as reader:
+        number = reader.run(run).run
+        hashes = {f"run {number}: {path}": digest for path, digest in reader.run(number).hashes.items()}
+        rows: dict[tuple[str, str], list[tuple[int, float, float, float]]] = {}
+        seen: set[str] = set()
+        for _, entry in reader.shots(number, buffers=False):
+            shot = entry.shot
+            seen.add(shot.target)
+            if entry.status == "used" and any(fnmatchcase(shot.target, p) for p in points):
+                rows.setdefault((shot.ranger, shot.target), []).append(
+                    (shot.ticks, 0.5 * shot.duration, entry.range_, entry.u_range)
+                )
+    kept = {key: np.array(sorted(found)) for key, found in rows.items() if len(found) >= least}
+    if not kept:
+        some = ", ".join(sorted(seen)[:8])
+        most = max((len(found) for found in rows.values()), default=0)
+        raise InputError(
+            f"journal {journal}: run {number} has no target {', '.join(points)} with {least} used ranges of one ranger "
+            f"(the most is {most}; its targets are {some})"
+        )
+    zero = min(int(found[0, 0]) for found in kept.values())
+    made = []
+    for (ranger, target), found in sorted(kept.items()):
+        seconds = (found[:, 0] - zero) * (SECONDS_PER_DAY / TICKS_PER_DAY) + found[:, 1]
+        good = np.isfinite(found[:, 2:]).all(axis=1) & np.concatenate([[True], np.diff(seconds) > 0.0])
+        window = 2.0 * float(np.median(found[:, 1]))
+        made.append(RangeSeries(ranger, target, seconds[good], found[good, 2], found[good, 3], window))
+    return tuple(made), hashes, zero / TICKS_PER_DAY

@@ -1,0 +1,133 @@
+"""Figures of a surface: maps over the aperture, Zernike terms, terms by elevation."""
+
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.optics.zernike import number
+from catseye.reduction.actuators import Actuators
+from catseye.reduction.surface_lookup import HYSTERESIS, Lookup
+from catseye.reduction.surface_shape import Aperture, Expansion, ShapeSettings
+
+LEVELS = 21
+MOST_NAMED = 60  # prisms whose names fit
+PANELS = 6  # terms of an elevation figure
+
+
+def surface_map(
+    local: np.ndarray, value: np.ndarray, aperture: Aperture, label: str, names: tuple[str, ...] = ()
+) -> str:
+    """Values at prisms, and between them by plain triangles.
+
+    local      (k, 2 or 3) m, dish's frame
+    value      (k,) m
+    label      of the scale, with mm
+    names      of the prisms, where there are few
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 6.8), layout="constrained")
+        ax = figure.add_subplot()
+        x, y, shown = local[:, 0], local[:, 1], value / MILLIMETRE
+        limit = max(float(np.max(np.abs(shown))), 1e-6)
+        levels = np.linspace(-limit, limit, LEVELS)
+        scale: Any = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+        ax.tricontourf(x, y, shown, levels, extend="both", alpha=0.75, **scale)
+        size = 60.0 if len(x) <= MOST_NAMED else 7.0
+        seen = ax.scatter(x, y, c=shown, s=size, edgecolors=FAINT, linewidths=0.4 if size > 10 else 0.0, **scale)
+        if len(names) <= MOST_NAMED:
+            for name, px, py in zip(names, x, y, strict=False):
+                ax.annotate(name, (px, py), xytext=(0, -6), textcoords="offset points", ha="center", va="top",
+                            fontsize=6, color=INK)  # fmt: skip
+        _edge(ax, aperture)
+        ax.set_xlabel("x in the dish's frame (m)")
+        ax.set_ylabel("y in the dish's frame, from the vertex (m)")
+        figure.colorbar(seen, ax=ax, label=label, shrink=0.85)
+        return svg(figure)
+
+
+def actuator_map(found: Actuators, aperture: Aperture) -> str:
+    """Corrections of all actuators, and their standard uncertainty."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 5.2), layout="constrained")
+        correction, u = found.correction / MILLIMETRE, found.u_correction / MILLIMETRE
+        limit = max(float(np.max(np.abs(correction))), 1e-6)
+        centred: Any = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+        rising: Any = {"cmap": "viridis", "vmin": 0.0, "vmax": float(u.max())}
+        panels = ((correction, "correction (mm)", centred), (u, "standard uncertainty (mm)", rising))
+        for k, (values, title, scale) in enumerate(panels):
+            ax = figure.add_subplot(1, 2, k + 1)
+            seen = ax.scatter(found.places[:, 0], found.places[:, 1], c=values, s=6, linewidths=0, **scale)
+            _edge(ax, aperture)
+            ax.set_title(title)
+            ax.set_xlabel("x (m)")
+            ax.set_ylabel("y (m)" if k == 0 else "")
+            figure.colorbar(seen, ax=ax, shrink=0.8)
+        return svg(figure)
+
+
+def _edge(ax: Any, aperture: Aperture) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    (x, y), radius = aperture.centre, aperture.radius
+    ax.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=FAINT, lw=0.9, ls="--")
+    ax.set_aspect("equal")
+    ax.use_sticky_edges = False  # of filled contours, which would cut prisms at the edge
+    ax.margins(0.04)
+
+
+def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> str:
+    """Terms with their standard uncertainties, piston and tilts left to the table."""
+    with mpl.rc_context(STYLE):
+        shown = [k for k, term in enumerate(expansion.terms) if term.n >= 2] or list(range(len(expansion.terms)))
+        figure = Figure(figsize=(9.4, 0.9 + 0.27 * len(shown)), layout="constrained")
+        ax = figure.add_subplot()
+        rows = np.arange(len(shown))
+        value, u = expansion.value[shown] / MILLIMETRE, np.sqrt(np.diag(expansion.covariance))[shown] / MILLIMETRE
+        ax.barh(rows, value, xerr=u, color=SERIES[0], ecolor=INK, error_kw={"lw": 1.0, "capsize": 2.5}, height=0.65)
+        labels = [f"{number(expansion.terms[k], settings.numbering)}  {expansion.terms[k].name}" for k in shown]
+        ax.set_yticks(rows, labels)
+        ax.invert_yaxis()
+        ax.axvline(0.0, color=FAINT, lw=0.8)
+        ax.set_xlabel("half-path error of the term, rms over the aperture (mm), bars: 1σ")
+        return svg(figure)
+
+
+def elevation_terms(lookup: Lookup) -> str:
+    """The terms that move most, measured and modelled, up and down apart."""
+    with mpl.rc_context(STYLE):
+        span = np.ptp(lookup.table[:, :, 1], axis=0)
+        order = [k for k in np.argsort(span)[::-1] if lookup.models[k].term.n >= 2][:PANELS] or [0]
+        rows = (len(order) + 1) // 2
+        figure = Figure(figsize=(10.0, 2.7 * rows), layout="constrained")
+        for place, k in enumerate(order):
+            ax = figure.add_subplot(rows, 2, place + 1)
+            _elevation_panel(ax, lookup, int(k))
+            ax.set_title(lookup.models[k].term.name)
+            if place >= len(order) - 2:
+                ax.set_xlabel("elevation (°)")
+            if place % 2 == 0:
+                ax.set_ylabel("half-path (mm rms)")
+            if place == 0:
+                ax.legend()
+        return svg(figure)
+
+
+def _elevation_panel(ax: Any, lookup: Lookup, k: int) -> None:
+    at, ways = lookup.elevation_deg, (lookup.rising > 0.0, lookup.rising < 0.0)
+    both = HYSTERESIS in lookup.columns
+    for way, (chosen, mark, name) in enumerate(zip(ways, "^v", ("going up", "going down"), strict=True)):
+        color = SERIES[way]
+        if chosen.any():
+            ax.errorbar(
+                at[chosen], lookup.measured[chosen, k] / MILLIMETRE, lookup.u_measured[chosen, k] / MILLIMETRE,
+                fmt=mark, ms=4.5, color=color, lw=0.9, capsize=2, label=name,
+            )  # fmt: skip
+        if both:
+            line = lookup.table[:, k, 2 * way] / MILLIMETRE
+            ax.plot(lookup.table_deg, line, color=color, lw=1.1)
+    if not both:
+        ax.plot(lookup.table_deg, lookup.table[:, k, 1] / MILLIMETRE, color=FAINT, lw=1.1)
+    band = lookup.u_table[:, k, 1] / MILLIMETRE
+    mean = lookup.table[:, k, 1] / MILLIMETRE
+    ax.fill_between(lookup.table_deg, mean - band, mean + band, color=FAINT, alpha=0.25, linewidth=0)

@@ -1,0 +1,319 @@
+"""Surfaces as plain objects for JSON, and as text for people; SI, with the unit in the key elsewhere."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.optics.zernike import Numbering, number
+from catseye.reduction.actuators import Actuators
+from catseye.reduction.surface_change import Change
+from catseye.reduction.surface_lookup import Lookup
+from catseye.reduction.surface_shape import Expansion, Gain, MeanSquare, Shape
+
+FORMAT = "catseye-surface-1"
+TAKEN = 0.5  # share of a term's square from which a note is due
+UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
+
+
+class Passage(NamedTuple):
+    """A title and what is to be said under it."""
+
+    title: str
+    text: str
+
+
+def root(square: float) -> float | None:
+    """m; null where a noise that was taken off leaves less than nothing."""
+    return float(np.sqrt(square)) if square >= 0.0 else None
+
+
+def shape_object(shape: Shape) -> dict[str, Any]:
+    """One epoch."""
+    fit = shape.fit
+    u = np.sqrt(np.diag(fit.deviation_covariance))
+    return {
+        "source": shape.prisms.source,
+        "elevation_deg": shape.prisms.elevation_deg,
+        "prisms": len(shape.prisms.names),
+        "free": list(fit.free),
+        "taper_db": shape.settings.taper_db,
+        "paraboloid": {
+            "frame": shape.prisms.nominal.to,
+            "vertex": fit.frame.translation,
+            "axis": fit.frame.rotation[:, 2],
+            "focus": fit.frame.translation + fit.focal_length * fit.frame.rotation[:, 2],
+            "translation": fit.translation,
+            "rotation": fit.rotation,
+            "covariance": fit.covariance,
+            "covariance_order": ["translation x", "y", "z", "rotation x", "y", "z"],
+            "focal_length": fit.focal_length,
+            "u_focal_length": fit.u_focal_length,
+            "unobserved": [UNOBSERVED],
+        },
+        "rms_normal": shape.rms_normal,
+        **_square(shape.square),
+        "gain": [_gain(g) for g in shape.gains],
+        "zernike": zernike_object(shape.expansion, shape.settings.numbering),
+        "deviations": {
+            name: {"deviation": d, "u_deviation": s, "half_path": h}
+            for name, d, s, h in zip(shape.prisms.names, fit.deviation, u, fit.half_path, strict=True)
+        },
+    }
+
+
+def change_object(change: Change) -> dict[str, Any]:
+    """Second epoch less first."""
+    u = np.sqrt(np.diag(change.deviation_covariance))
+    return {
+        "sources": [change.first.source, change.second.source],
+        "prisms": len(change.names),
+        "motion": change.motion,
+        "motion_covariance": change.motion_covariance,
+        "motion_order": ["translation x", "y", "z", "rotation x", "y", "z"],
+        "frame": "reflector",
+        "pivot": [0.0, 0.0, 0.0],
+        **_square(change.square),
+        "gain": [_gain(g) for g in change.gains],
+        "zernike": zernike_object(change.expansion, change.settings.numbering),
+        "deviations": {
+            name: {"deviation": d, "u_deviation": s, "half_path": h}
+            for name, d, s, h in zip(change.names, change.deviation, u, change.half_path, strict=True)
+        },
+    }
+
+
+def _square(square: MeanSquare) -> dict[str, Any]:
+    own = root(square.own)
+    return {
+        "half_path_rms_measured": root(square.measured),
+        "half_path_rms_noise": root(square.noise),
+        "half_path_rms": own,
+        "u_half_path_rms": square.u / (2.0 * own) if own else None,
+        "half_path_mean_square": square.own,
+        "u_half_path_mean_square": square.u,
+    }
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    loss = -10.0 * np.log10(gain.ruze) if gain.ruze > 0.0 else float("inf")
+    return {
+        "frequency": gain.frequency,
+        "gain": gain.ruze,
+        "u_gain": gain.u_ruze,
+        "loss_db": loss,
+        "gain_noise_included": gain.measured,
+        "gain_coherent_noise_included": gain.coherent,
+    }
+
+
+def zernike_object(expansion: Expansion, numbering: Numbering) -> dict[str, Any]:
+    """Terms and coefficients, m."""
+    u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
+    return {
+        "of": "half-path errors over the aperture, rms 1",
+        "numbering": numbering,
+        "terms": [
+            {
+                "number": number(term, numbering),
+                "n": term.n,
+                "m": term.m,
+                "name": term.name,
+                "value": expansion.value[k],
+                "u": u[k],
+                "share_taken": expansion.share[k],
+                "joint": expansion.joint[k],
+                "u_joint": u_joint[k],
+                "orthonormal": expansion.orthonormal[k],
+                "u_orthonormal": expansion.u_orthonormal[k],
+            }
+            for k, term in enumerate(expansion.terms)
+        ],
+        "covariance": expansion.covariance,
+    }
+
+
+def lookup_object(lookup: Lookup) -> dict[str, Any]:
+    """Terms by elevation."""
+    numbering = lookup.shapes[0].settings.numbering
+    return {
+        "columns": list(lookup.columns),
+        "left_out": lookup.left_out,
+        "elevation_deg": lookup.elevation_deg,
+        "rising": [way > 0.0 for way in lookup.rising],
+        "terms": [
+            {
+                "number": number(model.term, numbering),
+                "name": model.term.name,
+                **dict(zip(lookup.columns, model.value.tolist(), strict=True)),
+                **{
+                    f"u_{name}": model.raised * float(np.sqrt(v))
+                    for name, v in zip(lookup.columns, np.diag(model.covariance), strict=True)
+                },
+                "variance_factor": model.variance_factor,
+            }
+            for model in lookup.models
+        ],
+        "table": {
+            "elevation_deg": lookup.table_deg,
+            "rising": lookup.table[:, :, 0],
+            "mean": lookup.table[:, :, 1],
+            "falling": lookup.table[:, :, 2],
+            "u_mean": lookup.u_table[:, :, 1],
+        },
+    }
+
+
+def actuators_object(found: Actuators) -> dict[str, Any]:
+    """How many, how sure, how far."""
+    return {
+        "actuators": len(found.names),
+        "measured": int(found.measured.sum()),
+        "beyond_limits": [name for name, ok in zip(found.names, found.within, strict=True) if not ok],
+        "largest_correction": float(np.abs(found.correction).max()),
+        "u_correction_median": float(np.median(found.u_correction)),
+        "u_correction_largest": float(found.u_correction.max()),
+        "roughness": {
+            "smooth": found.roughness.smooth,
+            "length": found.roughness.length,
+            "own": found.roughness.own,
+        },
+    }
+
+
+def shape_passages(shape: Shape) -> list[Passage]:
+    """What a person should know of one epoch, in order."""
+    fit, square = shape.fit, shape.square
+    u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
+    made = [
+        Passage(
+            "The dish",
+            f"{len(shape.prisms.names)} prisms of {shape.prisms.source}, normal deviations {shape.rms_normal * 1e3:.3f}"
+            f" mm rms, u {u.min():.3f} to {u.max():.3f} mm each",
+        ),
+        Passage("Paraboloid", f"free: {', '.join(fit.free) or 'nothing'}. {_pose(shape)}"),
+        Passage("Half path", _rms(square, shape.settings.taper_db)),
+    ]
+    made += [_gain_passage(g) for g in shape.gains]
+    taken = [
+        t.name
+        for t, s in zip(shape.expansion.terms, shape.expansion.share, strict=True)
+        if t.n >= 2 and s > TAKEN and not (t == (2, 0) and "focal-length" in fit.free)
+    ]
+    if taken:
+        made.append(
+            Passage(
+                "Note",
+                f"the free paraboloid takes most of {', '.join(taken)} for a turn of the offset dish; hold the axis "
+                "(--free vertex,focal-length), ask for fewer terms and read `joint`, or compare two epochs",
+            )
+        )
+    return made
+
+
+def _pose(shape: Shape) -> str:
+    fit, u = shape.fit, np.sqrt(np.diag(shape.fit.covariance))
+    parts = []
+    if "vertex" in fit.free:
+        moved = ", ".join(
+            f"{v / MILLIMETRE:+.3f} ± {s / MILLIMETRE:.3f}" for v, s in zip(fit.translation, u[:3], strict=True)
+        )
+        parts.append(f"vertex off nominal by {moved} mm ({shape.prisms.nominal.to} axes)")
+    if "axis" in fit.free:
+        turned = ", ".join(
+            f"{v / ARCSECOND:+.2f} ± {s / ARCSECOND:.2f}" for v, s in zip(fit.rotation, u[3:], strict=True)
+        )
+        parts.append(f"turned by {turned}″")
+    if "focal-length" in fit.free:
+        parts.append(f"focal length {fit.focal_length:.5f} ± {fit.u_focal_length:.5f} m")
+    return "; ".join(parts)
+
+
+def _rms(square: MeanSquare, taper_db: float) -> str:
+    own = root(square.own)
+    lit = f"weighted for an edge taper of {taper_db:g} dB" if taper_db else "uniform weight over the aperture"
+    told = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
+    if own is None:
+        return told + "not above the measurement's own noise"
+    return told + (
+        f"{own * 1e3:.4f} ± {square.u / (2.0 * own) * 1e3:.4f} mm without the measurement's noise"
+        if own > 0.0
+        else "nothing beyond the measurement's noise"
+    )
+
+
+def _gain_passage(gain: Gain) -> Passage:
+    text = f"{gain.frequency / 1e9:g} GHz: {gain.ruze:.4f} ± {gain.u_ruze:.4f} of the perfect surface's (Ruze)"
+    return Passage("Gain", text + f"; {gain.coherent:.4f} by the aperture's integral with the noise in it")
+
+
+def change_passages(change: Change) -> list[Passage]:
+    """What a person should know of a difference, in order."""
+    u = np.sqrt(np.diag(change.motion_covariance))
+    shift = ", ".join(f"{v * 1e3:+.3f} ± {s * 1e3:.3f}" for v, s in zip(change.motion[:3], u[:3], strict=True))
+    turn = ", ".join(
+        f"{v / ARCSECOND:+.2f} ± {s / ARCSECOND:.2f}" for v, s in zip(change.motion[3:], u[3:], strict=True)
+    )
+    rms = float(np.sqrt(np.mean(change.deviation**2)))
+    return [
+        Passage(
+            "Change",
+            f"{change.second.source} less {change.first.source}, {len(change.names)} prisms: the surface by "
+            f"{rms * 1e3:.3f} mm rms along its normals, after the dish's own motion against its posture",
+        ),
+        Passage("Motion", f"{shift} mm; {turn}″, reflector axes, about the nominal vertex"),
+        Passage("Half path", _rms(change.square, change.settings.taper_db)),
+        *[_gain_passage(g) for g in change.gains],
+    ]
+
+
+def lookup_passages(lookup: Lookup) -> list[Passage]:
+    """What a person should know of an elevation series."""
+    low, high = lookup.elevation_deg.min(), lookup.elevation_deg.max()
+    rising = int((lookup.rising > 0).sum())
+    text = (
+        f"{len(lookup.shapes)} epochs from {low:g}° to {high:g}°, {rising} going up, {len(lookup.shapes) - rising} "
+        f"down; each term by {', '.join(lookup.columns)}"
+    )
+    made = [Passage("Elevation", text)]
+    made += [Passage("Left out", f"{name}: {why}") for name, why in lookup.left_out.items()]
+    return made
+
+
+def actuators_passage(found: Actuators) -> Passage:
+    """What a person should know of the actuators."""
+    beyond, rough = int((~found.within).sum()), found.roughness
+    u = found.u_correction * 1e3
+    return Passage(
+        "Actuators",
+        f"{len(found.names)}, {int(found.measured.sum())} with a measured prism of their own; corrections to "
+        f"{np.abs(found.correction).max() * 1e3:.3f} mm, u {np.median(u):.3f} mm (median) to {u.max():.3f} mm; "
+        f"{beyond or 'none'} beyond their limits. Beside the trend the surface has {rough.smooth * 1e3:.3f} mm over "
+        f"{rough.length:.0f} m and {rough.own * 1e3:.3f} mm of each point's own",
+    )
+
+
+def term_lines(shapes: Sequence[Shape], change: Change | None, lookup: Lookup | None) -> list[str]:
+    """A line a Zernike term: of the change, of the model with elevation, or of the only epoch; mm."""
+    shape = shapes[0]
+    numbering = shape.settings.numbering
+    if lookup is not None:
+        made = [f"{'term':>4}  {'':<26}" + "".join(f"{name:>22}" for name in lookup.columns) + "   mm"]
+        for model in lookup.models:
+            cells = "".join(
+                f"{v * 1e3:+13.4f} ± {model.raised * np.sqrt(s) * 1e3:.4f}"
+                for v, s in zip(model.value, np.diag(model.covariance), strict=True)
+            )
+            made.append(f"{number(model.term, numbering):>4}  {model.term.name:<26}{cells}")
+        return made
+    expansion = shape.expansion if change is None else change.expansion
+    u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
+    made = [f"{numbering:>4}  {'term':<26}{'left':>18}   taken{'itself':>20}   mm"]
+    for k, term in enumerate(expansion.terms):
+        line = f"{number(term, numbering):>4}  {term.name:<26}{expansion.value[k] * 1e3:+9.4f} ± {u[k] * 1e3:.4f}"
+        line += f"  {round(100.0 * float(expansion.share[k])):4d} %"
+        if np.isfinite(u_joint[k]):
+            line += f"{expansion.joint[k] * 1e3:+12.4f} ± {u_joint[k] * 1e3:.4f}"
+        made.append(line)
+    return made

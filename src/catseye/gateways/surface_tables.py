@@ -1,0 +1,145 @@
+"""Tables of a surface: prisms, Zernike terms, look-up table, actuators; CSV with the unit in each name, and FITS."""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.optics.zernike import Numbering, number
+from catseye.records.actuators import ActuatorCorrection
+from catseye.reduction.surface_change import Change
+from catseye.reduction.surface_lookup import Lookup
+from catseye.reduction.surface_shape import Expansion, Shape
+
+PRISMS = ("point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm", "half_path_mm", "weight")
+ZERNIKE = (
+    *("number", "n", "m", "name", "value_mm", "u_mm", "share_taken"),
+    *("joint_mm", "u_joint_mm", "orthonormal_mm", "u_orthonormal_mm"),
+)
+ACTUATOR_MARK = ",".join(ActuatorCorrection.model_fields)  # the header, by which a file is known as ours
+
+
+def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Numbers as Python writes them; empty where there is none."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if isinstance(cell, float) and cell != cell else cell for cell in row])
+    return text.getvalue()
+
+
+def prisms_csv(shape: Shape) -> str:
+    """A row a prism, in the fitted paraboloid's frame; the weight is its share of the illumination."""
+    u = np.sqrt(np.diag(shape.fit.deviation_covariance)) / MILLIMETRE
+    cells = zip(
+        shape.prisms.names,
+        shape.fit.local.tolist(),
+        (shape.fit.deviation / MILLIMETRE).tolist(),
+        u.tolist(),
+        (shape.fit.half_path / MILLIMETRE).tolist(),
+        shape.weights.tolist(),
+        strict=True,
+    )
+    return _csv(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
+
+
+def change_csv(change: Change) -> str:
+    """A row a prism of both epochs, second less first; places of the first epoch, nominal paraboloid's frame."""
+    u = np.sqrt(np.diag(change.deviation_covariance)) / MILLIMETRE
+    cells = zip(
+        change.names,
+        change.local.tolist(),
+        (change.deviation / MILLIMETRE).tolist(),
+        u.tolist(),
+        (change.half_path / MILLIMETRE).tolist(),
+        change.weights.tolist(),
+        strict=True,
+    )
+    return _csv(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
+
+
+def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
+    """A row a term."""
+    u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
+    columns = [
+        values / MILLIMETRE
+        for values in (expansion.value, u, expansion.joint, u_joint, expansion.orthonormal, expansion.u_orthonormal)
+    ]
+    rows = []
+    for k, term in enumerate(expansion.terms):
+        value, spread, joint, u_j, ortho, u_o = (float(column[k]) for column in columns)
+        share = float(expansion.share[k])
+        rows.append((number(term, numbering), term.n, term.m, term.name, value, spread, share, joint, u_j, ortho, u_o))
+    return _csv(ZERNIKE, rows)
+
+
+def lookup_csv(lookup: Lookup) -> str:
+    """A row an elevation and a term: rising, mean, falling, each with its u."""
+    header = [f"{u}{way}_mm" for way in ("rising", "mean", "falling") for u in ("", "u_")]
+    numbering = lookup.shapes[0].settings.numbering
+    rows = [
+        (
+            float(elevation),
+            number(model.term, numbering),
+            model.term.name,
+            *(float(v[e, k, way]) / MILLIMETRE for way in range(3) for v in (lookup.table, lookup.u_table)),
+        )
+        for e, elevation in enumerate(lookup.table_deg)
+        for k, model in enumerate(lookup.models)
+    ]
+    return _csv(("elevation_deg", "number", "name", *header), rows)
+
+
+def epochs_csv(lookup: Lookup) -> str:
+    """A row an epoch and a term: measured, its residual to the model."""
+    header = ("epoch", "source", "elevation_deg", "rising", "number", "name", "value_mm", "u_mm", "residual_mm", "w")
+    numbering = lookup.shapes[0].settings.numbering
+    rows = [
+        (
+            t + 1,
+            shape.prisms.source,
+            float(lookup.elevation_deg[t]),
+            "yes" if lookup.rising[t] > 0.0 else "no",
+            number(model.term, numbering),
+            model.term.name,
+            float(lookup.measured[t, k]) / MILLIMETRE,
+            float(lookup.u_measured[t, k]) / MILLIMETRE,
+            float(model.residual[t]) / MILLIMETRE,
+            float(model.standardised[t]),
+        )
+        for t, shape in enumerate(lookup.shapes)
+        for k, model in enumerate(lookup.models)
+    ]
+    return _csv(header, rows)
+
+
+def actuators_csv(rows: Iterable[ActuatorCorrection]) -> str:
+    """A row an actuator, which `read_corrections` reads back without the loss of a bit."""
+    return _csv(tuple(ActuatorCorrection.model_fields), (tuple(row.model_dump().values()) for row in rows))
+
+
+def actuators_fits(rows: Sequence[ActuatorCorrection]) -> bytes:
+    """The same as one FITS binary table ACTUATORS; the unit of each column is in TUNIT, not in its name."""
+    from astropy.io import fits
+
+    columns = []
+    for name, field in ActuatorCorrection.model_fields.items():
+        cells = [getattr(row, name) for row in rows]
+        unit = "mm" if name.endswith("_mm") else "m" if name.endswith("_m") else None
+        label = (name.removesuffix(f"_{unit}") if unit else name).upper()
+        if isinstance(cells[0], str):
+            text = np.array([cell.encode("ascii") for cell in cells])
+            columns.append(fits.Column(label, f"{text.dtype.itemsize}A", array=text))
+        elif field.annotation is int:
+            columns.append(fits.Column(label, "K", array=np.array(cells, dtype=np.int64)))
+        else:
+            columns.append(fits.Column(label, "D", unit=unit, array=np.array(cells, dtype=np.float64)))
+    page = fits.BinTableHDU.from_columns(columns, name="ACTUATORS")
+    page.header["ORIGIN"] = "catseye"
+    whole = io.BytesIO()
+    fits.HDUList([fits.PrimaryHDU(), page]).writeto(whole, checksum=True)
+    return whole.getvalue()

@@ -1,0 +1,419 @@
+"""A flexible model of a group of points from many epochs, and what it foretells.
+
+In the axes of the frame that carries the group, each point is where the rigid telescope would hold it, and moved by
+
+    the group's shift and turn about a pivot    for every function of posture and temperature that is not the points'
+    the point's own shift                       for "place": a constant; for "each": for every function
+
+The functions are 1, sinE, cosE, with two harmonics sin2E, cos2E, with temperatures t (degrees C off the reference),
+and for hysteresis `up`: 1 after the elevation rose, -1 after it fell. What no function foretells in an epoch (wind,
+what the sun did) is estimated too, by moments: a shift and turn of the group, new in each, and a shift of each point.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import DEGREE
+from catseye.errors import EstimationError, InputError, ValidityError
+from catseye.estimation.harmonic_body import rigid_design, rigid_part
+from catseye.estimation.harmonic_series import HarmonicFit, Spread, fit_harmonics
+from catseye.geometry.deformation import Posture, Terms
+
+Array = NDArray[np.float64]
+Own = Literal["place", "each"]
+ROUNDING = 1e-9  # of an eigenvalue of a covariance scaled to ones
+PASSES = 3  # of fit and scatter; the second changes a scatter by some percent, the third by less than one
+UP = "up"
+
+
+@dataclass(frozen=True)
+class SeriesModel:
+    """Which functions, and who has them.
+
+    harmonics     of elevation, 1 or 2
+    temperature   whether there is a coefficient of temperature
+    hysteresis    whether the way of the last elevation move counts
+    own           "place": each point has a place of its own; "each": and all functions of its own
+    scatter       whether what is new in each epoch is estimated; else the measurements' covariance is all there is
+    """
+
+    harmonics: int = 1
+    temperature: bool = True
+    hysteresis: bool = False
+    own: Own = "place"
+    scatter: bool = True
+
+    def __post_init__(self) -> None:
+        if self.harmonics not in (1, 2):
+            raise ValidityError(f"{self.harmonics} harmonics of elevation (expected 1 or 2)")
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Names, the constant first."""
+        waves = ("sinE", "cosE", "sin2E", "cos2E")[: 2 * self.harmonics]
+        return ("1", *waves, *(("t",) if self.temperature else ()), *((UP,) if self.hysteresis else ()))
+
+    @property
+    def own_count(self) -> int:
+        """How many of the functions, from the first, the points have themselves."""
+        return 1 if self.own == "place" else len(self.functions)
+
+    def rows(self, posture: Posture, way: ArrayLike, reference_c: float) -> Array:
+        """Values (..., k) of the functions.
+
+        posture       (...)
+        way           (...), 1 after the elevation rose, -1 after it fell
+        reference_c   degrees C at which t is 0
+        """
+        named = tuple(name for name in self.functions if name != UP)
+        found = Terms(named, reference_c).rows(posture)
+        if not self.hysteresis:
+            return found
+        ways = np.broadcast_to(np.asarray(way, dtype=float), found.shape[:-1])
+        return np.concatenate([found, ways[..., None]], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class GroupSeries:
+    """A group's points in T epochs, in the axes of the frame that carries them rigidly.
+
+    group, frame    names
+    names           n points
+    mjd             (T,) UTC; NaN where unknown
+    posture         (T,) elevation and azimuth, rad, and temperature, degrees C; NaN where unknown
+    way             (T,) 1 after the elevation rose, -1 after it fell, 0 where it did not move or is unknown
+    places          (T, n, 3) m; NaN where not measured
+    spread          covariance of the places, as `estimation.harmonic_series` takes it
+    pivot           (3,) m, of the group's turns
+    labels          T names of the epochs, for messages
+    """
+
+    group: str
+    frame: str
+    names: tuple[str, ...]
+    mjd: Array
+    posture: Posture
+    way: Array
+    places: Array
+    spread: Spread
+    pivot: Array
+    labels: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def part(self, epochs: NDArray[np.intp]) -> "GroupSeries":
+        """Some of the epochs, and the points that were measured in any of them."""
+        with_points = np.isfinite(self.places[epochs]).all(axis=2).any(axis=0)
+        at = np.flatnonzero(with_points)
+
+        def cut(q: Array | None, axes: int) -> Array | None:
+            if q is None:
+                return None
+            kept = q[epochs] if len(q) > 1 else q
+            if axes == 2:
+                rows = (3 * at[:, None] + np.arange(3)).ravel()
+                return kept[:, rows[:, None], rows]
+            return kept[:, at] if kept.shape[1] > 1 else kept
+
+        spread = Spread(cut(self.spread.full, 2), cut(self.spread.points, 1), cut(self.spread.shared, 1))
+        told = (np.asarray(v, dtype=float)[epochs] for v in vars(self.posture).values())
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in at),
+            mjd=self.mjd[epochs],
+            posture=Posture(*told),
+            way=self.way[epochs],
+            places=self.places[np.ix_(epochs, at)],
+            spread=spread,
+            labels=tuple(self.labels[i] for i in epochs) if self.labels else (),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What no function foretells, new in each epoch.
+
+    covariance   (6, 6) m and rad, of the group's shift and turn
+    u_point      m, of each coordinate of each point besides
+    """
+
+    covariance: Array
+    u_point: float
+
+    @property
+    def u_six(self) -> Array:
+        """(6,) m and rad."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def root(self) -> Array:
+        """(6, r) factor of the covariance, r its rank."""
+        size = np.where(self.u_six > 0.0, self.u_six, 1.0)
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        real = values > ROUNDING
+        return size[:, None] * vectors[:, real] * np.sqrt(values[real])
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Where the group's points will be.
+
+    names          n
+    place          (P, n, 3) m, in the frame's axes as the rigid telescope carries them
+    covariance     (P, n, 3, 3) m^2 of each point, what is new in an epoch with it
+    six            (P, 6) m and rad, the group's shift and turn from the mean of the fitted epochs
+    six_covariance (P, 6, 6), with what is new in an epoch; NaN where the points show no rigid motion
+    outside        what lies outside the epochs of the fit: it is extrapolated
+    """
+
+    names: tuple[str, ...]
+    place: Array
+    covariance: Array
+    six: Array
+    six_covariance: Array
+    outside: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class StructureFit:
+    """A group's flexible model.
+
+    series, model   what was fitted
+    rest            (n, 3) m, the middle of each point's places, from which displacements count
+    reference_c     degrees C at which t is 0: the mean of the epochs
+    fit             the coefficients: functions of the body are those after the points' own
+    scatter         what is left in each epoch anew
+    """
+
+    series: GroupSeries
+    model: SeriesModel
+    rest: Array
+    reference_c: float
+    fit: HarmonicFit
+    scatter: Scatter
+
+    @property
+    def arms(self) -> Array:
+        """(n, 3) m."""
+        return self.rest - self.series.pivot
+
+    def six_of(self) -> tuple[Array, Array]:
+        """Shift and turn (6, k) a unit of each function, m and rad, and the covariance (6 k, 6 k), by functions."""
+        m, k = self.model.own_count, len(self.model.functions)
+        order = np.concatenate([np.arange(k - m, k), np.arange(k - m)])  # the fit has the body's own first
+        at = (6 * order[:, None] + np.arange(6)).ravel()
+        six = np.concatenate([self.fit.six, self.fit.rigid], axis=1)
+        return six, self.fit.six_covariance[np.ix_(at, at)]
+
+    def predict(
+        self, elevation: ArrayLike, *, temperature_c: ArrayLike | None = None, way: ArrayLike = 0.0
+    ) -> Prediction:
+        """Where the points will be, and how sure that is.
+
+        elevation       (P,) rad
+        temperature_c   (P,) degrees C; the reference where it is None
+        way             (P,) 1 after the elevation rose, -1 after it fell; 0 is between both
+
+        Raises InputError for values that are not finite. Outside the epochs it is extrapolated, and says so.
+        """
+        posture = self._asked(elevation, temperature_c)
+        rows = self.model.rows(posture, way, self.reference_c)
+        if not np.isfinite(rows).all():
+            raise InputError("a prediction's elevation, temperature or way is not a finite number (expected numbers)")
+        m = self.model.own_count
+        own, body = rows[:, :m], rows[:, m:]
+        place = self.rest + self.fit.displacement(body, own, self.arms)
+        covariance = self.fit.covariance(body, own, self.arms) + self._fresh()
+        six, q = self.six_of()
+        change = rows - self.model.rows(
+            fitted_posture(self.series, self.model), self.series.way, self.reference_c
+        ).mean(axis=0)
+        k = rows.shape[1]
+        shared = np.einsum("pa,aibj,pb->pij", change, q.reshape(k, 6, k, 6), change, optimize=True)
+        spread = shared + self.scatter.covariance
+        return Prediction(self.series.names, place, covariance, change @ six.T, spread, self.outside(posture, way))
+
+    def outside(self, posture: Posture, way: ArrayLike = 0.0) -> tuple[str, ...]:
+        """What of a posture lies outside the epochs of the fit, in words."""
+        found = []
+        asked: list[tuple[str, ArrayLike, ArrayLike, float, str]] = [
+            ("elevation", posture.elevation, self.series.posture.elevation, DEGREE, "deg")
+        ]
+        if self.model.temperature:
+            asked.append(("temperature", posture.temperature_c, self.series.posture.temperature_c, 1.0, "C"))
+        for name, values, seen, unit, text in asked:
+            low, high = float(np.min(seen)) / unit, float(np.max(seen)) / unit
+            x = np.atleast_1d(np.asarray(values, dtype=float)) / unit
+            for value in x[(x < low - 1e-9) | (x > high + 1e-9)]:
+                found.append(f"{name} {value:.6g} {text} is outside {low:.6g} to {high:.6g} {text}: extrapolated")
+        if self.model.hysteresis and np.any(np.abs(np.asarray(way, dtype=float)) > 1.0):
+            found.append("way is outside -1 to 1: extrapolated")
+        return tuple(found)
+
+    def _asked(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> Posture:
+        e = np.atleast_1d(np.asarray(elevation, dtype=float))
+        warm = np.broadcast_to(self.reference_c if temperature_c is None else np.asarray(temperature_c, float), e.shape)
+        return Posture(np.zeros_like(e), e, warm)
+
+    def _fresh(self) -> Array:
+        """Covariance (n, 3, 3) m^2 of what is new in an epoch."""
+        r = rigid_design(self.arms)
+        return np.einsum("nij,jk,nlk->nil", r, self.scatter.covariance, r) + self.scatter.u_point**2 * np.eye(3)
+
+
+def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> StructureFit:
+    """A group's flexible model.
+
+    series   its epochs
+    model    which functions; the usual where it is None
+
+    Raises InputError where a function's posture or temperature is unknown, EstimationError for what floats.
+
+    Source: [RAO73] section 4a (least squares with a full covariance); what is new in each epoch by moments:
+    covariance of its rigid parts less what the measurements' explains, in the directions where it is more.
+    """
+    what = model or SeriesModel()
+    refuse_unknown(series, what)
+    rest = np.nanmean(series.places, axis=0)
+    reference_c = float(np.mean(np.asarray(series.posture.temperature_c, dtype=float))) if what.temperature else 0.0
+    rows = what.rows(fitted_posture(series, what), series.way, reference_c)
+    m = what.own_count
+    scatter = Scatter(np.zeros((6, 6)), 0.0)
+
+    def fitted() -> StructureFit:
+        spread = widened(series.spread, rest - series.pivot, scatter)
+        try:
+            found = fit_harmonics(
+                series.places - rest, rest - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
+            )
+        except EstimationError as problem:
+            raise EstimationError(_named(str(problem), series, what)) from problem
+        return StructureFit(series, what, rest, reference_c, found, scatter)
+
+    answer = fitted()
+    if what.scatter:
+        for _ in range(PASSES):
+            before, scatter = scatter, scatter_of(answer)
+            answer = fitted()
+            if np.allclose(before.u_six, scatter.u_six, rtol=0.02) and before.u_point == scatter.u_point:
+                break
+    return answer
+
+
+def fitted_posture(series: GroupSeries, model: SeriesModel) -> Posture:
+    """Postures of the epochs as the functions need them: at the reference temperature 0 where none counts."""
+    e = np.asarray(series.posture.elevation, dtype=float)
+    warm = np.asarray(series.posture.temperature_c, dtype=float) if model.temperature else np.zeros_like(e)
+    return Posture(np.zeros_like(e), e, warm)
+
+
+def widened(spread: Spread, arms: Array, scatter: Scatter) -> Spread:
+    """A spread with what is new in each epoch.
+
+    spread    of the measurements
+    arms      (n, 3) m, from the pivot
+    scatter   to be added
+    """
+    factor = rigid_design(arms) @ scatter.root
+    own = scatter.u_point**2
+    if spread.full is not None:
+        flat = factor.reshape(3 * len(arms), -1)
+        return Spread(full=spread.full + (flat @ flat.T + own * np.eye(3 * len(arms))))
+    points = spread.points + own * np.eye(3) if spread.points is not None else None
+    if not factor.shape[2]:
+        return Spread(points=points, shared=spread.shared)
+    shared = factor[None]
+    if spread.shared is not None:
+        shape = (len(spread.shared), *factor.shape)
+        shared = np.concatenate([spread.shared, np.broadcast_to(factor, shape)], axis=3)
+    return Spread(points=points, shared=shared)
+
+
+def scatter_of(answer: StructureFit) -> Scatter:
+    """What is new in each epoch, by moments of the residuals' rigid parts and of what is left of them.
+
+    answer   a fit; its own scatter does not matter but for the weights
+    """
+    series, arms, e = answer.series, answer.arms, answer.fit.residual
+    known = variances_of(series)
+    count, m = len(series), answer.model.own_count
+    degrees, own_degrees = (count / max(count - k, 1) for k in (len(answer.model.functions), m))
+    squares, noise, left, expected = [], [], 0.0, 0.0
+    for t in range(len(series)):
+        at = np.flatnonzero(np.isfinite(e[t]).all(axis=1))
+        part = rigid_part(arms[at]) if len(at) >= 3 else None
+        if part is None:
+            continue
+        flat = part.reshape(6, -1)
+        q = known(t, at)
+        keep = np.eye(3 * len(at)) if q.ndim == 2 else None
+        six = flat @ e[t, at].ravel()
+        squares.append(np.outer(six, six))
+        rest = e[t, at].ravel() - rigid_design(arms[at]).reshape(-1, 6) @ six
+        left += float(rest @ rest)
+        if keep is not None:
+            noise.append(flat @ q @ flat.T)
+            keep -= rigid_design(arms[at]).reshape(-1, 6) @ flat
+            expected += float(np.sum((keep @ q) * keep))
+        else:
+            noise.append(np.einsum("jni,nil,knl->jk", part, q, part))
+            expected += float(np.einsum("nii->", q)) * (1.0 - 2.0 / len(at))
+    if not squares:
+        return Scatter(np.zeros((6, 6)), 0.0)
+    more = _excess(degrees * np.mean(squares, axis=0), np.mean(noise, axis=0))
+    free = 3 * int(np.isfinite(e).all(axis=2).sum()) - 6 * len(squares)
+    each = (own_degrees * left - expected) / free if free > 0 else 0.0
+    return Scatter(more, float(np.sqrt(max(each, 0.0))))
+
+
+def _excess(found: Array, noise: Array) -> Array:
+    """What a covariance (6, 6) has more than that of noise, in the directions in which it has more."""
+    size = np.sqrt(np.diag(noise))
+    root = size[:, None] * np.linalg.cholesky(noise / np.outer(size, size))
+    inverse = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(inverse @ found @ inverse.T)
+    half = root @ vectors * np.sqrt(np.maximum(values - 1.0, 0.0))
+    return half @ half.T
+
+
+def variances_of(series: GroupSeries):
+    """What gives the covariance of some points of an epoch: (3q, 3q), or (q, 3, 3) where points stand alone."""
+    spread = series.spread
+
+    def of(t: int, at: NDArray[np.intp]) -> Array:
+        if spread.full is not None:
+            rows = (3 * at[:, None] + np.arange(3)).ravel()
+            return spread.full[t if len(spread.full) > 1 else 0][rows[:, None], rows]
+        assert spread.points is not None  # a spread has one of both
+        q = spread.points[t if len(spread.points) > 1 else 0]
+        return q[at] if len(q) > 1 else np.broadcast_to(q, (len(at), 3, 3))
+
+    return of
+
+
+def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
+    """Raises InputError where a function needs what an epoch does not say."""
+    wanted = [("elevation", np.asarray(series.posture.elevation, dtype=float), "a posture")]
+    if model.temperature:
+        hint = "a temperature of the structure, or a model without (--no-temperature)"
+        wanted.append(("temperature", np.asarray(series.posture.temperature_c, dtype=float), hint))
+    for name, values, hint in wanted:
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            label = series.labels[bad[0]] if series.labels else f"{bad[0]} (counted from 0)"
+            raise InputError(f"epoch {label}: its {name} is unknown (expected {hint})")
+
+
+def _named(text: str, series: GroupSeries, model: SeriesModel) -> str:
+    """A refusal with the names of points and functions in the place of their numbers."""
+    import re
+
+    m, functions = model.own_count, model.functions
+    text = re.sub(r"the body's function (\d+)", lambda f: f"{series.group} by {functions[m + int(f[1]) - 1]!r}", text)
+    text = re.sub(r"by its function (\d+)", lambda f: f"by {functions[int(f[1]) - 1]!r}", text)
+    text = re.sub(r"point (\d+)( \(counted from 0\))?", lambda f: series.names[int(f[1])], text)
+    return f"group {series.group!r}: {text} (functions {', '.join(functions)}; {len(series)} epochs)"

@@ -1,0 +1,321 @@
+"""A dish's shape from its prisms: the paraboloid that fits best, half-path errors, Zernike terms, rms, gain."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
+from catseye.errors import EstimationError, ValidityError
+from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.geometry.frame import Transform
+from catseye.optics.aperture import cells, coherent_gain, ruze_gain
+from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
+from catseye.records.site import Paraboloid
+
+HELD = 1e-8  # smallest singular value of Zernike terms beside the paraboloid: below it nothing tells them apart
+
+
+@dataclass(frozen=True, eq=False)
+class Aperture:
+    """What is lit of a paraboloid: a circle in the projection along its axis.
+
+    centre         (2,) m, from the axis
+    radius         m
+    focal_length   m, as designed
+    """
+
+    centre: np.ndarray
+    radius: float
+    focal_length: float
+
+    @classmethod
+    def of(cls, record: Paraboloid) -> "Aperture":
+        """The aperture that a site's record says."""
+        return cls(
+            np.array(record.aperture_centre_mm) * MILLIMETRE,
+            record.aperture_radius_mm * MILLIMETRE,
+            record.focal_length_mm * MILLIMETRE,
+        )
+
+    def unit(self, local: np.ndarray) -> np.ndarray:
+        """Points (k, 2 or 3) m of the paraboloid's frame in the aperture's own units, (k, 2)."""
+        return (local[:, :2] - self.centre) / self.radius
+
+
+@dataclass(frozen=True)
+class ShapeSettings:
+    """What is asked of a shape.
+
+    free           of "vertex", "axis", "focal-length": what of the paraboloid is fitted
+    taper_db       how much less power the feed sends to the edge than to the middle; 0: uniform
+    frequencies    Hz, at which the gain is wanted
+    terms          how many Zernike terms
+    numbering      "noll" or "ansi"
+    """
+
+    free: tuple[str, ...] = ("vertex", "axis", "focal-length")
+    taper_db: float = 0.0
+    frequencies: tuple[float, ...] = ()
+    terms: int = 15
+    numbering: Numbering = "noll"
+
+
+@dataclass(frozen=True, eq=False)
+class Prisms:
+    """Prisms of a dish, as one epoch knows them.
+
+    names         of k prisms
+    points        (k, 3) m, in the frame `nominal.to`
+    covariance    (3k, 3k), or (k, 3, 3) where they are independent, m^2
+    nominal       that frame from the nominal paraboloid's
+    source        where they come from
+    elevation_deg, azimuth_deg, temperature_c   of the epoch, where known
+    """
+
+    names: tuple[str, ...]
+    points: np.ndarray
+    covariance: np.ndarray
+    nominal: Transform
+    source: str
+    elevation_deg: float | None = None
+    azimuth_deg: float | None = None
+    temperature_c: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Zernike terms of half-path errors over the aperture.
+
+    terms              t of them
+    value, covariance  (t,) m, (t, t) m^2: least squares under the weights, of the errors as the fit leaves them
+    share              (t,) of each term's square that the free parts of the paraboloid take for themselves
+    joint              (t,) m, the term itself, paraboloid and terms estimated together; nan where the paraboloid stands
+                       for it (piston and tilts of a free vertex, defocus of a free focal length), or nothing tells them
+                       apart
+    joint_covariance   (t, t) m^2
+    orthonormal        (t,) m, in terms made orthonormal on these prisms under the weights, each from itself and those
+                       before it: their squares sum up to the square of the rms that the terms explain
+    u_orthonormal      (t,) m
+    rest               (k,) m, half-path errors less the terms
+    """
+
+    terms: tuple[Term, ...]
+    value: np.ndarray
+    covariance: np.ndarray
+    share: np.ndarray
+    joint: np.ndarray
+    joint_covariance: np.ndarray
+    orthonormal: np.ndarray
+    u_orthonormal: np.ndarray
+    rest: np.ndarray
+
+
+@dataclass(frozen=True)
+class MeanSquare:
+    """Of half-path errors under the illumination, about their mean: a constant phase costs no gain.
+
+    measured   m^2, of the measured errors
+    noise      m^2, what the measurement alone is expected to put into it
+    u          m^2, standard uncertainty of `own`
+    """
+
+    measured: float
+    noise: float
+    u: float
+
+    @property
+    def own(self) -> float:
+        """m^2, the surface's own: unbiased, and below zero where the noise hides it."""
+        return self.measured - self.noise
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gain over the perfect surface's at one frequency.
+
+    ruze, u_ruze   by Ruze, from the surface's own mean square
+    measured       by Ruze, the measurement's noise included
+    coherent       the aperture's own integral over the measured errors, noise included
+    """
+
+    frequency: float
+    ruze: float
+    u_ruze: float
+    measured: float
+    coherent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One epoch's surface.
+
+    weights      (k,) share of the illumination that each prism stands for
+    places       (k, 2) in the aperture, units of its radius
+    """
+
+    prisms: Prisms
+    aperture: Aperture
+    settings: ShapeSettings
+    fit: ParaboloidFit
+    weights: np.ndarray
+    places: np.ndarray
+    expansion: Expansion
+    square: MeanSquare
+    gains: tuple[Gain, ...] = field(default=())
+
+    @property
+    def rms_normal(self) -> float:
+        """m, of the normal deviations, every prism alike."""
+        return float(np.sqrt(np.mean(self.fit.deviation**2)))
+
+
+def shape_of(prisms: Prisms, aperture: Aperture, settings: ShapeSettings | None = None) -> Shape:
+    """The surface of one epoch: half-path errors, squared under the illumination, are least.
+
+    prisms     their places and covariance
+    aperture   of the design
+    settings   what is free, lit, wanted
+
+    Each prism weighs what of the illumination is nearest to it. Raises EstimationError for too few prisms and for
+    prisms that do not hold the paraboloid or the terms; ValidityError for settings out of range.
+    """
+    settings = settings or ShapeSettings()
+    first = aperture.unit(prisms.nominal.inverse().points(prisms.points))
+    weights = cells(first, edge_db=settings.taper_db)
+    fit = fit_paraboloid(
+        prisms.points,
+        prisms.covariance,
+        prisms.nominal,
+        aperture.focal_length,
+        free=settings.free,
+        weights=weights,
+        measure="half-path",
+    )
+    places, cos = aperture.unit(fit.local), fit.cos_incidence
+    expansion = expansion_of(
+        places,
+        fit.half_path,
+        weights=weights,
+        covariance=fit.half_path_covariance,
+        along=fit.along * cos[:, None] * cos,
+        design=fit.design * cos[:, None],
+        settings=settings,
+    )
+    square = mean_square(fit.half_path, fit.half_path_covariance, weights)
+    gains = gains_of(fit.half_path, weights, square, settings.frequencies)
+    return Shape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
+
+
+def expansion_of(
+    places: np.ndarray,
+    error: np.ndarray,
+    *,
+    weights: np.ndarray,
+    covariance: np.ndarray,
+    along: np.ndarray,
+    design: np.ndarray,
+    settings: ShapeSettings,
+) -> Expansion:
+    """Zernike terms of half-path errors.
+
+    places       (k, 2) in units of the aperture's radius
+    error        (k,) m
+    weights      (k,)
+    covariance   (k, k) m^2 of the errors
+    along        (k, k) m^2 of them before the paraboloid was fitted
+    design       (k, p) of the paraboloid's free parameters, half-path
+    settings     which terms
+
+    Raises EstimationError where the prisms are too few or do not hold the terms.
+    """
+    wanted = terms(settings.terms, settings.numbering)
+    values = zernike(wanted, places[:, 0], places[:, 1])
+    try:
+        basis, matrix = orthonormal(values, weights)
+    except ValidityError as problem:
+        raise EstimationError(f"{len(wanted)} Zernike terms: {problem}") from problem
+    shares = weights / weights.sum()
+    ortho_gain = (basis * shares[:, None]).T
+    gain = matrix @ ortho_gain
+    value = gain @ error
+    share, joint, joint_covariance = _beside(values, error, along, shares, design, wanted, settings.free)
+    return Expansion(
+        wanted,
+        value,
+        _rounded(gain @ covariance @ gain.T),
+        share,
+        joint,
+        joint_covariance,
+        ortho_gain @ error,
+        np.sqrt(np.maximum(np.diag(ortho_gain @ covariance @ ortho_gain.T), 0.0)),  # rounding may be below it
+        error - values @ value,
+    )
+
+
+def _rounded(covariance: np.ndarray) -> np.ndarray:
+    """A covariance whose variances are 0 where rounding left them below: of terms that the paraboloid stands for."""
+    made = covariance.copy()
+    made[np.diag_indices_from(made)] = np.maximum(np.diag(made), 0.0)
+    return made
+
+
+def _beside(
+    values: np.ndarray,
+    error: np.ndarray,
+    along: np.ndarray,
+    shares: np.ndarray,
+    design: np.ndarray,
+    wanted: tuple[Term, ...],
+    free: tuple[str, ...],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What the paraboloid takes of each term, and the terms beside it: share, joint, its covariance."""
+    root = np.sqrt(shares)[:, None]
+    rows = root * values
+    taken = np.linalg.qr(root * design / np.linalg.norm(root * design, axis=0))[0]
+    rest = rows - taken @ (taken.T @ rows)
+    share = 1.0 - np.sum(rest**2, axis=0) / np.sum(rows**2, axis=0)
+    stood_for = {t for t in wanted if t.n <= 1 and "vertex" in free}
+    stood_for |= {t for t in wanted if t == (2, 0) and "focal-length" in free}
+    asked = [k for k, t in enumerate(wanted) if t not in stood_for]
+    joint, covariance = np.full(len(wanted), np.nan), np.full((len(wanted),) * 2, np.nan)
+    if asked:
+        left, sizes, right = np.linalg.svd(rest[:, asked], full_matrices=False)
+        if sizes[-1] > HELD:
+            gain = (right.T / sizes) @ left.T
+            gain = (gain - (gain @ taken) @ taken.T) * root.T
+            joint[asked] = gain @ error
+            covariance[np.ix_(asked, asked)] = gain @ along @ gain.T
+    return share, joint, covariance
+
+
+def mean_square(error: np.ndarray, covariance: np.ndarray, weights: np.ndarray) -> MeanSquare:
+    """Weighted mean square of errors about their weighted mean, what of it is noise, and its uncertainty.
+
+    error        (k,) m
+    covariance   (k, k) m^2
+    weights      (k,)
+
+    With Q = diag(w) - w w^T the mean square is e^T Q e. Of e = true + noise its expectation is true^T Q true + tr(QC)
+    and its variance 4 true^T QCQ true + 2 tr(QCQC); true^T QCQ true is e^T QCQ e - tr(QCQC), above zero or left out.
+    """
+    w = weights / weights.sum()
+    centred = error - w @ error
+    spread = w[:, None] * covariance - w[:, None] * (w @ covariance)  # Q C
+    pulled = w * centred
+    twice = float(np.sum(spread * spread.T))
+    signal = max(float(pulled @ covariance @ pulled) - twice, 0.0)
+    return MeanSquare(float(w @ centred**2), float(np.trace(spread)), float(np.sqrt(4.0 * signal + 2.0 * twice)))
+
+
+def gains_of(
+    error: np.ndarray, weights: np.ndarray, square: MeanSquare, frequencies: tuple[float, ...]
+) -> tuple[Gain, ...]:
+    """The gain at each frequency (Hz), by Ruze and by the aperture's own integral."""
+    made = []
+    for frequency in frequencies:
+        wavelength = SPEED_OF_LIGHT / frequency
+        ruze = float(ruze_gain(square.own, wavelength))
+        slope = ruze * (4.0 * np.pi / wavelength) ** 2
+        measured = float(ruze_gain(square.measured, wavelength))
+        made.append(Gain(frequency, ruze, slope * square.u, measured, coherent_gain(error, weights, wavelength)))
+    return tuple(made)

@@ -1,0 +1,287 @@
+"""Vibration from ranges at full rate: spectra, modes and shapes of points; differences in which the common cancels.
+
+A range changes by e . dx when its target moves by dx, e the unit vector from the ranger to the target: approximate
+coordinates are enough (0.1 m off at 100 m is 0.1 % of the movement), and what is left out is dx^2 / 2 range, 5 nm for
+1 mm at 100 m. A movement within the mean of a buffer is dampened; within an interval of samples it is aliased.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import CatseyeError, InputError
+from catseye.signal.spectrum import Peak, Shape, Spectrum, aliases, likely_alias, peaks, shape_at, spectrum
+from catseye.signal.vibration import Mode
+from catseye.signal.vibration_modes import find_modes
+
+Array = NDArray[np.float64]
+LEAST = 64  # samples of a series: 8 s at full rate
+STRETCHES = 8  # that the shortest series is cut into, half overlapping, where none is given
+HIGHEST_HZ = 12.0  # of a structure's modes that are thought of when an alias is named
+CLEAR = 0.02  # of the share that real shapes hold: nearer alternatives stay open
+MOST_SAMPLES = 4000  # of the series from which the modes' damping is found: some seconds of work
+MOST_MODES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class RangeSeries:
+    """Ranges of one ranger to one target, or a difference of such.
+
+    ranger, target   names
+    seconds          (n,) s, middles of the buffers, rising; one clock for all series
+    ranges           (n,) m
+    u                (n,) m, standard uncertainty of what is new in each
+    window           s, of a buffer
+    """
+
+    ranger: str
+    target: str
+    seconds: Array
+    ranges: Array
+    u: Array
+    window: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Ranger and target."""
+        return f"{self.ranger}:{self.target}"
+
+    @property
+    def rate_hz(self) -> float:
+        """Ranges a second, mean."""
+        return float((len(self.seconds) - 1) / (self.seconds[-1] - self.seconds[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class FoundPeak:
+    """A peak, and what it may be.
+
+    peak         of the summed density
+    may_be_hz    all frequencies that would look alike, lowest first
+    likely_hz    of them, by the rhythms of several series; that of the peak where nothing decides
+    share        (candidates,) of the density that one real shape holds at each
+    decided      whether the best is clear of the next
+    shape        of the series about the peak; None of a single one
+    """
+
+    peak: Peak
+    may_be_hz: tuple[float, ...]
+    likely_hz: float
+    share: Array
+    decided: bool
+    shape: Shape | None
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """What some series say.
+
+    series     as given
+    spectrum   of all, each by its own times; before the mean of the buffers is not undone
+    peaks      the highest first
+    modes      by maximum likelihood, frequency with u; none where they did not settle, see the notes
+    floor      (A,) m^2/Hz, of the lowest fifth of each density
+    notes      for people
+    """
+
+    series: tuple[RangeSeries, ...]
+    spectrum: Spectrum
+    peaks: tuple[FoundPeak, ...]
+    modes: tuple[Mode, ...]
+    floor: Array
+    notes: tuple[str, ...]
+
+
+def vibration(
+    series: Sequence[RangeSeries],
+    *,
+    stretch: float | None = None,
+    most_modes: int = MOST_MODES,
+    highest_hz: float = HIGHEST_HZ,
+) -> Vibration:
+    """Spectra, peaks, modes and shapes of ranges.
+
+    series       one up, that overlap in time
+    stretch      s, transformed at once: resolution is 1.5 / stretch; a quarter of the common time where it is None
+    most_modes   whose frequency and damping are found by maximum likelihood, among the highest peaks
+    highest_hz   of the frequencies that a peak may be an alias of
+
+    Raises InputError for series that are too short or do not overlap.
+    """
+    kept = tuple(series)
+    for one in kept:
+        if len(one.seconds) < LEAST:
+            raise InputError(f"{one.name}: {len(one.seconds)} ranges (expected {LEAST} at least)")
+    if not kept:
+        raise InputError("there is no series of ranges (expected one up)")
+    first, last = max(s.seconds[0] for s in kept), min(s.seconds[-1] for s in kept)
+    if not last - first > 8.0:
+        raise InputError(f"the series overlap by {max(last - first, 0.0):.3g} s (expected more than 8)")
+    cut = [(s.seconds >= first) & (s.seconds <= last) for s in kept]
+    times = [s.seconds[at] for s, at in zip(kept, cut, strict=True)]
+    values = [s.ranges[at] for s, at in zip(kept, cut, strict=True)]
+    length = (last - first) * 2.0 / (STRETCHES + 1) if stretch is None else stretch
+    found = spectrum(times, values, stretch=length)
+    rate = float(found.rate_hz.min())
+    notes = [
+        f"Above {0.5 * rate:.3g} Hz, half the rate of {rate:.3g} Hz, nothing is seen where it is: a wave there appears "
+        "below, at the distance to the nearest multiple of the rate."
+    ]
+    told = [_told(found, peak, times, values, length, highest_hz) for peak in peaks(found)]
+    open_ones = [p for p in told if not p.decided]
+    if open_ones:
+        some = ", ".join(f"{p.peak.frequency_hz:.3g}" for p in open_ones[:5])
+        notes.append(
+            f"Whether the peaks at {some} Hz are aliases is open: rangers of other rhythms on the same target decide."
+        )
+    floor = np.quantile(found.density, 0.2, axis=0)
+    modes: tuple[Mode, ...] = ()
+    if told and most_modes:
+        try:
+            modes = _modes(kept, found, told[:most_modes], floor, notes)
+        except CatseyeError as problem:
+            notes.append(f"Modes were not found: {problem}.")
+    return Vibration(kept, found, tuple(told), modes, floor, tuple(notes))
+
+
+def _told(
+    found: Spectrum, peak: Peak, times: Sequence[Array], values: Sequence[Array], length: float, highest_hz: float
+) -> FoundPeak:
+    """A peak with all that it may be, by the rate of the series that shows it most."""
+    top = found.density[int(np.argmin(np.abs(found.frequency_hz - peak.frequency_hz)))]
+    loudest = int(np.argmax(top))
+    may_be = aliases(peak.frequency_hz, float(found.rate_hz[loudest]), max(highest_hz, peak.frequency_hz))
+    likely, share = likely_alias(times, values, may_be, stretch=length)
+    decided = len(may_be) == 1 or (len(times) > 1 and float(np.diff(np.sort(share)[-2:])[0]) > CLEAR)
+    shape = shape_at(found, peak.frequency_hz) if len(times) > 1 else None
+    return FoundPeak(peak, may_be, likely if decided else peak.frequency_hz, share, decided, shape)
+
+
+def _modes(
+    series: Sequence[RangeSeries], found: Spectrum, told: Sequence[FoundPeak], floor: Array, notes: list[str]
+) -> tuple[Mode, ...]:
+    """Modes by maximum likelihood from the peaks on, of the series that shows the faintest of them best."""
+    rows = [int(np.argmin(np.abs(found.frequency_hz - p.peak.frequency_hz))) for p in told]
+    best = int(np.argmax(np.min(found.density[rows] / floor, axis=0)))
+    one = series[best]
+    near = sorted({round(p.likely_hz, 6) for p in told})
+    count = min(len(one.seconds), MOST_SAMPLES)
+    if count < len(one.seconds):
+        notes.append(f"Modes are from the first {count} of {len(one.seconds)} ranges of {one.name}.")
+    else:
+        notes.append(f"Modes are from {one.name}, which shows the faintest of them best.")
+    when = one.seconds[:count]
+    samples = one.ranges[:count] - slow(when, one.ranges[:count], 4.0 / min(p.peak.frequency_hz for p in told))
+    u = max(float(np.median(one.u)), float(np.sqrt(floor[best] * 0.5 * one.rate_hz)))
+    return find_modes(when, samples[:, None], count=len(near), u_sample=u, window=one.window, near_hz=near)
+
+
+def slow(seconds: Array, values: Array, interval: float) -> Array:
+    """What changes slowly, (n,): a cubic spline by least squares.
+
+    seconds    (n,) s, rising
+    values     (n,)
+    interval   s between its knots: waves of a quarter of it and shorter stay out
+    """
+    from scipy.interpolate import make_lsq_spline
+
+    first, last = float(seconds[0]), float(seconds[-1])
+    parts = max(1, int((last - first) / interval))
+    inner = np.linspace(first, last, parts + 1)[1:-1]
+    held = np.searchsorted(seconds, inner)
+    inner = inner[np.concatenate([[True], np.diff(held) >= 4])] if len(inner) else inner  # gaps hold no knots
+    knots = np.concatenate([[first] * 4, inner, [last] * 4])
+    middle = values.mean()
+    return middle + make_lsq_spline(seconds, values - middle, knots, k=3)(seconds)
+
+
+def difference(one: RangeSeries, other: RangeSeries, *, scale: float = 1.0, longest_gap: float = 0.5) -> RangeSeries:
+    """One series less another, in which what they share cancels.
+
+    one, other    two targets of one ranger (its electronics and the air near it cancel), or two rangers on one target
+    scale         of the other: 1 for electronics, the ratio of the lengths for a common refractivity
+    longest_gap   s, between two ranges of the other: it is interpolated in a line between them
+
+    At a part w of a gap T of the other, a wave of frequency f comes through the interpolation with the power
+    1 - 2 w (1 - w)(1 - cos 2 pi f T): nothing is lost where instants agree, and up to all at f = 1/2T, w = 1/2.
+    Raises InputError where fewer than 64 instants remain.
+
+    Source: [PARKER04] section 3.2.4 (differences need no absolute coordinates); the interpolation is ours.
+    """
+    after = np.searchsorted(other.seconds, one.seconds, side="right")
+    exact = np.isin(one.seconds, other.seconds)
+    after = np.where(exact & (after == len(other.seconds)), after - 1, after)
+    inside = (after > 0) & (after < len(other.seconds))
+    at = np.where(inside, after, 1)
+    gap = other.seconds[at] - other.seconds[at - 1]
+    part = (one.seconds - other.seconds[at - 1]) / gap
+    kept = inside & ((gap <= longest_gap) | exact)
+    if kept.sum() < LEAST:
+        raise InputError(
+            f"{one.name} less {other.name}: {int(kept.sum())} instants lie within gaps of {longest_gap:g} s of the "
+            f"other (expected {LEAST} at least): they must be measured at the same time"
+        )
+    value = (1.0 - part) * other.ranges[at - 1] + part * other.ranges[at]
+    spread = ((1.0 - part) * other.u[at - 1]) ** 2 + (part * other.u[at]) ** 2
+    return RangeSeries(
+        one.name,
+        f"less {other.name}" if scale == 1.0 else f"less {scale:.6g} {other.name}",
+        one.seconds[kept],
+        (one.ranges - scale * value)[kept],
+        np.sqrt(one.u**2 + scale**2 * spread)[kept],
+        one.window,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Movements:
+    """A target's movement by differences of ranges.
+
+    seconds      (n,) s
+    x            (n, 3) m, from the mean, axes of the directions
+    covariance   (n, 3, 3) m^2
+    """
+
+    seconds: Array
+    x: Array
+    covariance: Array
+
+
+def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_gap: float = 0.5) -> Movements:
+    """How a target moved, from three rangers or more and approximate coordinates.
+
+    series        ranges of A rangers, three up, to one target; the first one's instants count
+    directions    (A, 3) unit vectors from ranger to target
+    longest_gap   s, as for `difference`
+
+    dr_a = e_a . dx, weighted with the u of each range. Raises InputError for fewer than three, or directions in one
+    plane, and as `difference`.
+
+    Source: [PARKER04] section 3.2.4.
+    """
+    e = np.asarray(directions, dtype=float)
+    if len(series) < 3 or e.shape != (len(series), 3):
+        raise InputError(f"{len(series)} series with directions {e.shape} (expected three up, and as many by 3)")
+    if np.linalg.svd(e, compute_uv=False)[2] < 1e-3:
+        raise InputError("the directions lie in one plane: a movement across it is not seen (expected another ranger)")
+    first = series[0]
+    zero = RangeSeries("", "", first.seconds, np.zeros_like(first.ranges), np.zeros_like(first.u))
+    # the others at the first one's instants: 0 less the other, turned round
+    moved = [difference(zero, other, longest_gap=longest_gap) for other in series[1:]]
+    when = first.seconds
+    for one in moved:
+        when = np.intersect1d(when, one.seconds)
+    if len(when) < LEAST:
+        raise InputError(f"{len(when)} instants are common to all series (expected {LEAST} at least)")
+    rows, u = [first.ranges[np.isin(first.seconds, when)]], [first.u[np.isin(first.seconds, when)]]
+    for one in moved:
+        at = np.isin(one.seconds, when)
+        rows.append(-one.ranges[at])
+        u.append(one.u[at])
+    y, sigma = np.array(rows).T, np.array(u).T
+    weighted = e[None] / sigma[..., None] ** 2
+    covariance = np.linalg.inv(np.einsum("nai,aj->nij", weighted, e))
+    x = np.einsum("nij,naj,na->ni", covariance, weighted, y - y.mean(axis=0))
+    return Movements(when, x, covariance)

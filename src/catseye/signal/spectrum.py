@@ -1,0 +1,309 @@
+"""Power spectra and cross spectra of displacements, evenly sampled or not, and what may hide behind a peak.
+
+One-sided densities: the integral of S(f) over f > 0 is the variance. Each channel has its own times (a ranger its own
+rhythm); a stretch of them is tapered and transformed at its true times, and stretches that overlap by half are
+averaged. Evenly sampled channels give Welch's estimate to the last digit.
+
+A ranger that measures 7.8 times a second shows everything below 3.9 Hz: a wave of 5 Hz appears at 2.8 Hz and nothing
+in its own numbers tells. Rangers that measure at other instants do tell: at the true frequency their amplitudes have
+one phase (or its opposite), at an alias they have not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import TWO_PI
+from catseye.errors import ValidityError
+
+Array = NDArray[np.float64]
+LEAST = 8  # samples of a channel in a stretch
+LEAST_GAIN = 0.2  # of a buffer's mean: below it what a sample shows of a wave is not carried back
+EVEN = 1e-6  # of the interval, rms: times as even as this have a Nyquist frequency in the strict sense
+PIECE = 4_000_000  # numbers in work at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Densities of A channels at F frequencies.
+
+    frequency_hz   (F,)
+    cross          (F, A, A) complex, m^2/Hz, one-sided: conj(X_a) X_b; the diagonal is the density of each channel
+    degrees        equivalent degrees of freedom of each density
+    bandwidth_hz   of the taper: a wave of variance v shows as v / bandwidth_hz at its frequency
+    rate_hz        (A,) samples a second, mean
+    """
+
+    frequency_hz: Array
+    cross: NDArray[np.complex128]
+    degrees: float
+    bandwidth_hz: float
+    rate_hz: Array
+
+    @property
+    def density(self) -> Array:
+        """(F, A) m^2/Hz."""
+        return np.einsum("faa->fa", self.cross).real.copy()
+
+    @property
+    def nyquist_hz(self) -> Array:
+        """(A,) half the sampling rate: what lies above it appears below."""
+        return 0.5 * self.rate_hz
+
+    def interval(self, probability: float = 0.95) -> Array:
+        """(F, A, 2) m^2/Hz: limits that hold the true density with that probability, chi-square with `degrees`."""
+        from scipy.stats import chi2
+
+        tail = 0.5 * (1.0 - probability)
+        quantiles = chi2.ppf(np.array([1.0 - tail, tail]), self.degrees)
+        return self.density[..., None] * self.degrees / quantiles
+
+    def coherence(self, a: int, b: int) -> Array:
+        """(F,) squared, 0 to 1, of two channels."""
+        product = self.cross[:, a, a].real * self.cross[:, b, b].real
+        return np.abs(self.cross[:, a, b]) ** 2 / np.maximum(product, np.finfo(float).tiny)
+
+    def before_the_mean(self, window: float) -> "Spectrum":
+        """The spectrum of what moved, where samples are means over a window.
+
+        window    s: 0.128 of a ranger's buffer
+
+        Divided by (sin x / x)^2, x = pi f window; NaN where that gain is below LEAST_GAIN, 0.2. Noise of the samples
+        themselves, which no window dampened, grows with it.
+        """
+        gain = np.sinc(self.frequency_hz * window)
+        factor = np.where(np.abs(gain) >= LEAST_GAIN, 1.0 / np.maximum(np.abs(gain), LEAST_GAIN) ** 2, np.nan)
+        return replace(self, cross=self.cross * factor[:, None, None])
+
+
+def spectrum(
+    times: Sequence[ArrayLike],
+    samples: Sequence[ArrayLike],
+    *,
+    stretch: float | None = None,
+    highest_hz: float | None = None,
+    tapered: bool = True,
+) -> Spectrum:
+    """Densities and cross densities of channels, each with its own times.
+
+    times        A of (N_a,) s, rising, any gaps; one clock
+    samples      A of (N_a,) m
+    stretch      s, length of what is transformed at once; the whole, where it is None
+    highest_hz   of the frequencies; half the highest mean rate where it is None
+    tapered      with Hann's window; without it neighbouring frequencies leak
+
+    Frequencies are multiples of 1 / stretch. Each stretch's mean is taken out; one with less than 8 samples of a
+    channel is left out. With K stretches overlapping by half there are 2 K / (1 + (K - 1)/(18 K)) degrees of freedom.
+    Unevenly sampled noise spreads a floor over all frequencies; its integral up to half the mean rate is the variance.
+
+    Raises ValidityError for times that do not rise, numbers that are not finite, or no stretch with enough samples.
+
+    Source: [WELCH67] (averaging, degrees of freedom), [SCARGLE82] eq. 6 (uneven times). Checked against scipy's.
+
+    >>> t = np.arange(512) / 8.0
+    >>> found = spectrum([t], [np.cos(2 * np.pi * 1.0 * t) * 1e-3], stretch=16.0)
+    >>> float(found.frequency_hz[np.argmax(found.density[:, 0])])
+    1.0
+    """
+    t = [np.asarray(x, dtype=float) for x in times]
+    y = [np.asarray(x, dtype=float) for x in samples]
+    _refuse(t, y)
+    first, last = min(x[0] for x in t), max(x[-1] for x in t)
+    interval = [float(np.median(np.diff(x))) for x in t]
+    whole = last - first + min(interval)  # a sample stands for the interval after it
+    length = whole if stretch is None else float(stretch)
+    if not 0.0 < length <= whole * (1.0 + 1e-9):
+        raise ValidityError(f"a stretch of {length:.6g} s of {whole:.6g} s (expected above 0 and no longer)")
+    starts = first + 0.5 * length * np.arange(int(np.floor(2.0 * (whole / length - 1.0) + 1e-6)) + 1)
+    rate = np.array([(len(x) - 1) / (x[-1] - x[0]) for x in t])
+    top = 0.5 * float(rate.max()) if highest_hz is None else float(highest_hz)
+    frequency = np.arange(1, int(np.floor(top * length + 1e-6)) + 1) / length
+    if not len(frequency):
+        raise ValidityError(f"no frequency up to {top:.6g} Hz in stretches of {length:.6g} s (expected longer ones)")
+    cross, used = np.zeros((len(frequency), len(t), len(t)), dtype=complex), 0
+    for start in starts:
+        waves = _waves(start, length, frequency, t, y, tapered)
+        if waves is not None:
+            cross += waves.conj()[:, :, None] * waves[:, None, :]
+            used += 1
+    if not used:
+        raise ValidityError(f"no stretch of {length:.6g} s holds {LEAST} samples of each channel: take longer ones")
+    both = np.ones_like(frequency)
+    if len({len(x) for x in t}) == 1 and all(np.std(np.diff(x)) < EVEN * np.mean(np.diff(x)) for x in t):
+        both = np.where(np.abs(frequency - 0.5 * rate[0]) < 1e-6 * rate[0], 0.5, 1.0)  # Nyquist's has no other side
+    shared = 1.0 / 18.0 if tapered else 0.5  # twice the squared correlation of neighbours that overlap by half
+    degrees = 2.0 * used / (1.0 + shared * (used - 1.0) / used)
+    width = (1.5 if tapered else 1.0) / length
+    scaled: NDArray[np.complex128] = cross * (2.0 / used * both)[:, None, None].astype(complex)
+    return Spectrum(frequency, scaled, degrees, width, rate)
+
+
+def _waves(
+    start: float, length: float, frequency: Array, t: Sequence[Array], y: Sequence[Array], tapered: bool
+) -> NDArray[np.complex128] | None:
+    """(F, A) of one stretch, such that twice |wave|^2 is the density; None where a channel has too few samples."""
+    found = np.empty((len(frequency), len(t)), dtype=complex)
+    for a, (when, values) in enumerate(zip(t, y, strict=True)):
+        low, high = np.searchsorted(when, [start - 1e-9 * length, start + length * (1.0 - 1e-9)])
+        if high - low < LEAST:
+            return None
+        x, part = (when[low:high] - start) / length, values[low:high]
+        taper = 0.5 - 0.5 * np.cos(TWO_PI * x) if tapered else np.ones_like(x)
+        weighted = taper * (part - part.mean())
+        for at in np.array_split(np.arange(len(frequency)), max(1, len(frequency) * len(x) // PIECE)):
+            found[at, a] = np.exp(-1j * TWO_PI * np.outer(frequency[at] * length, x)) @ weighted
+        found[:, a] *= np.sqrt(length / len(x) / np.sum(taper**2))
+    return found
+
+
+def _refuse(t: Sequence[Array], y: Sequence[Array]) -> None:
+    if not t or len(t) != len(y):
+        raise ValidityError(f"{len(t)} channels of times and {len(y)} of samples (expected as many, one up)")
+    for a, (when, values) in enumerate(zip(t, y, strict=True)):
+        if when.ndim != 1 or when.shape != values.shape or len(when) < LEAST:
+            raise ValidityError(
+                f"channel {a}: times {when.shape}, samples {values.shape} (expected both (n,), {LEAST} at least)"
+            )
+        if not (np.isfinite(values).all() and np.all(np.diff(when) > 0.0)):
+            raise ValidityError(f"channel {a}: times do not rise, or a sample is not finite (leave lost ones out)")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A peak of the density summed over channels.
+
+    frequency_hz   of its top, a parabola through the logarithms of three densities
+    density        m^2/Hz, there
+    over           times the background: the median about it
+    """
+
+    frequency_hz: float
+    density: float
+    over: float
+
+
+def peaks(found: Spectrum, *, probability: float = 0.999, about_hz: float | None = None) -> tuple[Peak, ...]:
+    """Where the density stands above its surroundings by more than chance makes of it, the highest first.
+
+    found         a spectrum
+    probability   that the highest of all frequencies of a smooth spectrum is not taken for a peak
+    about_hz      half width of the surroundings; 12 bandwidths where it is None
+
+    A smooth background is judged by its median; of a band broader than the surroundings only the edges show.
+    """
+    from scipy.ndimage import median_filter
+    from scipy.stats import chi2
+
+    total = found.density.sum(axis=1)
+    step = found.frequency_hz[0]
+    half = max(3, round((12.0 * found.bandwidth_hz if about_hz is None else about_hz) / step))
+    degrees = found.degrees * _effective(found)
+    background = median_filter(total, size=2 * half + 1, mode="nearest") * degrees / chi2.ppf(0.5, degrees)
+    limit = chi2.ppf(probability ** (1.0 / max(len(total), 1)), degrees) / degrees
+    # the median of so many independent frequencies is itself uncertain: pi/2 the variance of a mean
+    limit *= 1.0 + 2.0 * np.sqrt(np.pi / degrees * found.bandwidth_hz / ((2 * half + 1) * step))
+    inner = np.arange(1, len(total) - 1)
+    tops = inner[(total[inner] > total[inner - 1]) & (total[inner] >= total[inner + 1])]
+    tops = tops[total[tops] > limit * background[tops]]
+    made = []
+    for k in tops:
+        low, mid, high = np.log(np.maximum(total[k - 1 : k + 2], np.finfo(float).tiny))
+        bend = low - 2.0 * mid + high
+        shift = float(0.5 * (low - high) / bend) if bend < 0.0 else 0.0
+        made.append(Peak(float(found.frequency_hz[k] + shift * step), float(total[k]), float(total[k] / background[k])))
+    return tuple(sorted(made, key=lambda peak: -peak.density))
+
+
+def _effective(found: Spectrum) -> float:
+    """How many independent channels the sum of densities is of: (sum)^2 / sum of squares; 1 where one prevails."""
+    mean = found.density.mean(axis=0)
+    return float(mean.sum() ** 2 / np.sum(mean**2))
+
+
+def aliases(frequency_hz: float, rate_hz: float, highest_hz: float) -> tuple[float, ...]:
+    """All frequencies up to the highest that a channel of this rate shows alike, the lowest first.
+
+    >>> aliases(2.8, 7.8, 12.0)
+    (2.8, 5.0, 10.6)
+    """
+    folded = abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
+    found = {round(abs(k * rate_hz + s * folded), 9) for k in range(int(highest_hz / rate_hz) + 2) for s in (-1, 1)}
+    return tuple(sorted(f for f in found if 0.0 < f <= highest_hz))
+
+
+def likely_alias(
+    times: Sequence[ArrayLike], samples: Sequence[ArrayLike], candidates_hz: Sequence[float], *, stretch: float
+) -> tuple[float, Array]:
+    """Which of some frequencies a wave seen by several channels has, and how well each fits.
+
+    times, samples   as for `spectrum`
+    candidates_hz    such as `aliases` gives
+    stretch          s, over which the wave keeps its phase
+
+    One mode moves all points in phase or against it: the real part of the cross densities then holds all that their
+    largest eigenvalue does. At an alias each channel's phase is off by 2 pi times the difference of frequencies times
+    the offset of its rhythm. Returned is the first of the best and the share (C,), 1 at most, of the summed density
+    that real shapes hold; where two shares are nearly alike (one channel, one rhythm), nothing is known.
+    """
+    t = [np.asarray(x, dtype=float) for x in times]
+    y = [np.asarray(x, dtype=float) for x in samples]
+    _refuse(t, y)
+    first, last = min(x[0] for x in t), max(x[-1] for x in t)
+    asked = np.asarray(candidates_hz, dtype=float)
+    total = np.zeros((len(asked), len(t), len(t)), dtype=complex)
+    for start in np.arange(first, max(last - stretch, first) + 1e-9, 0.5 * stretch):
+        waves = _waves(start, stretch, asked, t, y, True)
+        if waves is not None:
+            total += waves.conj()[:, :, None] * waves[:, None, :]
+    scale = np.maximum(np.einsum("faa->f", total).real, np.finfo(float).tiny)
+    share = np.linalg.eigvalsh(total.real)[:, -1] / scale
+    return float(asked[int(np.argmax(share))]), share
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """How channels move together about a frequency.
+
+    frequency_hz   the middle of the band
+    rms            (A,) m, of each channel in the band, noise included
+    shape          (A,) complex, of the first singular vector; its largest entry is 1
+    u_shape        (A,) standard uncertainty of its size, from coherence with that channel
+    first_share    of the summed variance that this shape holds: near 1 is one mode
+    """
+
+    frequency_hz: float
+    rms: Array
+    shape: NDArray[np.complex128]
+    u_shape: Array
+    first_share: float
+
+
+def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> Shape:
+    """The shape of a mode from the cross densities about its frequency.
+
+    found           a spectrum of two channels or more
+    frequency_hz    of the mode
+    half_width_hz   of the band; 2 bandwidths where it is None
+
+    Source: [BRINCKER01] (singular vectors of the spectral matrix are mode shapes); u of a ratio from its coherence
+    c, averaged over K: sqrt((1 - c) / (2 K c)) of it, [BENDAT10] chapter 9; NaN where the coherence is below 0.05.
+    """
+    half = 2.0 * found.bandwidth_hz if half_width_hz is None else half_width_hz
+    at = np.abs(found.frequency_hz - frequency_hz) <= half
+    if not at.any():
+        raise ValidityError(f"no frequency of the spectrum within {half:.6g} Hz of {frequency_hz:.6g} Hz")
+    step = float(found.frequency_hz[0])
+    matrix = found.cross[at].sum(axis=0) * step
+    values, vectors = np.linalg.eigh(matrix)
+    # matrix = conj(x) x': its eigenvector is the conjugate of the shape
+    shape = vectors[:, -1].conj()
+    top = int(np.argmax(np.abs(shape)))
+    shape = shape / shape[top]
+    power = np.diag(matrix).real
+    coherence = np.abs(matrix[top]) ** 2 / np.maximum(power[top] * power, np.finfo(float).tiny)
+    averages = 0.5 * found.degrees * max(1.0, at.sum() * step / found.bandwidth_hz)
+    safe = np.where(coherence > 0.05, np.minimum(coherence, 1.0), np.nan)
+    u = np.abs(shape) * np.sqrt((1.0 - safe) / (2.0 * averages * safe))
+    return Shape(float(frequency_hz), np.sqrt(np.maximum(power, 0.0)), shape, u, float(values[-1] / values.sum()))

@@ -1,0 +1,126 @@
+"""`catseye pointing` as a new user meets it: the example's stars, the published series, poses and inclinometers."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from catseye.constants import ARCSECOND, DEGREE
+from catseye.geometry.pointing_series import published
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "pointing"
+STARS, TILTS = EXAMPLES / "stars.dat", EXAMPLES / "tilts.csv"
+
+
+def test_the_example_gives_the_published_terms_within_their_covariance(catseye):
+    status, said, complained = catseye("pointing", "fit", STARS, "--against", "published", "--json")
+    assert (status, complained) == (0, "")
+    found = json.loads(said, parse_constant=pytest.fail)
+    assert found["observations"] == 72
+    assert found["comparison"]["p"] > 0.01
+    assert found["sky_rms_arcsec"] == pytest.approx(7.35, abs=4 * 7.35 / 272**0.5)  # 5.2 in each of two
+    assert [set(w["parts"]) for w in found["weak"]] == [{"IA", "CA", "NPAE"}, {"IE", "HZCZ", "HZSZ"}]
+    assert np.array(found["covariance_arcsec2"]).shape == (8, 8)
+
+
+def test_a_report_a_model_and_the_stars_used_are_written(catseye, tmp_path):
+    model, used, out = tmp_path / "m.toml", tmp_path / "used.dat", tmp_path / "out"
+    status, said, _ = catseye(
+        "pointing", "fit", STARS, "--reject", "--out", out, "--write", model, "--write-stars", used
+    )
+    assert status == 0
+    assert "arcsec only" in said
+    files = "observations.csv pointing.json pointing.toml provenance.json report.html"
+    assert sorted(p.name for p in out.iterdir()) == files.split()
+    assert (out / "report.html").read_text().count("<img") == 3
+    told = json.loads(catseye("pointing", "fit", used, "--json")[1])
+    first = json.loads((out / "pointing.json").read_text())
+    for term, value in first["values_arcsec"].items():  # files carry 1e-7 degrees
+        assert told["values_arcsec"][term] == pytest.approx(value, abs=0.01)
+    assert tomllib.loads(model.read_text())["terms"] == first["terms"]
+    status, said, _ = catseye("pointing", "fit", used, "--against", model, "--json")
+    assert json.loads(said)["comparison"]["rms_on_the_sky_arcsec"] < 1e-3
+
+
+def test_predictions_of_the_published_series_and_of_a_model(catseye, tmp_path):
+    status, said, _ = catseye("pointing", "predict", "--azimuth-deg", "145.3", "--elevation-deg", "30", "--json")
+    found = json.loads(said)
+    assert status == 0
+    np.testing.assert_allclose(found["correction"], published().correction(145.3 * DEGREE, 30 * DEGREE), rtol=1e-12)
+    assert found["covariance"] is None
+    model = tmp_path / "m.toml"
+    catseye("pointing", "fit", STARS, "--write", model, "--quiet")
+    status, said, _ = catseye("pointing", "predict", "--azimuth-deg", "0", "--elevation-deg", "45", "--model", model)
+    assert "u 0." in said or "u 1." in said
+
+
+def pose_file(folder, azimuth_deg, **more):
+    folder.mkdir()
+    made = {"format": "catseye-pose-1", "posture": {"azimuth_deg": azimuth_deg, "elevation_deg": 45.0}, **more}
+    (folder / "pose.json").write_text(json.dumps(made))
+    return folder / "pose.json"
+
+
+def test_metrology_from_poses_is_fitted_and_compared_with_the_stars(catseye, tmp_path):
+    rng, files, q = np.random.default_rng(5), [], np.diag([1.0, 1.0, 1.0]) * (0.5 * ARCSECOND) ** 2
+    for k in range(40):
+        azimuth, elevation = rng.uniform(0, 360), rng.uniform(15, 80)
+        value = published().correction(azimuth * DEGREE, elevation * DEGREE) + rng.normal(size=2) * 0.5 * ARCSECOND
+        told = {"correction": [*value, 0.0], "covariance": q.tolist()}
+        posture = {"azimuth_deg": azimuth, "elevation_deg": elevation}
+        files.append(pose_file(tmp_path / f"p{k}", 0.0, pointing=told))
+        files[-1].write_text(json.dumps({"format": "catseye-pose-1", "posture": posture, "pointing": told}))
+    status, said, complained = catseye("pointing", "fit", *files, "--against", STARS, "--json")
+    assert (status, complained) == (0, "")
+    found = json.loads(said)
+    assert found["source"] == "metrology"
+    assert not found["scaled_by_variance_factor"]
+    assert found["comparison"]["p"] > 0.01
+
+
+def test_the_track_under_an_inclinometer_and_poses(catseye, tmp_path):
+    q = np.diag([1e-8] * 3 + [(0.6 * ARCSECOND) ** 2] * 3).tolist()
+    files = []
+    for azimuth in range(0, 360, 45):
+        a = azimuth * DEGREE
+        east = 2.96 - 1.2 * np.cos(3 * a) + 0.8 * np.sin(2 * a)
+        north = 2.18 + 0.9 * np.cos(2 * a) + 1.5 * np.sin(3 * a)
+        turn = np.array([np.cos(a) * east - np.sin(a) * north, np.sin(a) * east + np.cos(a) * north, 0]) * ARCSECOND
+        files.append(pose_file(tmp_path / f"{azimuth}", azimuth, frame="alidade", rotation=turn.tolist(), covariance=q))
+    out = tmp_path / "out"
+    told = ["pointing", "track", *files, "--tilts", TILTS, "--harmonics", "3"]
+    status, said, _ = catseye(*told, "--out", out)
+    assert status == 0
+    assert "leans north, west" in said
+    assert sorted(p.name for p in out.iterdir()) == ["provenance.json", "report.html", "tilt.csv", "track.json"]
+    found = json.loads((out / "track.json").read_text())
+    for name, wanted in (("cos 3A east", -1.2), ("sin 3A north", 1.5), ("sin 2A east", 0.8), ("mean north", 2.18)):
+        off = found["coefficients"][name] / ARCSECOND - wanted
+        assert abs(off) < 4 * found["u_coefficients"][name] / ARCSECOND
+    assert found["p"] > 1e-3
+    status, _, complained = catseye("pointing", "track", "--tilts", TILTS, "--harmonics", "1")
+    assert status == 1
+    assert "zero x" in complained
+
+
+@pytest.mark.parametrize(
+    ("told", "status", "said"),
+    [
+        (["fit", "nowhere.dat"], 1, "nowhere.dat"),
+        (["fit", STARS, "--terms", "IA,XX"], 2, "is not a selection"),
+        (["fit", STARS, "--u-arcsec", "0"], 2, "not above zero"),
+        (["fit", STARS, "--write", STARS], 1, "is an input"),
+        (["fit", STARS, STARS], 1, "second file"),
+        (["fit", TILTS], 1, "tilts.csv"),
+        (["predict", "--azimuth-deg", "0", "--elevation-deg", "90"], 2, "degrees"),
+        (["predict", "--azimuth-deg", "0", "--elevation-deg", "45", "--model", "none.toml"], 1, "none.toml"),
+        (["track"], 2, "needs poses"),
+        (["track", STARS], 1, "is not JSON"),
+    ],
+)
+def test_what_cannot_be_done_is_said(catseye, told, status, said):
+    found, _, complained = catseye("pointing", *told)
+    assert found == status
+    assert said in complained
