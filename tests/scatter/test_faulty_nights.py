@@ -18,6 +18,7 @@ NIGHTS, EPOCHS = 40, 8
 END = 10.0 * EPOCHS  # s
 FAULTS_A_NIGHT = 5
 KINDS = ("blocked-beam", "wrong-target", "saturated-adc", "dew", "lying-station", "silent-station", "dead-ranger")
+ARM = tuple(f"ZY{k}" for k in range(113, 119))  # whose places nothing else tells
 FAR = chi2.ppf(0.9999, 3)  # of one point's squared deviation in its own uncertainties
 
 
@@ -50,6 +51,8 @@ def drawn(seed: int) -> tuple[str, ...]:
         }.get(str(kind), ranger)
         size = {"wrong-target": rng.choice([-1.0, 1.0]) * rng.uniform(0.003, 0.045), "lying-station": rng.uniform(2, 8)}
         more = f" {size[str(kind)]:.4f}" if kind in size else ""
+        if kind == "wrong-target" and whom in ARM:  # wrong by the same on all from its first shot: it stands elsewhere
+            start = max(start, 12.0)
         found.append(f"{kind} {whom} {start:.1f} {end:.1f}{more}")
     return tuple(found)
 

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from beam_scene import FOCUS, beam
 from catseye.geometry.frame import Transforms
 from catseye.records.live import TICKS_PER_DAY
 from catseye.reduction.live import LiveSettings
@@ -28,7 +29,6 @@ FAULTS = (
     "dead-ranger ZY115",
     "dead-ranger ZY101",
 )
-FOCAL = 60.0  # m
 
 
 @cache
@@ -64,7 +64,7 @@ def own_places(night: Night, live, k):
 
 
 def true_offset(then, now, bodies):
-    """Azimuth times cos E, elevation, focus: of rigid motions fitted to true points, by the signs of the ray trace."""
+    """Azimuth times cos E, elevation, focus: of rigid motions fitted to true points, by the ray trace."""
     motion = {}
     for body in ("dish", "arm"):
         names = [n for n in then if bodies[n] == body]
@@ -74,11 +74,11 @@ def true_offset(then, now, bodies):
             design.append(np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]]))
             change.append(now[n] - then[n])
         motion[body] = np.linalg.lstsq(np.vstack(design), np.concatenate(change), rcond=None)[0]
-    focus = [0.0, 0.0, FOCAL]
-    places = {b: m[:3] + np.cross(m[3:], focus) for b, m in motion.items()}
-    dx, dy, dz = places["arm"] - places["dish"]
-    turn = motion["dish"][3:]
-    return np.array([turn[1] - dx / FOCAL, turn[0] + dy / FOCAL, dz])
+    feed = FOCUS + motion["arm"][:3] + np.cross(motion["arm"][3:], FOCUS)
+    dish = motion["dish"]
+    x, y, _ = beam(dish[3:], dish[:3], feed)  # to the right of the axis, and away from the arm: down
+    relative = feed - FOCUS - dish[:3] - np.cross(dish[3:], FOCUS)
+    return np.array([x, -y, relative[2]])
 
 
 def tally(motion, seeds, epochs, **more):

@@ -16,6 +16,7 @@ from catseye.coordinator.journal_entries import AnsweredShot, Solution
 from catseye.estimation.datum import motions
 from catseye.records.site_folder import SiteFolder
 from catseye.reduction.live_bodies import bodies_of, lasting_names
+from catseye.reduction.live_pose import beam_per_feed_shift
 from catseye.reduction.motion import GROUND, frames_of, ground_from
 from catseye.simulator.twin import Twin
 
@@ -71,6 +72,7 @@ class TwinComparison:
         self._frames, self._bodies = frames_of(site), bodies_of(site, frames_of(site))
         self._lasting = frozenset(lasting_names(site))
         self._focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
+        self._slopes = beam_per_feed_shift(site)
         self._middles: dict[int, float] = {}  # s since the twin's start, by number
         self._reference: dict[str, Array] = {}  # true places in the reflector frame, at the reference epoch
 
@@ -158,7 +160,8 @@ class TwinComparison:
             moved[body] = np.linalg.lstsq(motions(rest, pivot, 1.0)[:, :6], change.ravel(), rcond=None)[0]
         turn = moved["dish"][3:]
         slip = moved["arm"][:3] - moved["dish"][:3] - np.cross(turn, focus)
-        return np.array([turn[1] - slip[0] / self._focal, turn[0] + slip[1] / self._focal, slip[2]])
+        across, along = self._slopes @ slip
+        return np.array([turn[1] + across, turn[0] - along, slip[2]])
 
 
 def _chi2(off: Array, covariance: Array) -> float:

@@ -389,7 +389,7 @@ class Live:
         """Jitter of each body, mm: as learnt, and bent by the telescope's own motion during the epoch's shots."""
         times = [r.mjd for r in rows if r.shot.target != REFERENCE]
         angles = self.track.at(np.array(times or [rows[-1].mjd]))
-        moved = math.hypot(*(float(np.ptp(angle)) for angle in angles)) / DEGREE
+        moved = float(np.ptp(angles[1])) / DEGREE
         bent = {b: self.settings.bending_mm_per_degree.get(b, 0.0) * moved / math.sqrt(12.0) for b in self.jitter.mm}
         return {b: math.hypot(u, bent[b]) for b, u in self.jitter.mm.items()}
 

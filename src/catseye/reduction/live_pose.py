@@ -26,6 +26,7 @@ from catseye.reduction.live_state import REFERENCE_EPOCH, XYZ, Carried
 
 Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
+BISECTIONS = 30
 OFFSETS = ("azimuth times cos E", "elevation", "focus")
 
 
@@ -40,6 +41,7 @@ class BodyMotion:
     covariance    (6, 6), translation then rotation
     chi2, degrees_of_freedom   of the points against a rigid motion
     points        how many
+    bending       m, of each coordinate besides what was measured: the body is no rigid one; in the covariance
     """
 
     body: str
@@ -50,6 +52,7 @@ class BodyMotion:
     chi2: float
     degrees_of_freedom: int
     points: int
+    bending: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +94,14 @@ def live_pose(carried: Carried, bodies: Mapping[str, str], site: SiteFolder) -> 
     change, covariance, places = _change(carried, both)
     k = len(names["dish"])
     try:
-        dish, by_dish = _rigid("dish", places[:k], change[: 3 * k], covariance[: 3 * k, : 3 * k], vertex)
-        feed, by_feed = _rigid("arm", places[k:], change[3 * k :], covariance[3 * k :, 3 * k :], focus)
+        dish, by_dish, dish_bends = _rigid("dish", places[:k], change[: 3 * k], covariance[: 3 * k, : 3 * k], vertex)
+        feed, by_feed, feed_bends = _rigid("arm", places[k:], change[3 * k :], covariance[3 * k :, 3 * k :], focus)
     except EstimationError as problem:
         return LivePose(None, None, *nothing, str(problem))
     to_motion = np.zeros((12, len(change)))
     to_motion[:6, : 3 * k], to_motion[6:, 3 * k :] = by_dish, by_feed
-    joint = to_motion @ covariance @ to_motion.T
+    bending = np.concatenate([np.full(3 * k, dish_bends), np.full(len(change) - 3 * k, feed_bends)])
+    joint = to_motion @ (covariance + np.diag(bending)) @ to_motion.T
     # offset = pointing by the dish's turn, and the feed at the focus less where the dish takes the focus
     by = np.zeros((3, 12))
     at_focus = np.hstack([np.eye(3), motions(focus[None], vertex, 1.0)[:, 3:6]])  # the dish's, of the focus
@@ -136,30 +140,60 @@ def _change(carried: Carried, names: Sequence[str]) -> tuple[Array, Array, Array
     return carried.x[now] - carried.x[then], covariance, carried.x[then].reshape(-1, 3)
 
 
-def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Array) -> tuple[BodyMotion, Array]:
-    """The weighted rigid motion (6,), and the matrix (6, 3k) that takes changes to it.
+def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Array) -> tuple[BodyMotion, Array, float]:
+    """The weighted rigid motion (6,), the matrix (6, 3k) that takes changes to it, and the variance of bending, m^2.
 
+    A body that bends between epochs is no rigid one: each coordinate is off by more than was measured, by how much more
+    is what makes the points' chi-square its degrees of freedom. With C = V diag(l) V', adding s^2 leaves V as it is.
     In the reference epoch itself nothing has changed, and nothing is uncertain: then all points count alike.
     """
     design = motions(places, pivot, 1.0)[:, :6]
     scale = float(np.trace(covariance)) / len(covariance)
-    weight = np.eye(len(change)) if scale < 1e-16 else np.linalg.pinv(covariance + 1e-6 * scale * np.eye(len(change)))
-    normal = design.T @ weight @ design
-    size = np.sqrt(np.diag(normal))
+    degrees = len(change) - 6
+    if scale < 1e-16:
+        values, turned, moved = np.ones(len(change)), design, change
+        axes = np.eye(len(change))
+    else:
+        values, axes = np.linalg.eigh(covariance)
+        values = np.maximum(values, 0.0) + 1e-6 * scale
+        turned, moved = axes.T @ design, axes.T @ change
+    size = np.linalg.norm(turned / np.sqrt(values)[:, None], axis=0)
     size[size == 0.0] = 1.0  # a turn that moves no point at all
-    if np.linalg.cond(normal / np.outer(size, size)) > 1e12:
+    normal = (turned / values[:, None]).T @ turned / np.outer(size, size)
+    if np.linalg.cond(normal) > 1e12:
         raise EstimationError(
             f"{body}: its points lie on a line and do not hold its turn (expected points aside of it)"
         )
-    to_motion = np.linalg.solve(normal, design.T @ weight)
+
+    def solved(bending: float) -> tuple[Array, float]:
+        weighted = turned / (values + bending)[:, None]
+        gain = np.linalg.solve(weighted.T @ turned, weighted.T)
+        rest = moved - turned @ (gain @ moved)
+        return gain, float(rest @ (rest / (values + bending)))
+
+    gain, chi2 = solved(0.0)
+    bending = 0.0
+    if scale >= 1e-16 and degrees > 0 and chi2 > degrees:
+        low, high = 0.0, float(moved @ moved)
+        for _ in range(BISECTIONS):
+            bending = 0.5 * (low + high)
+            low, high = (bending, high) if solved(bending)[1] > degrees else (low, bending)
+        gain, _ = solved(bending)
+    to_motion = gain @ axes.T
     found = to_motion @ change
-    rest = change - design @ found
-    degrees = len(change) - 6
-    chi2 = float(rest @ weight @ rest) if scale >= 1e-16 else 0.0
+    spread = to_motion @ covariance @ to_motion.T + bending * to_motion @ to_motion.T
     motion = BodyMotion(
-        body, pivot, found[:3], found[3:], _positive(to_motion @ covariance @ to_motion.T), chi2, degrees, len(places)
+        body,
+        pivot,
+        found[:3],
+        found[3:],
+        _positive(spread),
+        chi2 if scale >= 1e-16 else 0.0,
+        degrees,
+        len(places),
+        float(np.sqrt(bending)),
     )
-    return motion, to_motion
+    return motion, to_motion, bending
 
 
 def _positive(covariance: Array) -> Array:
