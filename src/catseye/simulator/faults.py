@@ -88,12 +88,20 @@ class Planted:
         return 0.0 if effect in self.ignore else float(self.signs.get(effect, 1.0))
 
 
+NIGHTLY = ("samples/", "returns/", "path/", "path noise/", "electronics", "weather/", "sound/", "air/")
+
+
 @dataclass(frozen=True)
 class Streams:
-    """One independent random generator for each purpose, so that changing one draw moves no other."""
+    """One independent random generator for each purpose, so that changing one draw moves no other.
+
+    night   another one at the same site: what a night draws anew differs, what stands there does not
+    """
 
     seed: int
+    night: int = 0
 
     def __call__(self, purpose: str) -> np.random.Generator:
         key = zlib.crc32(purpose.encode())
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(key,)))
+        keys = (key, self.night) if self.night and purpose.startswith(NIGHTLY) else (key,)
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=keys))

@@ -137,6 +137,7 @@ def simulate_night(
     planted: Planted | None = None,
     warm_lines: Mapping[tuple[str, str], float] | None = None,
     u_sound_c: float | None = None,
+    night: int = 0,
 ) -> Night:
     """A night in the manner of night-01, from one seed.
 
@@ -147,13 +148,14 @@ def simulate_night(
     warm_lines      (ranger, target) -> °C by which the mean of that line is warmer than smooth air
     u_sound_c       °C: these lines are sounded, each with an offset of its own drawn from it, and noise of a fifth;
                     None: no sound
+    night           another one at the same site: noise, electronics, weather and air are drawn anew
     """
     if not 5.0 <= elevation_deg <= 90.0:
         raise ValidityError(f"elevation {elevation_deg} deg is outside 5-90 deg, where the telescope moves")
     if not (0 <= dish_prisms <= 999 and 0 <= triplets <= 99):
         raise ValidityError(f"{dish_prisms} dish prisms and {triplets} triplets: expected 0-999 and 0-99")
     faults, rule, planted = faults or Faults(), schedule or Schedule(), planted or Planted()
-    streams = Streams(seed)
+    streams = Streams(seed, night)
     heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
     monuments = {r: monument(r, heads[r], streams, planted) for r in GROUND_RANGERS}
     marks = benchmarks(monuments, streams, planted)
