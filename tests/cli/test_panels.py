@@ -65,8 +65,8 @@ def test_the_files_are_whole_and_agree_with_the_object(whole):
     _, said, _, out = whole
     told = json.loads(said)
     assert {p.name for p in out.iterdir()} == {
-        "report.html", "screws.csv", "actuators.csv", "panels.csv", "readings.csv", "readings-as-left.csv", "crew.csv",
-        "panels.json", "provenance.json",
+        "report.html", "samplers.fits", "screws.csv", "actuators.csv", "panels.csv", "readings.csv",
+        "readings-as-left.csv", "crew.csv", "panels.json", "provenance.json",
     }  # fmt: skip
     assert json.loads((out / "panels.json").read_text()) == told
     with (out / "screws.csv").open() as stream:

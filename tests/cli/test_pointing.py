@@ -32,7 +32,7 @@ def test_a_report_a_model_and_the_stars_used_are_written(catseye, tmp_path):
     )
     assert status == 0
     assert "arcsec only" in said
-    files = "observations.csv pointing.json pointing.toml provenance.json report.html"
+    files = "observations.csv pointing.json pointing.toml provenance.json report.html samplers.fits"
     assert sorted(p.name for p in out.iterdir()) == files.split()
     assert (out / "report.html").read_text().count("<img") == 3
     told = json.loads(catseye("pointing", "fit", used, "--json")[1])
@@ -94,7 +94,13 @@ def test_the_track_under_an_inclinometer_and_poses(catseye, tmp_path):
     status, said, _ = catseye(*told, "--out", out)
     assert status == 0
     assert "leans north, west" in said
-    assert sorted(p.name for p in out.iterdir()) == ["provenance.json", "report.html", "tilt.csv", "track.json"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "provenance.json",
+        "report.html",
+        "samplers.fits",
+        "tilt.csv",
+        "track.json",
+    ]
     found = json.loads((out / "track.json").read_text())
     for name, wanted in (("cos 3A east", -1.2), ("sin 3A north", 1.5), ("sin 2A east", 0.8), ("mean north", 2.18)):
         off = found["coefficients"][name] / ARCSECOND - wanted

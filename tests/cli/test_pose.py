@@ -53,7 +53,7 @@ def test_pointing_writes_report_tables_and_tells_people(catseye, night, tmp_path
     assert status == 0
     for word in ("Frame", "reflector", "plate scale 3.438", "azimuth times cos E", "turn of the dish", "Written to"):
         assert word in said
-    files = "points.csv pose.json provenance.json report.html"
+    files = "points.csv pose.json provenance.json report.html samplers.fits"
     assert sorted(p.name for p in out.iterdir()) == files.split()
     found = json.loads((out / "pose.json").read_text())
     np.testing.assert_allclose(found["pointing"]["offset"], 0.0, atol=1e-12)  # a night against itself

@@ -50,7 +50,7 @@ def test_one_epoch_with_everything(catseye, tmp_path):
     assert 0.0 < found["gain"][1]["gain"] < found["gain"][0]["gain"] < 1.0
     assert found["actuators"]["actuators"] == 2209
     assert len(found["deviations"]) == len(ROWS)
-    files = "actuators.csv prisms.csv provenance.json report.html surface.json zernike.csv"
+    files = "actuators.csv prisms.csv provenance.json report.html samplers.fits surface.json zernike.csv"
     assert sorted(p.name for p in out.iterdir()) == files.split()
     assert json.loads((out / "surface.json").read_text()) == found
     rows = read_corrections(out / "actuators.csv")

@@ -13,6 +13,7 @@ from catseye.gateways.samplers_fits import (
     SamplerColumn,
     SamplerTable,
     join_samplers,
+    join_tables,
     read_samplers,
     sampler_tables,
     write_samplers,
@@ -152,3 +153,22 @@ def test_the_file_joins_the_provenance_of_its_directory(tmp_path):
         "a.csv": "0",
         "samplers.fits": hashlib.sha256((tmp_path / "samplers.fits").read_bytes()).hexdigest(),
     }
+
+
+def test_an_outputs_tables_are_in_the_fits_with_the_same_numbers(tmp_path):
+    (tmp_path / PROVENANCE).write_text('{"format": "a test", "outputs": {}}')
+    (tmp_path / "points-left.csv").write_text(
+        "point,x_m,u_x_um,slope_x_urad,m,note\nT1,1.25,3,-4,2,0.3 µm off\nT2,,4,5,-2,\n", encoding="utf-8"
+    )
+    six = SamplerTable("SIX", {"SHIFT": SamplerColumn("m", np.zeros((1, 3)))})
+    join_tables(tmp_path, frame="ground", pivot="1, 2, 3 m", tables={"SIX": six})
+    found = read_samplers(tmp_path / "samplers.fits")
+    assert list(found) == ["SIX", "POINTS_LEFT"]
+    table = found["POINTS_LEFT"]
+    assert (table.frame, table.pivot) == ("ground", "1, 2, 3 m")
+    assert [c.unit for c in table.columns.values()] == ["", "m", "um", "urad", "", ""]
+    np.testing.assert_array_equal(table.columns["X_M"].values, [1.25, np.nan])
+    np.testing.assert_array_equal(table.columns["M"].values, [2.0, -2.0])
+    assert [str(v).strip() for v in table.columns["NOTE"].values] == ["0.3 um off", ""]
+    told = json.loads((tmp_path / PROVENANCE).read_text())["outputs"]
+    assert told["samplers.fits"] == hashlib.sha256((tmp_path / "samplers.fits").read_bytes()).hexdigest()

@@ -19,6 +19,7 @@ from catseye.gateways.panels_objects import (
     screws,
 )
 from catseye.gateways.panels_tables import actuators_csv, crew_csv, panels_csv, readings_csv, screws_csv
+from catseye.gateways.samplers_fits import join_tables
 from catseye.gateways.written import Files, origin, write_files
 from catseye.reduction.panel_crew import members, sessions, standing
 
@@ -61,6 +62,7 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
     }
     made = {"format": FORMAT, "made_by": "catseye panels"}
     write_files(files, directory, {**made, **origin(when, work.inputs)}, progress)
+    join_tables(directory, frame="of each corner or panel: z the normal towards the focus")
 
 
 def _left(work: "PanelWork") -> str:

@@ -24,6 +24,7 @@ from catseye.gateways.pointing_series_objects import (
     model_record,
     track_object,
 )
+from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.written import Files, origin, write_files
 from catseye.records.pointing_model import FORMAT as MODEL
 from catseye.records.toml_text import record_toml
@@ -53,6 +54,16 @@ def write_fit(
     }
     made = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
     write_files(files, directory, {**made, **origin(when, observed.hashes)})
+    series = SamplerTable(
+        "SERIES",
+        {
+            "TERM": SamplerColumn("", np.array(fit.series.terms)),
+            "VALUE": SamplerColumn("rad", fit.series.values),
+            "COVARIANCE": SamplerColumn("rad2", fit.series.covariance, "a row a term"),
+        },
+        comment="pointing series, encoders less sky",
+    )
+    join_tables(directory, tables={"SERIES": series})
 
 
 def write_model(fit: PointingFit, path: Path) -> None:
@@ -148,6 +159,7 @@ def write_track(found: TrackProfile, directory: Path, hashes: Mapping[str, str])
     settings = {"harmonics": found.series.harmonics}
     made = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
     write_files(files, directory, {**made, **origin(when, hashes)})
+    join_tables(directory, frame="alidade turned about east and north of the ground")
 
 
 def tilt_csv(found: TrackProfile) -> str:

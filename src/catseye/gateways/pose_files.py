@@ -14,6 +14,7 @@ from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.objects import json_page, versions
 from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.pose_objects import FORMAT, PoseResult, beam_rows, pose_result_object, pose_rows, pose_words
+from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.written import Files, origin, write_files
 
 HEADER = (
@@ -48,6 +49,20 @@ def write_pose(found: PoseResult, directory: Path, inputs: Mapping[str, str], se
     }
     made = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
     write_files(files, directory, {**made, **origin(when, inputs)})
+    pose = found.pose.pose
+    pivot = f"{', '.join(f'{v:.6f}' for v in pose.pivot)} m"
+    six = SamplerTable(
+        "POSE",
+        {
+            "TRANSLATION": SamplerColumn("m", pose.translation[None], "of the pivot"),
+            "ROTATION": SamplerColumn("rad", pose.rotation[None], "rotation vector, right-handed"),
+            "COVARIANCE": SamplerColumn("", pose.covariance[None], "6 x 6, translation then rotation, m and rad"),
+        },
+        comment="second = pivot + translation + rotation (first - pivot)",
+        frame=pose.frame,
+        pivot=pivot,
+    )
+    join_tables(directory, frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
 def points_csv(found: PoseResult) -> str:

@@ -6,6 +6,7 @@ says TIMESYS, MJDREF, ORIGIN, the version of catseye, and in words the frame and
 Doubles, whole numbers, truth values and ASCII text are stored as they are: what is read back is the same bit for bit.
 """
 
+import csv
 import hashlib
 import io
 import json
@@ -28,6 +29,19 @@ from catseye.records.record import EARLIEST_MJD, LATEST_MJD
 
 MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
 TIME = "MJD"
+SAMPLERS = "samplers.fits"
+UNITS = {
+    "m": "m",
+    "mm": "mm",
+    "um": "um",
+    "rad": "rad",
+    "urad": "urad",
+    "deg": "deg",
+    "arcsec": "arcsec",
+    "s": "s",
+    "hz": "Hz",
+}
+NOT_ASCII = {"°": " deg", "µ": "u", "″": " arcsec", "′": " arcmin", "·": "*", "–": "-", "−": "-", "±": "+-"}
 STANDARD = {"XTENSION", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "PCOUNT", "GCOUNT", "TFIELDS", "END", "EXTNAME"}
 OURS = {"TIMESYS", "MJDREF", "ORIGIN", "FRAME", "PIVOT", "REMARK", "CHECKSUM", "DATASUM", MARK}
 OF_COLUMNS = ("TTYPE", "TFORM", "TUNIT", "TCOMM", "TDIM")
@@ -140,6 +154,44 @@ def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]
     told = json.loads(place.read_text(encoding="utf-8"))
     told["outputs"] = {**told["outputs"], name: hashlib.sha256(content).hexdigest()}
     place.write_bytes(json_page(told).encode("utf-8"))
+
+
+def join_tables(
+    directory: Path, *, frame: str = "", pivot: str = "", tables: Mapping[str, SamplerTable] | None = None
+) -> None:
+    """All CSV tables of an output directory once more, as samplers.fits, with the same numbers.
+
+    directory      as for `join_samplers`
+    frame, pivot   of the tables, as in `SamplerTable`
+    tables         more, which stand first
+    """
+    told = dict(tables or {})
+    for path in sorted(directory.glob("*.csv")):
+        name = path.stem.upper().replace("-", "_")
+        told[name] = _of_csv(name, path.read_text(encoding="utf-8"), frame, pivot)
+    join_samplers(directory, SAMPLERS, told)
+
+
+def _of_csv(name: str, text: str, frame: str, pivot: str) -> SamplerTable:
+    """A table by its CSV: units by the ends of its columns' names, blanks as NaN, text where a cell is no number."""
+    header, *rows = csv.reader(io.StringIO(text))
+    columns = {}
+    for k, title in enumerate(header):
+        cells = [row[k] for row in rows]
+        try:
+            values: ArrayLike = np.array([float(cell) if cell else np.nan for cell in cells])
+            what, _, unit = title.rpartition("_")
+            unit = UNITS.get(unit, "") if what else ""
+        except ValueError:
+            values, unit = np.array([_as_ascii(cell) for cell in cells]), ""
+        columns[title.upper()] = SamplerColumn(unit, values)
+    return SamplerTable(name, columns, comment=f"as {name.lower()}.csv", frame=frame, pivot=pivot)
+
+
+def _as_ascii(text: str) -> str:
+    for sign, plain in NOT_ASCII.items():
+        text = text.replace(sign, plain)
+    return text.encode("ascii", "replace").decode("ascii")
 
 
 def read_samplers(path: Path) -> dict[str, SamplerTable]:

@@ -12,6 +12,7 @@ from catseye.errors import InputError
 from catseye.gateways.interruption import deferred, undone_when_interrupted
 from catseye.gateways.objects import json_page
 from catseye.gateways.output import whole_file
+from catseye.gateways.samplers_fits import join_tables
 from catseye.gateways.surface_objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
 from catseye.gateways.surface_report import SurfaceResult, surface_report
 from catseye.gateways.surface_tables import (
@@ -73,6 +74,7 @@ def write_surface(
     made: Files = files
     told = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(found.shapes[-1].settings)}
     write_files(made, directory, {**told, **origin(when, inputs)}, progress)
+    join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 
 def write_actuators(found: SurfaceResult, path: Path) -> None:
