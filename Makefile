@@ -31,7 +31,7 @@ test-all: check  ## the same with the long scatter and fault runs
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
 
-bench: setup  ## benchmarks, as ratios in one run: the main job, phases, positions, networks, pointing, air, delays
+bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, networks, pointing, air, delays, living site, surfaces
 	$(BIN)/python benchmarks/bench_reduce.py
 	$(BIN)/python benchmarks/bench_phase.py
 	$(BIN)/python benchmarks/bench_positions.py
@@ -39,6 +39,9 @@ bench: setup  ## benchmarks, as ratios in one run: the main job, phases, positio
 	$(BIN)/python benchmarks/bench_pointing.py
 	$(BIN)/python benchmarks/bench_air.py
 	$(BIN)/python benchmarks/bench_delay.py
+	$(BIN)/python benchmarks/bench_live.py
+	$(BIN)/python benchmarks/bench_surface.py
+	$(BIN)/python benchmarks/bench_structure.py
 
 release: setup  ## a wheel in dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
