@@ -1,13 +1,12 @@
 """Acoustic paths as JSON, tables and words."""
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from catseye.constants import PPM
+from catseye.gateways.written import csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.acoustic_recording import AcousticPath
@@ -113,7 +112,7 @@ def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
         for k in np.flatnonzero(path.used)
     ]  # fmt: skip
     rows.sort(key=lambda row: row[0])
-    return _csv(MARK.split(","), [(f"{t:.8f}", a, b, f"{c:.4f}", f"{u:.4f}") for t, a, b, c, u in rows])
+    return csv_text(MARK.split(","), [(f"{t:.8f}", a, b, f"{c:.4f}", f"{u:.4f}") for t, a, b, c, u in rows])
 
 
 def shots_csv(paths: Sequence["AcousticPath"]) -> str:
@@ -135,15 +134,7 @@ def shots_csv(paths: Sequence["AcousticPath"]) -> str:
             cells = ("" if not np.isfinite(value) else format(float(value), form) for value, form in numbers)
             head = (f"{shots.mjd[k]:.8f}", path.sheet.ranger, path.sheet.target, shots.file[k])
             rows.append((*head, *cells, path.status(k)))
-    return _csv(TIMES, rows)
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue()
+    return csv_text(TIMES, rows)
 
 
 def words(path: "AcousticPath") -> list[tuple[str, str]]:

@@ -1,14 +1,12 @@
 """An EDM baseline as CSV tables."""
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM
 from catseye.gateways.baseline_objects import baseline_object, spans
+from catseye.gateways.written import cell, csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline import BaselineCalibration
@@ -23,17 +21,17 @@ OBSERVATIONS = (
 def pillars_csv(found: "BaselineCalibration") -> str:
     """Pillars along the line with their standard uncertainties."""
     rows = [
-        (name, f"{p['x']:.6f}", f"{p['y']:.6f}", _cell(p["height"], ".6f"), f"{p['u_x'] / MILLIMETRE:.4f}",
+        (name, f"{p['x']:.6f}", f"{p['y']:.6f}", cell(p["height"], ".6f"), f"{p['u_x'] / MILLIMETRE:.4f}",
          f"{p['u_y'] / MILLIMETRE:.4f}")
         for name, p in baseline_object(found)["pillars"].items()
     ]  # fmt: skip
-    return _csv(("pillar", "x_m", "y_m", "height_m", "u_x_mm", "u_y_mm"), rows)
+    return csv_text(("pillar", "x_m", "y_m", "height_m", "u_x_mm", "u_y_mm"), rows)
 
 
 def distances_csv(found: "BaselineCalibration") -> str:
     """Every pair of pillars: horizontal distance at the reference height, with its standard uncertainty."""
     rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in spans(found)]
-    return _csv(("from_pillar", "to_pillar", "distance_m", "u_distance_mm"), rows)
+    return csv_text(("from_pillar", "to_pillar", "distance_m", "u_distance_mm"), rows)
 
 
 def shot_residuals(found: "BaselineCalibration") -> np.ndarray:
@@ -64,25 +62,13 @@ def observations_csv(found: "BaselineCalibration") -> str:
             f"{way.chord[k] * 1e6:.4f}",
             f"{way.level[k] / MILLIMETRE:.4f}",
             f"{way.distance[k]:.7f}",
-            _cell(seen.direction[k] / DEGREE, ".7f"),
-            _cell(residual[k] / MILLIMETRE, "+.4f"),
-            _cell(w_shot[k], "+.3f"),
-            _cell(w_set[k], "+.3f"),
+            cell(seen.direction[k] / DEGREE, ".7f"),
+            cell(residual[k] / MILLIMETRE, "+.4f"),
+            cell(w_shot[k], "+.3f"),
+            cell(w_set[k], "+.3f"),
             found.rejected[k] or "used",
             seen.where[k],
         )
         for k in range(len(seen))
     ]
-    return _csv(OBSERVATIONS, rows)
-
-
-def _cell(value: Any, form: str) -> str:
-    return "" if value is None or not np.isfinite(value) else format(float(value), form)
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue()
+    return csv_text(OBSERVATIONS, rows)

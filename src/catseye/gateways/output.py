@@ -4,7 +4,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -149,6 +149,33 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
                         raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
             yield pieces
             fresh.write_text("".join(pieces), encoding="utf-8")
+            with deferred():
+                os.replace(fresh, where)
+        except OSError as problem:
+            raise InputError(f"{option} {path}: cannot be written: {problem.strerror or problem}") from problem
+        finally:
+            fresh.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[bytes], bool]) -> None:
+    """A file that appears whole or not at all.
+
+    path      new, or an earlier file of catseye
+    content   all of it
+    option    that named the file, for messages
+    ours      whether what stands there is catseye's
+
+    Raises InputError where another's file would be lost, and where nothing can be written.
+    """
+    where = path.resolve()
+    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
+    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+        try:
+            if where.is_dir():
+                raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
+            if where.exists() and not ours(where.read_bytes()):
+                raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
+            fresh.write_bytes(content)
             with deferred():
                 os.replace(fresh, where)
         except OSError as problem:

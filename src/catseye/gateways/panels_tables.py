@@ -1,14 +1,13 @@
 """A crew's work as CSV tables: the list of screws, actuators, panels, readings."""
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.constants import MILLIMETRE
 from catseye.gateways.panels_objects import screws
+from catseye.gateways.written import cell, csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.panel_job import PanelWork
@@ -28,11 +27,11 @@ def screws_csv(found: "PanelHeights") -> str:
     """Every screw of the panels read: where its corner is, and how to turn it."""
     rows = [
         (s.panel, s.corner, f"{s.x:.4f}", f"{s.y:.4f}", s.readings, _um(s.departure), _um(s.u_departure),
-         _um(s.relative), _um(s.u_relative), _cell(s.probability_within, ".4f"), _cell(s.turns, "+.3f"),
-         _cell(s.u_turns, ".3f"), s.verdict)
+         _um(s.relative), _um(s.u_relative), cell(s.probability_within, ".4f"), cell(s.turns, "+.3f"),
+         cell(s.u_turns, ".3f"), s.verdict)
         for s in screws(found)
     ]  # fmt: skip
-    return _csv(SCREWS, rows)
+    return csv_text(SCREWS, rows)
 
 
 def actuators_csv(found: "PanelHeights") -> str:
@@ -45,7 +44,7 @@ def actuators_csv(found: "PanelHeights") -> str:
         for c, name in enumerate(found.layout.corners) if np.isfinite(found.actuator[c])
     ]  # fmt: skip
     columns = ("corner", "x_m", "y_m", "mean_height_um", "u_mean_height_um", "shaft_height_um", "u_shaft_height_um")
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def panels_csv(work: "PanelWork") -> str:
@@ -63,7 +62,7 @@ def panels_csv(work: "PanelWork") -> str:
         "panel", "piston_um", "u_piston_um", "slope_x_urad", "slope_y_urad", "u_slope_x_urad", "u_slope_y_urad",
         "map_rms_um", "map_outlying_points",
     )  # fmt: skip
-    return _csv(columns, rows)
+    return csv_text(columns, rows)
 
 
 def readings_csv(found: "PanelHeights") -> str:
@@ -77,11 +76,11 @@ def readings_csv(found: "PanelHeights") -> str:
                 (readings.where[row], found.layout.corners[told.corner[tip]], found.layout.panels[told.panel[tip]],
                  readings.sessions[readings.session[row]], readings.member[row], readings.turn[row],
                  found.sheet.gauge[gauge].name, f"{readings.reading[row, gauge] / MILLIMETRE:.3f}",
-                 _um(told.rise[tip]), _um(fit.residual[k]), _cell(fit.standardised[k], "+.2f"),
-                 _cell(fit.redundancy[k], ".3f"), "used" if fit.active[k] else "left out")
+                 _um(told.rise[tip]), _um(fit.residual[k]), cell(fit.standardised[k], "+.2f"),
+                 cell(fit.redundancy[k], ".3f"), "used" if fit.active[k] else "left out")
             )  # fmt: skip
     rows.sort(key=lambda r: (int(r[0].split()[1]), r[6]))
-    return _csv(READINGS, rows)
+    return csv_text(READINGS, rows)
 
 
 def crew_csv(work: "PanelWork") -> str:
@@ -94,33 +93,16 @@ def crew_csv(work: "PanelWork") -> str:
             continue
         for kind, readers in (("member", members(found)), ("session", sessions(found))):
             rows += [
-                (when, kind, r.name, r.readings, _cell(r.degrees_of_freedom, ".1f"), _cell(r.variance_factor, ".4f"),
-                 _cell(r.low, ".4f"), _cell(r.high, ".4f"), _um(r.u_gauge), r.doubts, *(_um(v) for v in r.closure))
+                (when, kind, r.name, r.readings, cell(r.degrees_of_freedom, ".1f"), cell(r.variance_factor, ".4f"),
+                 cell(r.low, ".4f"), cell(r.high, ".4f"), _um(r.u_gauge), r.doubts, *(_um(v) for v in r.closure))
                 for r in readers
             ]  # fmt: skip
     columns = (
         "when", "kind", "name", "readings", "degrees_of_freedom", "variance_factor", "low", "high", "u_gauge_um",
         "doubts", "closure_a_um", "closure_b_um", "closure_c_um", "closure_d_um",
     )  # fmt: skip
-    return _csv(columns, rows)
-
-
-def lean_arcsec(found: "PanelHeights") -> np.ndarray:
-    """(m,) size of the lean read in every placement; nan where none was."""
-    return np.hypot(*found.readings.lean.T) / ARCSECOND
+    return csv_text(columns, rows)
 
 
 def _um(value: float) -> str:
-    return _cell(value * 1e6, ".2f")
-
-
-def _cell(value: Any, form: str) -> str:
-    return "" if value is None or not np.isfinite(value) else format(float(value), form)
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue()
+    return cell(value * 1e6, ".2f")

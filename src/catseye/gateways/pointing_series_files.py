@@ -1,8 +1,6 @@
 """The files of a pointing fit and of a track profile."""
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -25,7 +23,7 @@ from catseye.gateways.pointing_series_objects import (
     track_object,
 )
 from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable, join_tables
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.written import Files, csv_text, origin, write_files
 from catseye.records.pointing_model import FORMAT as MODEL
 from catseye.records.toml_text import record_toml
 from catseye.reduction.pointing_fit import PointingFit, SeriesComparison
@@ -85,15 +83,7 @@ def observations_csv(fit: PointingFit, observed: Observed) -> str:
         )
         for k, where in enumerate(observed.where)
     ]
-    return _csv(OBSERVATIONS, rows)
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue()
+    return csv_text(OBSERVATIONS, rows)
 
 
 def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, when: datetime) -> str:
@@ -170,7 +160,7 @@ def tilt_csv(found: TrackProfile) -> str:
         [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
         for a, t, q in zip(azimuth, tilt, spread, strict=True)
     ]
-    return _csv(("azimuth_deg", "tilt_east_arcsec", "tilt_north_arcsec", "u_east_arcsec", "u_north_arcsec"), rows)
+    return csv_text(("azimuth_deg", "tilt_east_arcsec", "tilt_north_arcsec", "u_east_arcsec", "u_north_arcsec"), rows)
 
 
 def track_rows(found: TrackProfile) -> list[tuple[str, str, str]]:

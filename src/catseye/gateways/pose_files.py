@@ -30,7 +30,6 @@ HEADER = (
     "residual_z_mm",
     "w",
 )
-FILES = ("report.html", "points.csv", "pose.json")
 
 
 def write_pose(found: PoseResult, directory: Path, inputs: Mapping[str, str], settings: Mapping[str, Any]) -> None:

@@ -10,8 +10,6 @@ import csv
 import hashlib
 import io
 import json
-import os
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,9 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye import __version__
 from catseye.errors import InputError
-from catseye.gateways.interruption import deferred
 from catseye.gateways.objects import json_page
-from catseye.gateways.output import PROVENANCE
+from catseye.gateways.output import PROVENANCE, write_whole
 from catseye.records.record import EARLIEST_MJD, LATEST_MJD
 
 MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
@@ -122,23 +119,8 @@ def write_samplers(path: Path, tables: Mapping[str, SamplerTable], *, option: st
 
     Raises InputError where another's file would be lost, nothing can be written, or FITS cannot hold a value.
     """
-    content = sampler_tables(tables)
-    where = path.resolve()
-    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    try:
-        if where.is_dir():
-            raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
-        if where.exists():
-            with where.open("rb") as stream:
-                if f"{MARK:<8}=".encode() not in stream.read(2880):
-                    raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
-        fresh.write_bytes(content)
-        with deferred():
-            os.replace(fresh, where)
-    except OSError as problem:
-        raise InputError(f"{option} {path}: cannot be written: {problem.strerror or problem}") from problem
-    finally:
-        fresh.unlink(missing_ok=True)
+    mark = f"{MARK:<8}=".encode()
+    write_whole(path, sampler_tables(tables), option=option, ours=lambda content: mark in content[:2880])
 
 
 def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]) -> None:

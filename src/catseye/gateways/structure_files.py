@@ -1,8 +1,6 @@
 """All files of a structure's model or of its vibration: tables, object, report, samplers, provenance."""
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,7 @@ from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.samplers_fits import SAMPLERS, join_samplers
 from catseye.gateways.structure_figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure_objects import FORMAT, structure_samplers, vibration_object, vibration_samplers
-from catseye.gateways.written import Files, Progress, origin, write_files
+from catseye.gateways.written import Files, Progress, cell, csv_text, origin, write_files
 from catseye.reduction.structure_check import LeaveOut
 from catseye.reduction.structure_series import Prediction, StructureFit
 from catseye.reduction.vibration import Vibration
@@ -79,7 +77,7 @@ def coefficients_csv(fit: StructureFit) -> str:
         (name, *(f"{v:.6f}" for v in six[:, k] / units), *(f"{v:.6f}" for v in u[:, k] / units))
         for k, name in enumerate(fit.model.functions)
     ]
-    return _csv(("function", *names, *(f"u_{name}" for name in names)), rows)
+    return csv_text(("function", *names, *(f"u_{name}" for name in names)), rows)
 
 
 def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
@@ -91,13 +89,19 @@ def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
     head += [f"left_out_{a}_mm" for a in "xyz"] + [f"u_left_out_{a}_mm" for a in "xyz"] if check is not None else []
     rows = []
     for t, p in zip(*np.nonzero(np.isfinite(fit.fit.residual).all(axis=2)), strict=True):
-        row = [s.labels[t], _cell(s.mjd[t], ".8f"), f"{e[t] / DEGREE:.6f}", _cell(warm[t], ".3f"), f"{s.way[t]:+.0f}"]
+        row = [
+            s.labels[t],
+            cell(s.mjd[t], ".8f"),
+            f"{e[t] / DEGREE:.6f}",
+            cell(warm[t], ".3f"),
+            f"{s.way[t]:+.0f}",
+        ]
         row += [s.names[p], *(f"{v:.4f}" for v in fit.fit.residual[t, p] / MILLIMETRE)]
         if check is not None:
-            row += [_cell(v, ".4f") for v in check.residual[t, p] / MILLIMETRE]
-            row += [_cell(v, ".4f") for v in np.sqrt(np.diag(check.covariance[t, p])) / MILLIMETRE]
+            row += [cell(v, ".4f") for v in check.residual[t, p] / MILLIMETRE]
+            row += [cell(v, ".4f") for v in np.sqrt(np.diag(check.covariance[t, p])) / MILLIMETRE]
         rows.append(row)
-    return _csv(head, rows)
+    return csv_text(head, rows)
 
 
 def prediction_csv(predicted: Prediction, asked: Mapping[str, Any]) -> str:
@@ -107,9 +111,9 @@ def prediction_csv(predicted: Prediction, asked: Mapping[str, Any]) -> str:
         for i, name in enumerate(predicted.names):
             u = np.sqrt(np.diag(predicted.covariance[k, i])) / MILLIMETRE
             place = (f"{v:.7f}" for v in predicted.place[k, i])
-            rows.append((f"{e:.6f}", _cell(asked["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
+            rows.append((f"{e:.6f}", cell(asked["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
     head = ("elevation_deg", "temperature_c", "point", "x_m", "y_m", "z_m", "u_x_mm", "u_y_mm", "u_z_mm")
-    return _csv(head, rows)
+    return csv_text(head, rows)
 
 
 def spectra_csv(found: Vibration) -> str:
@@ -120,19 +124,7 @@ def spectra_csv(found: Vibration) -> str:
         for a, s in enumerate(found.series)
         for k, x in enumerate(f)
     ]
-    return _csv(("series", "frequency_hz", "density_m2_per_hz", "low_95_m2_per_hz", "high_95_m2_per_hz"), rows)
-
-
-def _cell(value: Any, form: str) -> str:
-    return "" if value is None or not np.isfinite(value) else format(float(value), form)
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return stream.getvalue()
+    return csv_text(("series", "frequency_hz", "density_m2_per_hz", "low_95_m2_per_hz", "high_95_m2_per_hz"), rows)
 
 
 def _structure_page(

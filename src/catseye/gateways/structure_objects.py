@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, ZERO_CELSIUS_K
+from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
 from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable
 from catseye.geometry.deformation import COMPONENTS
 from catseye.reduction.structure_check import LeaveOut
@@ -227,8 +227,3 @@ def vibration_samplers(found: Vibration, zero_mjd: float) -> dict[str, SamplerTa
         comment="Ranges, at the middles of their buffers.",
     )
     return {"SPECTRA": spectra, "RANGES": ranges}
-
-
-def millimetres(values: Any) -> str:
-    """Numbers in mm, two decimals, for people."""
-    return ", ".join(f"{v / MILLIMETRE:.3f}" for v in values)

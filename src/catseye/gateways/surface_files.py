@@ -1,7 +1,5 @@
 """All files of a surface, and the table of its actuators."""
 
-import os
-import secrets
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -9,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.interruption import deferred, undone_when_interrupted
 from catseye.gateways.objects import json_page
-from catseye.gateways.output import whole_file
+from catseye.gateways.output import whole_file, write_whole
 from catseye.gateways.samplers_fits import join_tables
 from catseye.gateways.surface_objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
 from catseye.gateways.surface_report import SurfaceResult, surface_report
@@ -90,27 +87,9 @@ def write_actuators(found: SurfaceResult, path: Path) -> None:
         with whole_file(path, "--actuators", ACTUATOR_MARK) as pieces:
             pieces.append(actuators_csv(rows))
     elif ending == ".fits":
-        _write_fits(path, actuators_fits(rows))
+        write_whole(path, actuators_fits(rows), option="--actuators", ours=_ours)
     else:
         raise InputError(f"--actuators {path}: ends in {ending!r} (expected .csv or .fits)")
-
-
-def _write_fits(path: Path, content: bytes) -> None:
-    where = path.resolve()
-    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
-        try:
-            if where.is_dir():
-                raise InputError(f"--actuators {path}: is a directory (expected the name of a file)")
-            if where.exists() and not _ours(where.read_bytes()):
-                raise InputError(f"--actuators {path}: exists and is not catseye's (expected a new name)")
-            fresh.write_bytes(content)
-            with deferred():
-                os.replace(fresh, where)
-        except OSError as problem:
-            raise InputError(f"--actuators {path}: cannot be written: {problem.strerror or problem}") from problem
-        finally:
-            fresh.unlink(missing_ok=True)
 
 
 def _ours(content: bytes) -> bool:

@@ -1,13 +1,12 @@
 """Tables of a surface: prisms, Zernike terms, look-up table, actuators; CSV with the unit in each name, and FITS."""
 
-import csv
 import io
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
+from catseye.gateways.written import csv_text
 from catseye.optics.zernike import Numbering, number
 from catseye.records.actuators import ActuatorCorrection
 from catseye.reduction.surface_change import Change
@@ -22,16 +21,6 @@ ZERNIKE = (
 ACTUATOR_MARK = ",".join(ActuatorCorrection.model_fields)  # the header, by which a file is known as ours
 
 
-def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Numbers as Python writes them; empty where there is none."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow(["" if isinstance(cell, float) and cell != cell else cell for cell in row])
-    return text.getvalue()
-
-
 def prisms_csv(shape: Shape) -> str:
     """A row a prism, in the fitted paraboloid's frame; the weight is its share of the illumination."""
     u = np.sqrt(np.diag(shape.fit.deviation_covariance)) / MILLIMETRE
@@ -44,7 +33,7 @@ def prisms_csv(shape: Shape) -> str:
         shape.weights.tolist(),
         strict=True,
     )
-    return _csv(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
+    return csv_text(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
 
 
 def change_csv(change: Change) -> str:
@@ -59,7 +48,7 @@ def change_csv(change: Change) -> str:
         change.weights.tolist(),
         strict=True,
     )
-    return _csv(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
+    return csv_text(PRISMS, ((name, *place, d, s, h, w) for name, place, d, s, h, w in cells))
 
 
 def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
@@ -74,7 +63,7 @@ def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
         value, spread, joint, u_j, ortho, u_o = (float(column[k]) for column in columns)
         share = float(expansion.share[k])
         rows.append((number(term, numbering), term.n, term.m, term.name, value, spread, share, joint, u_j, ortho, u_o))
-    return _csv(ZERNIKE, rows)
+    return csv_text(ZERNIKE, rows)
 
 
 def lookup_csv(lookup: Lookup) -> str:
@@ -91,7 +80,7 @@ def lookup_csv(lookup: Lookup) -> str:
         for e, elevation in enumerate(lookup.table_deg)
         for k, model in enumerate(lookup.models)
     ]
-    return _csv(("elevation_deg", "number", "name", *header), rows)
+    return csv_text(("elevation_deg", "number", "name", *header), rows)
 
 
 def epochs_csv(lookup: Lookup) -> str:
@@ -114,12 +103,12 @@ def epochs_csv(lookup: Lookup) -> str:
         for t, shape in enumerate(lookup.shapes)
         for k, model in enumerate(lookup.models)
     ]
-    return _csv(header, rows)
+    return csv_text(header, rows)
 
 
 def actuators_csv(rows: Iterable[ActuatorCorrection]) -> str:
     """A row an actuator, which `read_corrections` reads back without the loss of a bit."""
-    return _csv(tuple(ActuatorCorrection.model_fields), (tuple(row.model_dump().values()) for row in rows))
+    return csv_text(tuple(ActuatorCorrection.model_fields), (tuple(row.model_dump().values()) for row in rows))
 
 
 def actuators_fits(rows: Sequence[ActuatorCorrection]) -> bytes:

@@ -1,7 +1,10 @@
 """The files of a result, written one by one, and last the provenance with the hashes of all."""
 
+import csv
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -45,3 +48,18 @@ def write_files(files: Files, directory: Path, provenance: Mapping[str, Any], pr
     (directory / PROVENANCE).write_bytes(json_page({**provenance, "outputs": outputs}).encode("utf-8"))
     if progress is not None:
         progress("writing", len(files), len(files))
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table's text; a number that is none is an empty cell."""
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if isinstance(each, float) and math.isnan(each) else each for each in row])
+    return stream.getvalue()
+
+
+def cell(value: Any, form: str) -> str:
+    """A number as a cell; empty where there is none."""
+    return "" if value is None or not math.isfinite(value) else format(float(value), form)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from catseye.reduction.panel_model import flat_means
 from catseye.reduction.panels import PanelHeights, weighed_squares
 
 SURE = 0.95  # probability from which a corner counts as within, or (1 - it) as outside
@@ -192,8 +191,3 @@ def zeros(found: PanelHeights) -> list[tuple[str, np.ndarray, np.ndarray]]:
         value, u = found.value(at.zero(np.full(4, s), gauge))
         told.append((name, value, u))
     return told
-
-
-def flat_readings(found: PanelHeights) -> np.ndarray:
-    """(s, 4) how often each gauge read the flat."""
-    return flat_means(found.readings, found.sheet)[1]
