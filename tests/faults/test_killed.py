@@ -39,8 +39,8 @@ def server():
 class Killer:
     """Kills one part at a moment drawn, starts it again, and waits until it measures; keeps the times, s."""
 
-    def __init__(self, site, seed, server=None):
-        self.site, self.server, self.draw = site, server, random.Random(seed)
+    def __init__(self, site, seed, server=None, longest=1.5):
+        self.site, self.server, self.draw, self.longest = site, server, random.Random(seed), longest
         self.times = {}
 
     def kill(self, kind):
@@ -49,9 +49,9 @@ class Killer:
     def _noted(self, kind, seconds):
         self.times.setdefault(kind, []).append(seconds)
 
-    def _a_while(self, longest=1.5):
+    def _a_while(self):
         """A time drawn; every second one ends just when something is acknowledged, which must be durable by then."""
-        self.site.client.read(self.draw.uniform(0.0, longest))
+        self.site.client.read(self.draw.uniform(0.0, self.longest))
         heard, have = self.site.heard[-1], len(self.site.heard[-1].lines)
         if self.draw.random() < 0.5:
             assert self.site.client.read(PATIENCE, lambda: len(heard.lines) > have)
@@ -158,9 +158,9 @@ def assert_another_may_write(place):
         assert journal.run > before  # PostgreSQL leaves out up to 32 numbers when it was killed
 
 
-def killed(place, folder, kinds, seed, server=None):
+def killed(place, folder, kinds, seed, server=None, longest=1.5):
     with living_site(place, folder) as site:
-        killer = Killer(site, seed, server)
+        killer = Killer(site, seed, server, longest)
         for kind in kinds:
             killer.kill(kind)
         site.measuring()
@@ -251,7 +251,7 @@ def test_killed_at_a_hundred_moments_a_file_loses_and_doubles_nothing(tmp_path):
 @pytest.mark.slow
 def test_killed_at_a_hundred_moments_a_server_loses_and_doubles_nothing(server, tmp_path):
     kinds = mixed(OF_A_SERVER, 4)
-    times, counts = killed(server.database("hundred"), tmp_path, kinds, seed=4, server=server)
+    # A database that is down holds up what a file would have taken: longer between two kills.
+    times, counts = killed(server.database("hundred"), tmp_path, kinds, seed=4, server=server, longest=6.0)
     assert_quick(times)
-    # A database that is down holds up what a file would have taken: 642 on a busy machine.
-    assert counts[0] > 5 * len(kinds)
+    assert counts[0] > 1000

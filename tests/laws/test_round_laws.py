@@ -75,8 +75,9 @@ def moves_of(planned, told):
 def violations(moves, own, looks=17):
     """How many moves come into the cone, and how many into a box.
 
-    Moves that begin in the cone or the guard's margin of it, where the Sun or the telescope brought the beam: how many
-    do not leave it, or come nearer by the mirror's own turn (the telescope's, 0.3 deg/s at most, is not the planner's).
+    A beam that begins outside the cone stays outside, whether mirror, Sun or telescope moves it. One that begins in it
+    or in the guard's margin, where Sun or telescope brought it, leaves, and comes no nearer by the mirror's own turn:
+    what the telescope turns meanwhile, 0.3 deg/s at most, is not the planner's.
     """
     into_sun = into_box = 0
     ticks = np.array([m[3] for m in moves])
@@ -97,11 +98,9 @@ def violations(moves, own, looks=17):
             up = suns[:, 2].max() > np.sin(-1.99 * DEGREE)
             begins = apart[:, 0] < CONE + 0.16 * DEGREE  # inside the guard's margin: it may leave, and come no nearer
             turned = angle(beams(name, counts, own, np.repeat(times[:, :1], counts.shape[1], axis=1)), sun[:, :1])
-            bad = np.where(
-                begins,
-                (apart[:, -1] < CONE) | (turned.min(axis=1) < turned[:, 0] - 0.01 * DEGREE),
-                apart.min(axis=1) < CONE - SLACK,
-            )
+            nearer = (apart[:, -1] < CONE) | (turned.min(axis=1) < turned[:, 0] - 0.01 * DEGREE)
+            enters = (apart[:, 0] >= CONE) & (apart.min(axis=1) < CONE - SLACK)
+            bad = enters | (begins & nearer)
             into_sun += int(np.sum(bad & up))
             if mode == "together":  # boxes are asked for along the axes' profiles
                 inside = hits(origin(name, own, times), u)

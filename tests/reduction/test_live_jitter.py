@@ -41,7 +41,7 @@ def test_it_learns_what_the_bodies_do(true):
     for _ in range(60):
         jitter.learn(ranges(rng, PAIRS, shake=true, jitter=jitter), BODIES)
     # 144 redundant shots of each in the memory of ten epochs: 6 % of a standard deviation; the noise adds to the small
-    assert jitter.mm["arm"] == pytest.approx(true["arm"], rel=0.25)
+    assert jitter.mm["arm"] == pytest.approx(true["arm"], rel=0.2)
     assert jitter.mm["dish"] == pytest.approx(true["dish"], rel=0.3)
 
 

@@ -1,4 +1,4 @@
-"""Pose and beam against an independent ray trace of a paraboloid, and claimed covariances against scatter."""
+"""Pose and beam against the twin's ray trace of the paraboloid, and claimed covariances against scatter."""
 
 from types import SimpleNamespace
 
@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from beam_scene import FOCUS, F, beam
 from catseye.reduction.live_pose import beam_per_feed_shift, live_pose
 from catseye.reduction.live_state import REFERENCE_EPOCH, Carried, with_reference
+from catseye.simulator.twin_beam import TracedDish
 from live_scene import site
 
+F = 60.0  # m
+FOCUS = np.array([0.0, 0.0, F])
 DISH = {f"D{k}": np.array(p) for k, p in enumerate([(0, 10, 0.4), (-40, 50, 17.1), (40, 52, 17.9), (3, 98, 40.0)])}
 ARM = {f"A{k}": np.array(p) for k, p in enumerate([(-2, -4, 58), (2, -3, 59), (0, -1, 62), (1, -6, 50.0)])}
 BODIES = dict.fromkeys(DISH, "dish") | dict.fromkeys(ARM, "arm") | {"X": "alidade"}
@@ -53,7 +55,7 @@ def test_the_beam_goes_where_the_rays_go(v, azimuth, elevation):
     v = np.array(v)
     turn, shift, feed_turn, feed_shift = 5e-6 * v[:3], 2e-4 * v[3:6], 1e-5 * v[6:9], 4e-4 * v[9:]
     pose = live_pose(moved((turn, shift), (feed_turn, feed_shift)), BODIES, site())
-    direction = beam(turn, shift, FOCUS + feed_shift)
+    direction = TracedDish.of(site().site.paraboloid).beam(turn, shift, FOCUS + feed_shift)
     a, e = on_the_sky(direction, azimuth, elevation)
     off = (a - azimuth + np.pi) % (2 * np.pi) - np.pi
     # second order: turns of 5e-6 and shifts of 5e-4 m in 60 m, and what an arc of azimuth is off its cosine at 80 deg

@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from beam_scene import FOCUS, beam
 from catseye.geometry.frame import Transforms
 from catseye.records.live import TICKS_PER_DAY
 from catseye.reduction.live import LiveSettings
 from catseye.reduction.motion import ground_from
-from live_scene import Night, begun, deviations, lasting
+from catseye.simulator.twin_beam import TracedDish
+from live_scene import Night, begun, deviations, lasting, site
 
 TRACK, NIGHTS, FEWER, EPOCHS = "track 145.3 45", 60, 20, 8
 FAULTS = (
@@ -74,11 +74,9 @@ def true_offset(then, now, bodies):
             design.append(np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]]))
             change.append(now[n] - then[n])
         motion[body] = np.linalg.lstsq(np.vstack(design), np.concatenate(change), rcond=None)[0]
-    feed = FOCUS + motion["arm"][:3] + np.cross(motion["arm"][3:], FOCUS)
-    dish = motion["dish"]
-    x, y, _ = beam(dish[3:], dish[:3], feed)  # to the right of the axis, and away from the arm: down
-    relative = feed - FOCUS - dish[:3] - np.cross(dish[3:], FOCUS)
-    return np.array([x, -y, relative[2]])
+    dish = TracedDish.of(site().site.paraboloid)
+    shift, turn = motion["arm"][:3], motion["arm"][3:]
+    return dish.offset(motion["dish"], np.concatenate([shift + np.cross(turn, dish.focus), turn]))
 
 
 def tally(motion, seeds, epochs, **more):

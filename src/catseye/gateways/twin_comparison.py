@@ -16,9 +16,9 @@ from catseye.coordinator.journal_entries import AnsweredShot, Solution
 from catseye.estimation.datum import motions
 from catseye.records.site_folder import SiteFolder
 from catseye.reduction.live_bodies import bodies_of, lasting_names
-from catseye.reduction.live_pose import beam_per_feed_shift
 from catseye.reduction.motion import GROUND, frames_of, ground_from
 from catseye.simulator.twin import Twin
+from catseye.simulator.twin_beam import TracedDish
 
 Array = NDArray[np.float64]
 FEWEST_SHOTS = 3
@@ -71,8 +71,7 @@ class TwinComparison:
         self._site, self._twin, self._reference_after = site, twin, reference_after
         self._frames, self._bodies = frames_of(site), bodies_of(site, frames_of(site))
         self._lasting = frozenset(lasting_names(site))
-        self._focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
-        self._slopes = beam_per_feed_shift(site)
+        self._dish = TracedDish.of(site.site.paraboloid)
         self._middles: dict[int, float] = {}  # s since the twin's start, by number
         self._reference: dict[str, Array] = {}  # true places in the reflector frame, at the reference epoch
 
@@ -148,20 +147,16 @@ class TwinComparison:
         return np.array(pose["offset"], dtype=float), u, self._true_offset(riding)
 
     def _true_offset(self, own: Mapping[str, Array]) -> Array:
-        """By rigid motions of dish and arm fitted to the true places, all points alike; signs as in `live_pose`."""
-        focus = np.array([0.0, 0.0, self._focal])
+        """By rays, with the rigid motions of dish and arm that fit the true places, all points alike."""
         moved = {}
-        for body, pivot in (("dish", np.zeros(3)), ("arm", focus)):
+        for body, pivot in (("dish", np.zeros(3)), ("arm", self._dish.focus)):
             names = [n for n in own if n in self._reference and self._bodies[n] == body]
             if len(names) < FEWEST_POINTS:
                 return np.full(3, np.nan)
             rest = np.array([self._reference[n] for n in names])
             change = np.array([own[n] for n in names]) - rest
             moved[body] = np.linalg.lstsq(motions(rest, pivot, 1.0)[:, :6], change.ravel(), rcond=None)[0]
-        turn = moved["dish"][3:]
-        slip = moved["arm"][:3] - moved["dish"][:3] - np.cross(turn, focus)
-        across, along = self._slopes @ slip
-        return np.array([turn[1] + across, turn[0] - along, slip[2]])
+        return self._dish.offset(moved["dish"], moved["arm"])
 
 
 def _chi2(off: Array, covariance: Array) -> float:
