@@ -7,6 +7,7 @@ One reading of as-found.csv is 120 µm wrong: its line is said at the end.
 """
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,7 @@ def main() -> None:
     moved = screwed(solid, np.where(found.known, turn, 0.0) * sheet.screw.pitch_mm * 1e-3)
     rows, _ = taken(moved, sheet, Crew(rng), members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2), shafts=stands)
     (HERE / "as-left.csv").write_text("\n".join(rows) + "\n", "utf-8")
-    print(f"wrong: line {wrong + 1}, a_mm")  # noqa: T201
+    sys.stdout.write(f"wrong: line {wrong + 1}, a_mm\n")
 
 
 def write_maps(solid, directory: Path, rng: np.random.Generator) -> None:

@@ -78,7 +78,10 @@ def test_the_quadrature_is_that_of_another_kind():
         return np.exp(x - 0.5 * y) * np.cos(2 * y)
 
     nodes, weights = disk_quadrature(40)
-    reach = lambda x: np.sqrt(1 - x * x)  # noqa: E731
+
+    def reach(x):
+        return np.sqrt(1 - x * x)
+
     other = dblquad(lambda y, x: f(x, y), -1, 1, lambda x: -reach(x), reach, epsabs=1e-11)[0] / np.pi
     assert weights @ f(*nodes.T) == pytest.approx(other, abs=1e-9)
 

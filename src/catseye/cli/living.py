@@ -167,12 +167,12 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
     return SystemClock().now_ns() / PER_DAY
 
 
-def orders_of(**given: Any) -> Any:
-    """Of a coordinator, from the options."""
+def orders_of(*, drop: list[str] | None, **given: Any) -> Any:
+    """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
     from catseye.gateways.live_coordinator import Orders
 
-    port = given.pop("port")
-    return Orders(**given, **({} if port is None else {"port": port}))
+    names = tuple(name.upper() for name in drop or ())
+    return Orders(drop=names, **{key: value for key, value in given.items() if value is not None})
 
 
 def leave(run: "LiveRun[Any]", *, terminated: int = 143) -> None:

@@ -88,7 +88,7 @@ def serve(
     )
     orders = orders_of(
         mode=mode,
-        drop=tuple(name.upper() for name in drop or ()),
+        drop=drop,
         round_s=round_s,
         filter=filter_,
         journal=journal,
@@ -97,7 +97,7 @@ def serve(
         interlocks=interlocks,
         solids=solids,
         port=port,
-        **({} if host is None else {"host": host}),
+        host=host,
     )
 
     async def children(log: Any) -> None:

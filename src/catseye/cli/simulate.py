@@ -76,7 +76,7 @@ def simulate(
     world = World(begins, **told) if fast else World.starting_now(begins, **told).late(UNTIL_READY)
     free = fast or port_base == 0
     orders = orders_of(
-        drop=tuple(name.upper() for name in drop or ()),
+        drop=drop,
         round_s=round_s,
         filter=filter_,
         journal=journal,

@@ -93,7 +93,7 @@ def ziy(
     )
     orders = orders_of(
         mode=mode,
-        drop=tuple(name.upper() for name in drop or ()),
+        drop=drop,
         round_s=round_s,
         filter=filter_,
         journal=journal,
@@ -102,7 +102,7 @@ def ziy(
         interlocks=interlocks,
         solids=solids,
         port=port,
-        **({} if host is None else {"host": host}),
+        host=host,
     )
     run_coordinator(records, orders, rangers, source, offset=clock_offset_s, log_json=log_json, quiet=quiet)
 

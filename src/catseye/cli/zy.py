@@ -26,6 +26,8 @@ from catseye.cli.living import (
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from catseye.gateways.live_rangers import Listening, RangersServed
     from catseye.ranger.addresses import Addresses
     from catseye.records.site_folder import SiteFolder
@@ -150,15 +152,16 @@ def _say(at: "Listening", json: bool, quiet: bool) -> None:
             say_now(f"feed     listens at {at.feed[0]} port {at.feed[1]}")
 
 
-async def _served(served: "RangersServed", listening: object, with_stdin: bool) -> None:
+async def _served(served: "RangersServed", listening: "Callable[[Listening], None]", with_stdin: bool) -> None:
     import asyncio
+    import os
 
-    work = asyncio.ensure_future(served.serve(listening))  # type: ignore[arg-type]
+    work = asyncio.ensure_future(served.serve(listening))
     if with_stdin:
         loop = asyncio.get_running_loop()
 
         def heard() -> None:
-            if not sys.stdin.buffer.raw.read(4096):  # type: ignore[union-attr]
+            if not os.read(sys.stdin.fileno(), 4096):
                 loop.remove_reader(sys.stdin)
                 work.cancel()
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.pose_objects import FORMAT as POSE
 from catseye.geometry.pointing_series import PointingSeries, published
-from catseye.records.pointing_model import PointingModel
+from catseye.records.pointing_model import PointingModel, Term
 from catseye.records.reading import Folder, read_record
 from catseye.records.star_offsets import StarOffsets, read_star_offsets
 from catseye.reduction.pointing_fit import PointingFit, SeriesComparison
@@ -195,7 +195,7 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
     return PointingModel(
         format="catseye-pointing-series-1",
         name=name[:200] or "pointing",
-        terms=fit.series.terms,  # type: ignore[arg-type]
+        terms=cast("tuple[Term, ...]", fit.series.terms),
         values_arcsec=tuple(round(float(v), 6) for v in fit.series.values / ARCSECOND),
         covariance_arcsec2=tuple(tuple(float(f"{v:.12g}") for v in row) for row in 0.5 * (q + q.T)),
         sky_rms_arcsec=round(fit.sky_rms / ARCSECOND, 6),

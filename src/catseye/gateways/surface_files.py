@@ -8,14 +8,14 @@ from typing import Any
 
 from catseye.errors import InputError
 from catseye.gateways.objects import json_page
-from catseye.gateways.output import whole_file, write_whole
-from catseye.gateways.samplers_fits import join_tables
+from catseye.gateways.output import whole_file
+from catseye.gateways.samplers_fits import join_tables, write_samplers
 from catseye.gateways.surface_objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
 from catseye.gateways.surface_report import SurfaceResult, surface_report
 from catseye.gateways.surface_tables import (
     ACTUATOR_MARK,
     actuators_csv,
-    actuators_fits,
+    actuators_table,
     change_csv,
     epochs_csv,
     lookup_csv,
@@ -24,9 +24,6 @@ from catseye.gateways.surface_tables import (
 )
 from catseye.gateways.written import Files, Progress, origin, write_files
 from catseye.reduction.actuators import rows_of
-
-FITS_MARK = b"SIMPLE  ="
-ORIGIN = b"ORIGIN  = 'catseye"
 
 
 def surface_object(found: SurfaceResult) -> dict[str, Any]:
@@ -87,10 +84,6 @@ def write_actuators(found: SurfaceResult, path: Path) -> None:
         with whole_file(path, "--actuators", ACTUATOR_MARK) as pieces:
             pieces.append(actuators_csv(rows))
     elif ending == ".fits":
-        write_whole(path, actuators_fits(rows), option="--actuators", ours=_ours)
+        write_samplers(path, {"ACTUATORS": actuators_table(rows)}, option="--actuators")
     else:
         raise InputError(f"--actuators {path}: ends in {ending!r} (expected .csv or .fits)")
-
-
-def _ours(content: bytes) -> bool:
-    return content.startswith(FITS_MARK) and ORIGIN in content

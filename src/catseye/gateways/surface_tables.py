@@ -1,11 +1,11 @@
 """Tables of a surface: prisms, Zernike terms, look-up table, actuators; CSV with the unit in each name, and FITS."""
 
-import io
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
+from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable
 from catseye.gateways.written import csv_text
 from catseye.optics.zernike import Numbering, number
 from catseye.records.actuators import ActuatorCorrection
@@ -111,24 +111,11 @@ def actuators_csv(rows: Iterable[ActuatorCorrection]) -> str:
     return csv_text(tuple(ActuatorCorrection.model_fields), (tuple(row.model_dump().values()) for row in rows))
 
 
-def actuators_fits(rows: Sequence[ActuatorCorrection]) -> bytes:
-    """The same as one FITS binary table ACTUATORS; the unit of each column is in TUNIT, not in its name."""
-    from astropy.io import fits
-
-    columns = []
-    for name, field in ActuatorCorrection.model_fields.items():
-        cells = [getattr(row, name) for row in rows]
-        unit = "mm" if name.endswith("_mm") else "m" if name.endswith("_m") else None
+def actuators_table(rows: Sequence[ActuatorCorrection]) -> SamplerTable:
+    """The same as a table ACTUATORS of FITS samplers; the unit of each column is in TUNIT, not in its name."""
+    columns = {}
+    for name in ActuatorCorrection.model_fields:
+        unit = "mm" if name.endswith("_mm") else "m" if name.endswith("_m") else ""
         label = (name.removesuffix(f"_{unit}") if unit else name).upper()
-        if isinstance(cells[0], str):
-            text = np.array([cell.encode("ascii") for cell in cells])
-            columns.append(fits.Column(label, f"{text.dtype.itemsize}A", array=text))
-        elif field.annotation is int:
-            columns.append(fits.Column(label, "K", array=np.array(cells, dtype=np.int64)))
-        else:
-            columns.append(fits.Column(label, "D", unit=unit, array=np.array(cells, dtype=np.float64)))
-    page = fits.BinTableHDU.from_columns(columns, name="ACTUATORS")
-    page.header["ORIGIN"] = "catseye"
-    whole = io.BytesIO()
-    fits.HDUList([fits.PrimaryHDU(), page]).writeto(whole, checksum=True)
-    return whole.getvalue()
+        columns[label] = SamplerColumn(unit, [getattr(row, name) for row in rows])
+    return SamplerTable("ACTUATORS", columns, comment="corrections of a surface's actuators", frame="reflector")

@@ -179,7 +179,7 @@ def _many(mjd: NDArray[np.float64], place: Place) -> NDArray[np.float64]:
 @cache
 def _table() -> dict[str, Any]:
     """UT1 - TAI by day, free of steps; the steps of UTC (UT1 - UTC less UT1 - TAI) and where they start."""
-    from astropy_iers_data import IERS_A_FILE, IERS_B_FILE  # type: ignore[import-untyped]
+    from astropy_iers_data import IERS_A_FILE, IERS_B_FILE
 
     newer_mjd, newer_ut1, flag = _newer(IERS_A_FILE)
     with open(IERS_B_FILE, encoding="ascii") as stream:
