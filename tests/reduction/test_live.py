@@ -325,6 +325,29 @@ def test_a_return_from_elsewhere_is_rejected_and_moves_nothing(settled):
     assert np.abs((found.x - expected.x).ravel() / np.maximum(u, 1e-6)).max() < 1.0  # one shot's worth of 160
 
 
+def test_repeats_that_were_joined_are_told_one_by_one(settled):
+    """Two lines shot five times in a second: one clean, one whose light comes from elsewhere."""
+    _, live, feed = settled
+    bad = next(s for s in feed.shots if s.ranger == "ZY105" and s.target.startswith("ZEG"))
+    good = next(s for s in feed.shots if s.ranger == "ZY108" and s.target == bad.target)
+    night = Night(twin(seed=2, faults=(f"wrong-target ZY105:{bad.target}",)), 2)
+    more, number = [], max(s.number for s in feed.shots)
+    for shot in (bad, good):
+        begin = night.world.seconds_of_ticks(shot.ticks)
+        for k in range(1, 6):
+            number += 1
+            again = night.world.shot(shot.ranger, shot.target, night.on_tick(begin + 0.15 * k))
+            more.append(replace(again, number=number))
+    others = [item for item in feed.items if not (isinstance(item, LiveShot) and item is bad)]
+    Feed((*others, *more)).into(live)
+    answer = live.solve(night.ticks(3))
+    first, second = ({s.number for s in more if s.ranger == r} for r in ("ZY105", "ZY108"))
+    assert first <= answer.rejected.keys()
+    assert len({answer.rejected[n] for n in first}) < 5  # some of them were one row
+    assert second <= set(answer.used)
+    assert not (first | second) & (set(answer.used) & answer.rejected.keys())
+
+
 def test_without_posture_or_weather_it_waits_and_keeps_the_shots():
     world = twin("fixed 145.3 30", seed=1)
     night, live = Night(world), Live(world.site)

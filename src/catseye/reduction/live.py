@@ -335,11 +335,12 @@ class Live:
             pose = live_pose(self.carried, self.bodies, self.site)
         rows = epoch.rows
         used = [n for k, on in zip(ranges.shot, ranges.used, strict=True) if on for n in rows[int(k)].numbers]
-        rejected = {n: reason for k, reason in epoch.reasons.items() for n in rows[k].numbers}
+        why = dict(epoch.reasons)
         for row, on in enumerate(ranges.used):
             if not on:
                 text = f"range {ranges.residual[row] * 1e3:+.3f} mm off, w {ranges.standardised[row]:.1f}"
-                rejected |= dict.fromkeys(rows[int(ranges.shot[row])].numbers, f"reflected: {text}")
+                why[int(ranges.shot[row])] = f"reflected: {text}"
+        rejected = {n: reason for k, reason in why.items() for n in rows[k].numbers}
         return EpochAnswer(
             self.number,
             self.last_ticks,
