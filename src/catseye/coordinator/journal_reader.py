@@ -16,7 +16,6 @@ from catseye.coordinator.journal_place import place_of, reading_engine, refuse_f
 from catseye.coordinator.journal_rows import entry_of, unpack
 from catseye.coordinator.journal_tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, version_of
 from catseye.errors import InputError
-from catseye.records.live import TICKS_PER_DAY
 from catseye.records.site_folder import SiteFolder, read_site
 
 PIECE = 512  # events read at once: 8 MB where each is a buffer
@@ -47,11 +46,6 @@ class StoredRun:
     versions: dict[str, str]
     buffers: bool
     hashes: dict[str, str]
-
-    @property
-    def started_mjd(self) -> float:
-        """UTC."""
-        return self.started / TICKS_PER_DAY
 
 
 class JournalReader:

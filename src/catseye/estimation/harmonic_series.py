@@ -46,7 +46,7 @@ class Spread:
 class HarmonicFit:
     """What the epochs say.
 
-    rigid, u_rigid     (6, K) m and rad a unit of the body's functions, and standard uncertainties
+    rigid              (6, K) m and rad a unit of the body's functions
     own                (n, 3, m) m a unit of the points' functions
     own_covariance     (n, 3 m, 3 m), function by function
     cross              (n, 3 m, 6 K) between a point's own and the body's, function by function
@@ -76,11 +76,6 @@ class HarmonicFit:
     def variance_factor(self) -> float:
         """[pvv] / degrees of freedom, expectation 1; NaN without any."""
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom > 0 else float("nan")
-
-    @property
-    def u_rigid(self) -> Array:
-        """(6, K) standard uncertainties of `rigid`."""
-        return np.sqrt(np.diag(self.rigid_covariance)).reshape(-1, 6).T
 
     def displacement(self, body: Array, own: Array, arms: Array) -> Array:
         """Displacement (P, n, 3), m, in P epochs.

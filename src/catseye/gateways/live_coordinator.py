@@ -135,7 +135,7 @@ class LiveCoordinator:
         strange = sorted(set(orders.drop) - set(addresses))
         if strange:
             raise InputError(f"--drop {strange[0]}: no such ranger here (expected one of {', '.join(addresses)})")
-        self.site, self.orders, self._virtual = site, orders, virtual
+        self.site, self.orders = site, orders
         self.settings = LiveSettings(filter=orders.filter)
         self.live = Live(site, self.settings)
         keep_clear = KeepClear(site, None if orders.keep_out is None else read_record(orders.keep_out, KeepOut))
