@@ -1,15 +1,15 @@
 """What tests of every room share: the example night, read and reduced once."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import settings
+
+from repository import ROOT
 
 settings.register_profile("seeded", derandomize=True, deadline=None)  # the same examples on every machine
 settings.register_profile("explore", deadline=None, max_examples=300)  # for `make test-all`
 settings.load_profile("seeded")
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
+EXAMPLE = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="session")

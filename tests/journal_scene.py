@@ -14,8 +14,9 @@ import numpy as np
 from catseye.coordinator.journal_entries import AnsweredShot, Command, Document, Run, Solution
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import read_site
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[1] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 START = 5_288_912_500_000  # ticks
 SAMPLES, CYCLES = 16, 4
 MOST_WAIT = 30.0  # s for what other processes do; nothing here takes a tenth of it

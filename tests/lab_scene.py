@@ -5,7 +5,6 @@ in, none where it is None. `python tests/lab_scene.py` writes the examples of th
 """
 
 from datetime import date
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import quad
@@ -14,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, norm
 
 from catseye.records.readings import Readings
+from repository import ROOT
 
 ARC = np.pi / 180 / 3600
 TURN = 100_000.0
@@ -511,4 +511,4 @@ def said(value):
 
 if __name__ == "__main__":
     for each in EXAMPLES:
-        write_example(each, Path(__file__).parents[1] / "examples" / "calibrations")
+        write_example(each, ROOT / "examples" / "calibrations")

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from catseye.reduction.motion import ground_from
 from catseye.simulator.twin import Twin
 from catseye.simulator.twin_faults import Fault, FaultBoard
 from catseye.simulator.twin_motion import Motion
+from repository import ROOT
 
 START = 60635.125  # MJD, 22 h local mean time at Green Bank
 ROUND = 10.0  # s: a reference and nine targets a ranger
@@ -26,7 +26,7 @@ DISH = ("DP01C", "DP20C", "DP20P10", "DP33N15", "DP44C")
 @cache
 def site() -> SiteFolder:
     """Green Bank with five prisms on the dish: nothing else of it changes, and it is read in no time."""
-    whole = read_site(Path(__file__).parents[1] / "examples/sites/gbt")
+    whole = read_site(ROOT / "examples/sites/gbt")
     return replace(whole, targets={n: t for n, t in whole.targets.items() if not n.startswith("DP") or n in DISH})
 
 

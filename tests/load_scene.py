@@ -10,7 +10,6 @@ import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from pathlib import Path
 
 import numpy as np
 
@@ -25,8 +24,8 @@ from catseye.records.live import TICKS_PER_DAY
 from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
 from catseye.records.target import Target
 from catseye.simulator.world_clock import SystemClock
+from repository import ROOT
 
-ROOT = Path(__file__).parents[1]
 VOLTS_PER_CODE = 10.0 / 32768
 NOISE = 0.2  # V, of a sample
 VARIANTS = 4  # buffers of one place, each with its own noise

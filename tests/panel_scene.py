@@ -13,9 +13,10 @@ from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
 from catseye.reduction.panel_model import corner_places
 from catseye.simulator.panels import SolidPanels, screwed, solid_panels
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "panels"
-GBT = Path(__file__).parents[1] / "examples" / "sites" / "gbt"
+EXAMPLE = ROOT / "examples" / "panels"
+GBT = ROOT / "examples" / "sites" / "gbt"
 
 
 @cache

@@ -3,8 +3,6 @@
 The mount's turns come from scipy's rotations, the Sun from astropy, the axes' profiles from integrating their speeds.
 """
 
-from pathlib import Path
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -14,9 +12,9 @@ from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
 from catseye.reduction.earth_rotation import Place
 from catseye.reduction.guard import Guard
+from repository import ROOT
 
 DEGREE = np.pi / 180
-ROOT = Path(__file__).parents[1]
 LATITUDE_DEG, LONGITUDE_DEG, HEIGHT = 38.433, -79.84, 807.0
 GREEN_BANK = Place(LATITUDE_DEG * DEGREE, LONGITUDE_DEG * DEGREE, HEIGHT)
 MORNING = 52889.65  # 2003-09-07, 15:36 UTC: the Sun 50 degrees high in the south-east

@@ -1,7 +1,5 @@
 """The dish of the bundled site with planted half-path errors, measured prism by prism."""
 
-from pathlib import Path
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -11,8 +9,9 @@ from catseye.optics.zernike import zernike
 from catseye.records.site_folder import read_site
 from catseye.reduction.actuators import actuators_of
 from catseye.reduction.surface_shape import Aperture, Prisms
+from repository import ROOT
 
-SITE = read_site(Path(__file__).parents[1] / "examples" / "sites" / "gbt")
+SITE = read_site(ROOT / "examples" / "sites" / "gbt")
 APERTURE = Aperture.of(SITE.site.paraboloid)
 NAMES, PLACES = actuators_of(SITE)
 OWN = Transform("reflector", "reflector", np.eye(3), np.zeros(3))

@@ -2,7 +2,6 @@
 
 import copy
 import tomllib
-from pathlib import Path
 
 import numpy as np
 
@@ -10,8 +9,9 @@ from catseye.atmosphere.air import group_refractivity
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet_geometry import TripletReadings
 from catseye.simulator.triplet import POST, TripletScenes, TripletSheets, random_scenes, triplet_sheets
+from repository import ROOT
 
-SHEET = Path(__file__).parents[1] / "examples" / "triplets" / "TR99.toml"
+SHEET = ROOT / "examples" / "triplets" / "TR99.toml"
 N = 1.527077
 U = {"phase": 0.0005, "height": 0.003, "l_post": 0.002, "d12": 0.03, "glass": 0.002, "radius": 0.003, "ratio": 1e-5,
      "lateral": 0.05, "temperature": 0.05}  # fmt: skip

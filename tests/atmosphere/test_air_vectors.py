@@ -3,11 +3,12 @@
 import importlib
 import tomllib
 from operator import attrgetter
-from pathlib import Path
 
 import pytest
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "air.toml").read_text(encoding="utf-8"))["vector"]
+from repository import TESTS
+
+VECTORS = tomllib.loads((TESTS / "vectors" / "air.toml").read_text(encoding="utf-8"))["vector"]
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])

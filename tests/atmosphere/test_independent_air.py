@@ -18,9 +18,10 @@ import numpy as np
 import pytest
 
 from catseye.atmosphere import air, ciddor_hill1999, humidity
+from repository import ROOT, TESTS
 
-TABLE = Path(__file__).parents[1] / "vectors" / "independent_air.npz"
-STUDY = Path(__file__).parents[2] / "studies" / "lorentz_lorenz.py"
+TABLE = TESTS / "vectors" / "independent_air.npz"
+STUDY = ROOT / "studies" / "lorentz_lorenz.py"
 COUNT, SEED = 10_000, 1996
 # whole numbers are stored, so many to a °C, hPa, %, um, ppm; the answers to the units that follow
 STEPS = {"temperature_c": 100, "pressure_hpa": 10, "humidity_percent": 10, "wavelength_um": 10_000, "co2_ppm": 1}

@@ -3,7 +3,6 @@
 import importlib
 import tomllib
 from operator import attrgetter
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -19,8 +18,9 @@ from catseye.atmosphere.sound import (
 )
 from catseye.atmosphere.sound_dispersion import NITROGEN_K, OXYGEN_K, dispersion
 from catseye.errors import ValidityError
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "sound.toml").read_text(encoding="utf-8"))["vector"]
+VECTORS = tomllib.loads((TESTS / "vectors" / "sound.toml").read_text(encoding="utf-8"))["vector"]
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])

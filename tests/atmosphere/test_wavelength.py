@@ -1,7 +1,6 @@
 """Wavelengths in air: printed numbers, inverses, and the index of a modulation from its two sidebands."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ from mpmath import diff, mp, mpf
 from catseye.atmosphere import rueger1990, wavelength
 from catseye.atmosphere.air import group_refractivity, phase_refractivity
 from catseye.errors import EstimationError, ValidityError
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "path.toml").read_text(encoding="utf-8"))["vector"]
+VECTORS = tomllib.loads((TESTS / "vectors" / "path.toml").read_text(encoding="utf-8"))["vector"]
 STATE = (20.0, 933.0, 50.0)
 
 

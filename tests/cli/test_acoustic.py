@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ from catseye.records.reading import Folder
 from catseye.records.recording import read_sheet, wav_bytes, wav_samples
 from catseye.signal.delay import DelayPlan
 from catseye.signal.waveform import sampled
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "acoustic"
+EXAMPLE = ROOT / "examples" / "acoustic"
 FILES = [EXAMPLE / f"evening-{i}.wav" for i in (1, 2, 3, 4)]
 SHEET = EXAMPLE / "evening.toml"
 SECONDS = 86_400.0

@@ -2,12 +2,13 @@
 
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-DATA = Path(__file__).parents[2] / "examples" / "baselines" / "busselton"
+from repository import ROOT
+
+DATA = ROOT / "examples" / "baselines" / "busselton"
 TS30, TS16 = DATA / "ts30-baseline-observations.csv", DATA / "ts16-calibration-observations.csv"
 HEIGHTS = DATA / "pillar-heights.csv"
 KEYS = {"zero", "u_zero", "scale_ppm", "u_scale_ppm", "cyclic", "s", "degrees_of_freedom", "tests", "covariance"}

@@ -1,11 +1,12 @@
 """`catseye beam` as a user meets it."""
 
 import json
-from pathlib import Path
 
 import pytest
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "beams" / "head.toml"
+from repository import ROOT
+
+EXAMPLE = ROOT / "examples" / "beams" / "head.toml"
 
 
 @pytest.fixture

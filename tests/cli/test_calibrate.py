@@ -2,15 +2,15 @@
 
 import json
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.records.calibration import CalibrationRecord
 from catseye.records.reading import read_record
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "calibrations"
+EXAMPLES = ROOT / "examples" / "calibrations"
 # The truth of each example stands in the comment of its sheet.
 ARCSECOND = np.pi / 648_000
 TRUTH = {

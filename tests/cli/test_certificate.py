@@ -4,13 +4,13 @@ import hashlib
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from catseye.cli import certificate
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 ZY3, ZP3 = EXAMPLES / "monuments" / "ZY3.toml", EXAMPLES / "mirrors" / "ZP3.toml"
 
 

@@ -1,13 +1,13 @@
 """explain as programs call it: keys, statuses, streams, the page that appears whole or not at all."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 from catseye.gateways.explain_page import MARK
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 
 
 def test_a_shot_is_one_json_object_and_nothing_on_stderr(catseye):

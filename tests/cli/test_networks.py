@@ -1,12 +1,12 @@
 """adjust and plan as programs call them: keys, statuses, streams; every way a network can be bad ends in one line."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from repository import ROOT
+
 EXAMPLES = ROOT / "examples" / "networks"
 VECTORS = ROOT / "tests" / "vectors" / "networks"
 KEYS = {"points", "variance_factor", "degrees_of_freedom", "observations", "suspects", "status"}

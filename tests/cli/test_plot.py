@@ -2,11 +2,11 @@
 
 import json
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from repository import ROOT
+
 NIGHT = ROOT / "examples" / "night-01"
 SKY = [
     "sky", "--monument", NIGHT / "monuments/ZY103.toml", "--mirror", NIGHT / "mirrors/ZP103.toml",

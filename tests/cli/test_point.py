@@ -2,11 +2,11 @@
 
 import json
 import math
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from repository import ROOT
+
 ZY3, ZP3 = ROOT / "examples/monuments/ZY3.toml", ROOT / "examples/mirrors/ZP3.toml"
 NOTES = ["--monument", ZY3, "--mirror", ZP3]
 NIGHT = [

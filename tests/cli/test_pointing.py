@@ -2,15 +2,15 @@
 
 import json
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.pointing_series import published
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "pointing"
+EXAMPLES = ROOT / "examples" / "pointing"
 STARS, TILTS = EXAMPLES / "stars.dat", EXAMPLES / "tilts.csv"
 
 

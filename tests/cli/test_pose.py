@@ -1,15 +1,15 @@
 """`catseye pose` as a new user meets it: the example night against its design and against itself."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND
 from catseye.gateways.reduction_files import write_reduction
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="module")

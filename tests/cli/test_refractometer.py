@@ -2,12 +2,13 @@
 
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "refractometer" / "path-a.csv"
+from repository import ROOT
+
+EXAMPLE = ROOT / "examples" / "refractometer" / "path-a.csv"
 KEYS = {
     "path", "path_length", "group_index", "u_group_index", "phase", "mjd_utc", "temperature_c", "pressure_hpa",
     "humidity_percent", "phase_per_index", "budget", "slope", "thermometers", "drift", "noise", "variance_factor",

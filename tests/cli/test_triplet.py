@@ -1,13 +1,13 @@
 """`catseye triplet` as programs call it: keys, statuses, streams, files whole or not at all."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 import catseye.cli.triplet
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "triplets"
+EXAMPLES = ROOT / "examples" / "triplets"
 ONE, BAD, ODD = EXAMPLES / "TR99.toml", EXAMPLES / "TR04.toml", EXAMPLES / "TR05.toml"
 KEYS = {"h_corr", "l_mpbc", "difference", "accepted", "u_h_corr", "conformity_probability", "cycles", "memo_cycles"}
 

@@ -1,11 +1,11 @@
 """Every citation has its entry in the bibliography, every entry is cited."""
 
 import re
-from pathlib import Path
 
 from catseye.bibliography import SOURCES
+from repository import ROOT
 
-SOURCE_TREE = Path(__file__).parents[2] / "src" / "catseye"
+SOURCE_TREE = ROOT / "src" / "catseye"
 KEY = re.compile(r"\[([A-Z]{3,}\d{2,3})\]")
 BARE = re.compile(r"\b([A-Z]{3,}\d{2,3})\b")
 

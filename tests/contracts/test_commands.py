@@ -16,9 +16,9 @@ from catseye import __version__
 from catseye.atmosphere.air import MODELS
 from catseye.cli import commands
 from catseye.cli.commands import app, join_commands
+from repository import ROOT
 
 join_commands()
-ROOT = Path(__file__).parents[2]
 NIGHT = ROOT / "examples" / "night-01"
 WEATHER = ["--temperature-c", "20", "--pressure-hpa", "933", "--humidity-percent", "50"]
 COMMANDS = sorted(typer.main.get_command(app).commands)

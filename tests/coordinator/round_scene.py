@@ -6,7 +6,6 @@ Sun by astropy, the axes' profiles by integrating their speeds, boxes by slabs.
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,8 +17,8 @@ from catseye.records.keep_out import KeepOut
 from catseye.records.live import TICK_SECONDS, LivePosture
 from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
+from repository import ROOT
 
-ROOT = Path(__file__).parents[2]
 DAY = 100_000_000
 MORNING = 5_288_965_000_000  # 2003-09-07, 15:36 UTC: the Sun 50 degrees high in the south-east
 NIGHT = 5_288_920_000_000

@@ -30,6 +30,7 @@ from journal_scene import (
     scene_shot,
     scene_site,
 )
+from repository import TESTS
 
 
 @pytest.fixture(scope="module")
@@ -392,7 +393,7 @@ def test_a_dead_writers_lock_does_not_stay(tmp_path):
         "from catseye.simulator.world_clock import ManualClock\n"
         "Journal.open(sys.argv[1], run=scene_run(), clock=ManualClock(52889.125))\nos.kill(os.getpid(), 9)\n"
     )
-    place = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(__file__))}
+    place = {**os.environ, "PYTHONPATH": str(TESTS)}
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "j.db")], check=False, env=place)
     assert done.returncode == -9
     assert (tmp_path / "j.db.writer").exists()
@@ -412,7 +413,7 @@ def test_a_file_that_cannot_be_written_is_refused_in_one_line(tmp_path):
         "try:\n    Journal.open(sys.argv[1], run=run, clock=ManualClock(52889.125))\n"
         "except InputError as problem:\n    print(problem)\n"
     )
-    place = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(__file__))}
+    place = {**os.environ, "PYTHONPATH": str(TESTS)}
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         with opened(f"{folder}/j.db"):

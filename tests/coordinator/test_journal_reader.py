@@ -15,9 +15,9 @@ from catseye.coordinator.journal_reader import JournalReader
 from catseye.errors import InputError
 from catseye.simulator.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, plainly, scene_answer, scene_entries, scene_run
+from repository import TESTS
 
-FROZEN = Path(__file__).parents[1] / "vectors" / "formats" / "journal-1.db"
-TESTS = Path(__file__).parents[1]
+FROZEN = TESTS / "vectors" / "formats" / "journal-1.db"
 
 
 def written(path, entries, **more):

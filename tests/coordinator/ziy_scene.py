@@ -3,7 +3,6 @@
 import asyncio
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,13 +13,14 @@ from catseye.coordinator.ziy import Coordinator
 from catseye.records.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import read_site
 from coordinator.link_scene import COMMANDS, Free, LoopClock, MemoryJournal, Served, network, planned, until
+from repository import ROOT
 
 TARGETS = ("ZRG", "ZG11", "ZG12")
 
 
 @cache
 def gbt():
-    return read_site(Path(__file__).parents[2] / "examples" / "sites" / "gbt")
+    return read_site(ROOT / "examples" / "sites" / "gbt")
 
 
 @dataclass(frozen=True)

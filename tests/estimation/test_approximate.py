@@ -1,7 +1,6 @@
 """Points that have no coordinates are found from whatever ties them; those that cannot be are named with the reason."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,8 +29,9 @@ from catseye.estimation.observations import (
 )
 from catseye.geometry.rotation import from_vector
 from catseye.records.network import read_network
+from repository import TESTS
 
-MONITORING = Path(__file__).parents[1] / "vectors" / "networks" / "monitoring"
+MONITORING = TESTS / "vectors" / "networks" / "monitoring"
 ANGLE = 5e-6  # rad, about one arcsecond
 LENGTH = 1e-3  # m
 

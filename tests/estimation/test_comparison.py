@@ -2,7 +2,6 @@
 
 import csv
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,9 @@ from catseye.errors import EstimationError
 from catseye.estimation import comparison, epoch_model
 from catseye.estimation.comparison import compare
 from catseye.estimation.network_adjustment import adjust_network
+from repository import TESTS
 
-METRO = Path(__file__).parents[1] / "vectors" / "networks" / "monitoring"
+METRO = TESTS / "vectors" / "networks" / "monitoring"
 MONITORED = ("31", "32", "33", "34", "35", "41", "42", "43", "44", "45")
 CARRIED = ("201", "202", "203", "204", "211", "212", "213", "214")
 

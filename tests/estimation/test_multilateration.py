@@ -3,7 +3,6 @@
 import csv
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ from catseye.errors import EstimationError, InputError
 from catseye.estimation.adjustment import CONVERGED, adjust
 from catseye.estimation.multilateration import PointPriors, RangingNetwork, StationRanges, adjust_ranges, gauss_newton
 from catseye.estimation.observations import Linear
+from repository import TESTS
 
-FOLDER = Path(__file__).parents[1] / "vectors" / "networks" / "ranging-18x500"
+FOLDER = TESTS / "vectors" / "networks" / "ranging-18x500"
 ENGINES = ("numpy", "numba")
 
 

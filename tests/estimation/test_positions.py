@@ -1,7 +1,6 @@
 """Positions from many ranges: against scipy, an independently adjusted network, and scatter."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ from catseye.errors import EstimationError, InputError
 from catseye.estimation.positions import Status, positions
 from catseye.estimation.positions import dispatch as module
 from catseye.estimation.positions.descent import CAP, Ranges, descend
+from repository import TESTS
 
-NETWORK = Path(__file__).parents[1] / "vectors" / "networks" / "ranging-18x500"
+NETWORK = TESTS / "vectors" / "networks" / "ranging-18x500"
 UP = np.array([0.0, 0.0, 1.0])
 seeds = st.integers(0, 2**32 - 1)
 

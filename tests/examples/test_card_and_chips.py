@@ -1,7 +1,5 @@
 """The example of a real head, on simulated hardware that is spoken to in bytes."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,8 +8,9 @@ from catseye.ranger.head import Sampling
 from catseye.simulator.motor import AxisDesign
 from examples.byte_chip import ByteChip, Hardware, IrigClock
 from ranger.head_conformance import HeadConformance
+from repository import ROOT
 
-HEADS = Path(__file__).parents[2] / "examples" / "heads"
+HEADS = ROOT / "examples" / "heads"
 
 
 @pytest.fixture(autouse=True)

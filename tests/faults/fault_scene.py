@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
 
 from catseye.coordinator.journal_entries import AnsweredShot, Solution
 from catseye.gateways.live_coordinator import LiveCoordinator, Orders
@@ -21,6 +20,7 @@ from catseye.gateways.twin_comparison import EpochComparison, TwinComparison
 from catseye.records.live import Happening
 from catseye.records.site_folder import SiteFolder, read_site
 from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock
+from repository import ROOT
 
 START = 60635.125  # MJD, 22 h local mean time at Green Bank
 GROUND = ("ZY101", "ZY103", "ZY105", "ZY107", "ZY109", "ZY111")
@@ -33,7 +33,7 @@ GOOD = ("used", "reference")
 @cache
 def site() -> SiteFolder:
     """Green Bank with seven of its rangers and five prisms on the dish."""
-    whole = read_site(Path(__file__).parents[2] / "examples/sites/gbt")
+    whole = read_site(ROOT / "examples/sites/gbt")
     arm = tuple(r for r in whole.feedarm.ranger if r.name in ARM)
     return replace(
         whole,

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from catseye.errors import InputError
 from catseye.records import read_campaign
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 SHOTS = 30
 TEXT_FILES = (
     "site.toml",

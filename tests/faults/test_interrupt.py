@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from catseye.gateways.output import FORMAT
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 RUN = "from catseye.cli.main import run; run()"
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SOON = 5.0  # s, the contract's

@@ -1,13 +1,12 @@
-from pathlib import Path
-
 import pytest
 
 from catseye.gateways.output import whole_directory
 from catseye.gateways.reduction_files import write_reduction
 from catseye.records import read_campaign
 from catseye.reduction.epoch import reduce_epoch
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="session")

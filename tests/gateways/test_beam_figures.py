@@ -3,15 +3,15 @@
 import csv
 import io
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import pytest
 
 from catseye.errors import ValidityError
 from catseye.gateways.beam_figures import beam_figure, beam_object, coating_plot, lines, read_beam, write_beam
 from catseye.gateways.objects import json_line
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "beams" / "head.toml"
+EXAMPLE = ROOT / "examples" / "beams" / "head.toml"
 
 
 @pytest.fixture(scope="module")

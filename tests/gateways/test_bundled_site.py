@@ -13,8 +13,9 @@ from catseye.gateways import example
 from catseye.gateways.example import bundled_site, example_campaign, site_directory
 from catseye.records.site_folder import read_site, site_files
 from catseye.reduction.places import places_of
+from repository import ROOT
 
-SITES = Path(__file__).parents[2] / "examples" / "sites"
+SITES = ROOT / "examples" / "sites"
 TARGETS_OF_NIGHT = {"ZEG41040L", "ZEG20440L", "ZAG731P", "ZAG731D", *(f"ZBM{n:02d}" for n in range(1, 7))}
 FOCAL_LENGTH_MM, APERTURE_MM, RIM_MM = 60_000.0, 54_000.0, 50_000.0  # 100 m that begin 4 m from the vertex
 ROUNDING_MM = 0.001  # of each coordinate as written

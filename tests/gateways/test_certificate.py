@@ -5,7 +5,6 @@ import dataclasses
 import json
 import tomllib
 from datetime import UTC, date, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,9 @@ from catseye.records.calibration import CalibrationRecord
 from catseye.records.mirror import Mirror
 from catseye.records.reading import read_record
 from catseye.reduction.calibrations import calibrate
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "calibrations"
+EXAMPLES = ROOT / "examples" / "calibrations"
 MINE = ("reference-distance", "leakage", "leakage-lit", "linearity", "retroreflector", "amplitude-to-phase")
 WHEN = datetime(2026, 9, 2, 10, 0, tzinfo=UTC)
 

@@ -2,7 +2,6 @@
 
 import re
 from datetime import UTC, date, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,8 +25,9 @@ from catseye.gateways.field_report_fields import (
     written_value,
 )
 from catseye.geometry.mount import gamma, lambda_
+from repository import ROOT
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 ZY3, ZP3 = EXAMPLES / "monuments" / "ZY3.toml", EXAMPLES / "mirrors" / "ZP3.toml"
 WHEN = datetime(2026, 9, 2, 10, 0, tzinfo=UTC)
 

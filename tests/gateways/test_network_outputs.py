@@ -5,7 +5,6 @@ import hashlib
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,8 +29,9 @@ from catseye.gateways.network_xml import NAMESPACE, network_xml
 from catseye.records.gama import read_gama
 from catseye.records.network_folder import read_network_folder
 from catseye.reduction.networks import adjusted
+from repository import TESTS
 
-NETWORKS = Path(__file__).parents[1] / "vectors" / "networks"
+NETWORKS = TESTS / "vectors" / "networks"
 GON = np.pi / 200.0
 TRUTH = {  # x north, y east, z up, as the axes-xy "ne" says
     "A": (0.0, 0.0, 10.0),

@@ -4,7 +4,6 @@ import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from html.parser import HTMLParser
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -25,8 +24,9 @@ from catseye.gateways.network_report import network_report
 from catseye.gateways.network_summary import direction_words, passages, verdict
 from catseye.records.gama import read_gama
 from catseye.records.network_folder import read_network_folder
+from repository import TESTS
 
-NETWORKS = Path(__file__).parents[1] / "vectors" / "networks"
+NETWORKS = TESTS / "vectors" / "networks"
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 INPUTS = {"network.gkf": "ab" * 32}
 VOID = {"meta", "img", "link", "br"}

@@ -5,7 +5,6 @@ axis. Nothing of it knows the series.
 """
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,8 +22,9 @@ from catseye.geometry.pointing_series import (
     design,
     published,
 )
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "pointing.toml").read_text())
+VECTORS = tomllib.loads((TESTS / "vectors" / "pointing.toml").read_text())
 EAST, NORTH, UP = np.eye(3)
 small = st.floats(-20.0, 20.0)
 azimuths, elevations = st.floats(0.0, 2 * np.pi), st.floats(0.1, 1.35)

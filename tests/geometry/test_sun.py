@@ -1,16 +1,16 @@
 import tomllib
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
 from catseye.geometry.sun import LATEST_MJD, SUN_RATE, altitude_azimuth, apparent_geocentric, refracted, sun_direction
+from repository import TESTS
 from sun_scene import DEGREE, GREEN_BANK, apart, astropy_sun
 
 ARCSECOND = DEGREE / 3600
-TABLES = tomllib.loads((Path(__file__).parents[1] / "vectors" / "sun.toml").read_text(encoding="utf-8"))
+TABLES = tomllib.loads((TESTS / "vectors" / "sun.toml").read_text(encoding="utf-8"))
 AU = 149_597_870_700.0
 
 

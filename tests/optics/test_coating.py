@@ -1,7 +1,6 @@
 """Films against closed forms, conservation of energy, tabulated metals and another program."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,9 @@ from catseye.optics.coating import (
     response,
 )
 from catseye.optics.glass import group_index, phase_index
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "coating.toml").read_text())
+VECTORS = tomllib.loads((TESTS / "vectors" / "coating.toml").read_text())
 indices = st.builds(complex, st.floats(1.2, 3.0), st.floats(-4.0, 0.0))
 layers = st.lists(st.tuples(indices, st.floats(0.0, 0.5)), max_size=4).map(tuple)
 angles = st.floats(0.0, 1.5)

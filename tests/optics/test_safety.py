@@ -2,7 +2,6 @@
 
 import tomllib
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,9 @@ from catseye.optics.safety import (
 )
 from catseye.optics.safety_limits import CLASSES, class_limit, eye_limits, eye_mpe, factors, skin_limit
 from catseye.optics.safety_sweep import repetition_factor, sweep_hazard_distance, sweep_pulse, sweep_ratio
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "safety.toml").read_text(encoding="utf-8"))["vector"]
+VECTORS = tomllib.loads((TESTS / "vectors" / "safety.toml").read_text(encoding="utf-8"))["vector"]
 PUPIL_AREA = np.pi / 4 * 7e-3**2
 
 

@@ -1,15 +1,14 @@
 """Zernike terms: printed tables, orthonormality by exact quadrature over the site's aperture and on any prisms."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
 from catseye.optics.zernike import Term, disk_quadrature, number, orthonormal, term, terms, zernike
 from catseye.records.site_folder import read_site
+from repository import ROOT
 
-SITE = Path(__file__).parents[2] / "examples" / "sites" / "gbt"
+SITE = ROOT / "examples" / "sites" / "gbt"
 # [NOLL76] table I: n, m, and the polynomial as printed (r, angle)
 NOLL = {
     1: (0, 0, lambda r, t: 1.0 + 0.0 * r),

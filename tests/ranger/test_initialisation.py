@@ -1,7 +1,6 @@
 """What a ranger is told from a site's records, held against the records' own pointing."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,8 +29,9 @@ from catseye.reduction.places import nominal_frame, places_of
 from catseye.reduction.pointing import station_in
 from ranger.ranger_scene import Told
 from ranger.scripted_head import ScriptedHead
+from repository import ROOT
 
-GBT = Path(__file__).parents[2] / "examples" / "sites" / "gbt"
+GBT = ROOT / "examples" / "sites" / "gbt"
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,13 @@
 """Tables of actuators: read back without loss, refused in one line."""
 
-from pathlib import Path
-
 import pytest
 
 from catseye.errors import InputError
 from catseye.gateways.surface_tables import actuators_csv
 from catseye.records.actuators import read_corrections, read_positions
+from repository import TESTS
 
-FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
+FORMATS = TESTS / "vectors" / "formats"
 
 
 def test_a_table_of_corrections_is_read_back_to_the_bit():

@@ -1,15 +1,14 @@
 """Tables of an EDM baseline and BASELINE.toml: what is read, and every refusal in one line."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from catseye.errors import InputError
 from catseye.records.baseline import Baseline, baseline_text, read_baseline, read_heights, read_observations
+from repository import ROOT, TESTS
 
-VECTORS = Path(__file__).parents[1] / "vectors" / "baselines"
-TS30 = Path(__file__).parents[2] / "examples" / "baselines" / "busselton" / "ts30-baseline-observations.csv"
+VECTORS = TESTS / "vectors" / "baselines"
+TS30 = ROOT / "examples" / "baselines" / "busselton" / "ts30-baseline-observations.csv"
 RELEASED = VECTORS / "baseline-1.toml"
 
 

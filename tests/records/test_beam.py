@@ -1,14 +1,13 @@
 """The file of a beam train: what is read, and what is refused in one line."""
 
-from pathlib import Path
-
 import pytest
 
 from catseye.errors import InputError
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import read_record
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "beams" / "head.toml"
+EXAMPLE = ROOT / "examples" / "beams" / "head.toml"
 
 
 def test_the_example_loads_with_its_defaults():

@@ -2,7 +2,6 @@
 
 import hashlib
 from dataclasses import FrozenInstanceError
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +9,9 @@ from pydantic import ValidationError
 
 from catseye.errors import InputError
 from catseye.records import read_campaign
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """A file format once released always loads: one file a kind and version stays in tests/vectors/formats."""
 
 from datetime import date
-from pathlib import Path
 
 import pytest
 
@@ -28,8 +27,9 @@ from catseye.records.triplet import Triplet
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.records.weather import WeatherSample
 from catseye.reduction.refractometer_night import PathSheet
+from repository import TESTS
 
-FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
+FORMATS = TESTS / "vectors" / "formats"
 RECORDS: dict[str, type[Record]] = {
     "site-1.toml": Site,
     "monument-1.toml": Monument,

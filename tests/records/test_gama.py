@@ -2,7 +2,6 @@
 
 import csv
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,9 @@ from catseye.errors import InputError
 from catseye.estimation.observations import Joint, Vectors
 from catseye.records.gama import AXES, gama_network, read_gama
 from catseye.records.gama_xml import GON, Element, band_matrix
+from repository import TESTS
 
-VECTORS = Path(__file__).parents[1] / "vectors" / "networks"
+VECTORS = TESTS / "vectors" / "networks"
 MM, CC = 1e-3, 1e-4 * GON
 COMPASS = {"n": (0, 1), "s": (0, -1), "e": (1, 0), "w": (-1, 0)}
 

@@ -1,13 +1,12 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from catseye.errors import InputError
 from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "keep-out.toml"
+EXAMPLE = ROOT / "examples" / "keep-out.toml"
 ROOM = '[[box]]\nname = "room"\nwhy = "people"\n'
 
 

@@ -1,14 +1,13 @@
 """A mirror's sheet: what it may say of axes, amplitude coupling and cyclic deviation, and what belongs together."""
 
-from pathlib import Path
-
 import pytest
 
 from catseye.errors import InputError
 from catseye.records.mirror import Mirror
 from catseye.records.reading import read_record
+from repository import TESTS
 
-SHEET = (Path(__file__).parents[1] / "vectors" / "formats" / "mirror-1.toml").read_text(encoding="utf-8")
+SHEET = (TESTS / "vectors" / "formats" / "mirror-1.toml").read_text(encoding="utf-8")
 
 
 def sheet(tmp_path, more):

@@ -1,7 +1,5 @@
 """A network from a file or a folder: what is read, and the one line in which anything else is refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,9 +9,10 @@ from catseye.errors import InputError
 from catseye.estimation.observations import Coordinates, Distances
 from catseye.records.columns import columns_of
 from catseye.records.network import read_network
+from repository import ROOT, TESTS
 
-VECTORS = Path(__file__).parents[1] / "vectors" / "networks"
-EXAMPLES = Path(__file__).parents[2] / "examples" / "networks"
+VECTORS = TESTS / "vectors" / "networks"
+EXAMPLES = ROOT / "examples" / "networks"
 POINTS = """point,x,y,z,role
 S1,0,0,0,fixed
 S2,100,0,0,fixed

@@ -1,15 +1,14 @@
 """Our own network file: every kind and section once, and every key that is not ours refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from catseye.errors import InputError
 from catseye.estimation.observations import Distances
 from catseye.records.network import read_network
+from repository import TESTS
 
-FROZEN = Path(__file__).parents[1] / "vectors" / "formats" / "network-1.toml"
+FROZEN = TESTS / "vectors" / "formats" / "network-1.toml"
 ARCSEC = np.pi / 648_000
 # Where the points of the frozen file are: its observations were computed from these by formulas of their own.
 TRUTH = {

@@ -1,7 +1,6 @@
 """Pointing models, tables of tilts, solved points: read as written, refused with the place and what was expected."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from catseye.records.solved_points import read_solved_points
 from catseye.records.star_offsets import read_star_offsets
 from catseye.records.tilts import read_tilts
 from catseye.records.toml_text import record_toml
+from repository import TESTS
 
 MODEL = """\
 format = "catseye-pointing-series-1"
@@ -130,7 +130,7 @@ def test_points_that_cannot_be_used_are_refused(tmp_path, change, said):
         read_solved_points(written(tmp_path, **change))
 
 
-FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
+FORMATS = TESTS / "vectors" / "formats"
 
 
 def test_released_files_still_load():

@@ -3,7 +3,6 @@
 import io
 import struct
 import wave
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,9 @@ from scipy.io import wavfile
 
 from catseye.errors import InputError
 from catseye.records.recording import read_recording, read_sheet, wav_bytes, wav_samples
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "acoustic"
+EXAMPLE = ROOT / "examples" / "acoustic"
 CODES = np.random.default_rng(1).integers(-30_000, 30_000, (3, 500)).astype(np.int16)
 
 

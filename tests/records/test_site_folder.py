@@ -19,8 +19,9 @@ from catseye.records.reading import read_record
 from catseye.records.site_folder import SiteFolder, read_site, site_files
 from catseye.records.target import Target, Targets
 from catseye.records.toml_text import record_toml
+from repository import ROOT
 
-NIGHT = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT = ROOT / "examples" / "night-01"
 NIGHTLY = ("shots.csv", "frames.npy", "weather.csv", "README.md")
 RECORDS = ("site", "monuments", "mirrors", "feedarm", "targets", "triplets", "benchmarks")
 

@@ -1,14 +1,14 @@
 """The structural model's file: read, refused with key and value, written back without the loss of a bit."""
 
 import tomllib
-from pathlib import Path
 
 import pytest
 
 from catseye.errors import InputError
 from catseye.records.structural_model import read_structural_model, structural_model_toml
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "structural-model" / "telescope.toml"
+EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")
 
 

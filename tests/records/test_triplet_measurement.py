@@ -1,7 +1,5 @@
 """Sheets of measured triplets: what loads, and what is refused with file, key, value and expectation."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,9 +8,10 @@ from pydantic import ValidationError
 from catseye.errors import InputError
 from catseye.records.reading import read_record
 from catseye.records.triplet_measurement import TripletMeasurement
+from repository import TESTS
 from triplet_scene import SHEET, measurement
 
-FORMATS = Path(__file__).parents[1] / "vectors" / "formats"
+FORMATS = TESTS / "vectors" / "formats"
 
 
 def refused(tmp_path, old, new, count=1):

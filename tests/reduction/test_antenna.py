@@ -1,7 +1,5 @@
 """The antenna of a structural model: without motions it is eq. 2.44; with them a chain written out by hand; slopes."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,8 +11,9 @@ from catseye.geometry.deformation import Posture
 from catseye.geometry.rotation import rx, rz
 from catseye.records.structural_model import read_structural_model
 from catseye.reduction.antenna import SubreflectorPosition, antenna_of
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "structural-model" / "telescope.toml"
+EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
 POSTURE = Posture(0.9, np.radians(38.0), 3.0)
 FOOT = np.array([0.0, -8.0, 10.0])
 

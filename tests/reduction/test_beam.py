@@ -1,7 +1,5 @@
 """A beam train: power is accounted for, and each effect on a range is its own formula's."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,9 @@ from catseye.optics.detector import Photodiode, spot_range
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import read_record
 from catseye.reduction.beam import beam_profile, reduce_beam
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "beams" / "head.toml"
+EXAMPLE = ROOT / "examples" / "beams" / "head.toml"
 LIGHT = 0.78e-6
 
 

@@ -5,7 +5,6 @@ below agree on, not a truth from elsewhere.
 """
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,9 @@ import pytest
 from catseye.records.baseline import FORMAT, Baseline, baseline_text, read_baseline, read_heights, read_observations
 from catseye.reduction.baseline import calibrate_baseline, record_values
 from catseye.reduction.baseline_lengths import BaselineSettings
+from repository import ROOT
 
-DATA = Path(__file__).parents[2] / "examples" / "baselines" / "busselton"
+DATA = ROOT / "examples" / "baselines" / "busselton"
 TS30, TS16 = "ts30-baseline-observations.csv", "ts16-calibration-observations.csv"
 
 

@@ -1,15 +1,15 @@
 """Networks with answers from elsewhere: a textbook, established programs, an independent solver; see SOURCE."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.estimation.network_adjustment import adjust_network
 from catseye.records.network import read_network
+from repository import TESTS
 
-NETWORKS = Path(__file__).parents[1] / "vectors" / "networks"
+NETWORKS = TESTS / "vectors" / "networks"
 
 
 def answers(path):

@@ -1,7 +1,6 @@
 """Feed-arm rangers and moving targets: against the single-posture station, and by Monte Carlo through the chain."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,8 +18,9 @@ from catseye.reduction.antenna import SubreflectorPosition, antenna_of
 from catseye.reduction.moving_ranger import Driven, Known, moving_ranger, projected, tracked, vibrating
 from catseye.reduction.pointing import feed_arm_station
 from catseye.signal.vibration import Mode, follow, start
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "structural-model" / "telescope.toml"
+EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
 RANGER = FeedArmRanger(
     name="ZY113",
     zp="ZP113",

@@ -6,7 +6,6 @@ is its points with noise; the estimates only see the example as it is.
 
 from dataclasses import replace
 from datetime import date
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,9 @@ from catseye.records.structural_model import StructuralModel, read_structural_mo
 from catseye.reduction.antenna import UNITS, antenna_of
 from catseye.reduction.structure_corrections import Measured, correct_posture, frame_motion, measured_of
 from catseye.reduction.structure_fit import fit_model, updated_model
+from repository import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "structural-model" / "telescope.toml"
+EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
 POSTURE = Posture(0.9, np.radians(38.0), 3.0)
 GROUPS = ("bearings", "rim", "arm", "subreflector_rim")
 MOVED = ("alidade", "elevation", "reflector", "feed_arm", "subreflector")

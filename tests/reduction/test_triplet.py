@@ -1,7 +1,6 @@
 """The whole reduction of a triplet's sheet: numbers, combination of placements, acceptance."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +17,10 @@ from catseye.records.reading import read_record
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet import TOLERANCE, combined, conformity_probability, reduce_triplet, triplet_readings
 from catseye.reduction.triplet_geometry import half_wavelengths
+from repository import TESTS
 from triplet_scene import SHEET, N, document, measurement, noisy_unit
 
-VECTOR = tomllib.loads((Path(__file__).parents[1] / "vectors" / "triplet.toml").read_text(encoding="utf-8"))
+VECTOR = tomllib.loads((TESTS / "vectors" / "triplet.toml").read_text(encoding="utf-8"))
 EXAMPLES = SHEET.parent
 
 

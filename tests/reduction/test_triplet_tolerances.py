@@ -1,7 +1,6 @@
 """Appendices A and D: every printed bound, against mpmath, exact geometry and the air's own formula."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +11,9 @@ from catseye.atmosphere.air import group_refractivity
 from catseye.errors import ValidityError
 from catseye.optics import glass, prism
 from catseye.reduction import triplet_tolerances as t
+from repository import TESTS
 
-VECTORS = tomllib.loads((Path(__file__).parents[1] / "vectors" / "triplet_tolerances.toml").read_text("utf-8"))[
-    "vector"
-]
+VECTORS = tomllib.loads((TESTS / "vectors" / "triplet_tolerances.toml").read_text("utf-8"))["vector"]
 signed = st.floats(-0.15e-3, 0.15e-3)
 places = st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(17.9, 60.0))
 

@@ -1,7 +1,5 @@
 """Which ranger sees what, on the example night, with solids chosen for the test."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,13 +22,14 @@ from catseye.reduction.visibility import (
     retroreflectors_of,
     visibility,
 )
+from repository import ROOT
 
-TEXT = (Path(__file__).parents[2] / "examples" / "solids.toml").read_text(encoding="utf-8")
+TEXT = (ROOT / "examples" / "solids.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def solids():
-    return read_solids(Path(__file__).parents[2] / "examples" / "solids.toml")
+    return read_solids(ROOT / "examples" / "solids.toml")
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import math
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +9,9 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.signal.folding import fold
 from catseye.signal.phase import detect, phasors
+from repository import ROOT
 
-FRAMES = Path(__file__).parents[2] / "examples" / "night-01" / "frames.npy"
+FRAMES = ROOT / "examples" / "night-01" / "frames.npy"
 
 
 def literal(samples, n):

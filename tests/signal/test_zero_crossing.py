@@ -2,7 +2,6 @@
 
 import importlib.util
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +9,9 @@ from scipy.optimize import brentq
 
 from catseye.errors import ValidityError
 from catseye.signal.zero_crossing import crossing_phase, phase_between
+from repository import ROOT
 
-STUDY = Path(__file__).parents[2] / "studies" / "phase_estimators.py"
+STUDY = ROOT / "studies" / "phase_estimators.py"
 FINE = 4096
 
 

@@ -3,7 +3,6 @@
 import hashlib
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from catseye.simulator.faults import EFFECTS
 from catseye.simulator.twin import Twin
 from catseye.simulator.twin_conditions import LIVING_EFFECTS, LIVING_NIGHT, LivingPlanted
 from catseye.simulator.twin_motion import Motion
+from repository import ROOT
 
 START = 60_000.1  # MJD; 21 h local mean time at Green Bank
 ALL = (*EFFECTS, *LIVING_EFFECTS)
@@ -20,7 +20,7 @@ DISH = ("DP01C", "DP20C", "DP20P10", "DP33N15", "DP44C")
 
 @cache
 def whole_site() -> SiteFolder:
-    return read_site(Path(__file__).parents[2] / "examples/sites/gbt")
+    return read_site(ROOT / "examples/sites/gbt")
 
 
 @cache

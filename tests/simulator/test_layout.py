@@ -3,15 +3,15 @@
 import csv
 import re
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.errors import InputError
 from catseye.simulator import simulate_night
+from repository import ROOT
 
-NIGHT_01 = Path(__file__).parents[2] / "examples" / "night-01"
+NIGHT_01 = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from catseye.simulator.twin import Twin
 from catseye.simulator.twin_conditions import DEWY_NIGHT, STILL, LivingPlanted
 from catseye.simulator.twin_faults import Fault, FaultBoard
 from catseye.simulator.twin_motion import Motion
+from repository import TESTS
 from simulator.living_scene import START, digest, only, phasor, rms, site, twin, whole_site
 
 K = 4 * np.pi * 1.5e9 / SPEED_OF_LIGHT  # rad of phase a metre of optical path, one way: the light goes to and fro
@@ -342,7 +343,7 @@ def test_names_and_settings_that_the_site_does_not_have_are_refused():
 
 def test_two_processes_agree_bit_for_bit_and_two_seeds_do_not():
     code = "from simulator.living_scene import digest, twin; print(digest(twin('track 145 40', seed=7)))"
-    folder = str(Path(__file__).parents[1])
+    folder = str(TESTS)
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=folder)
     assert run.stdout.strip() == digest(twin("track 145 40", seed=7))
     assert run.stdout.strip() != digest(twin("track 145 40", seed=8))

@@ -1,7 +1,6 @@
 """A twin's head: the suite of all heads, its clock, its faults, its buffers, and a ranger that works with it."""
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +21,10 @@ from catseye.simulator.twin_mirror import travel_of
 from catseye.simulator.world_clock import ManualClock
 from ranger.head_conformance import HeadConformance
 from ranger.ranger_scene import CUBES, GEOMETRY
+from repository import ROOT
 
 START = 52889.125
-ZP3 = Path(__file__).parents[2] / "examples/mirrors/ZP3.toml"
+ZP3 = ROOT / "examples/mirrors/ZP3.toml"
 VELOCITY, ACCELERATION = velocity_integer(12_000), acceleration_integer(40_000)
 BY_COUNTS = np.array([1e-3, 2e-3])  # rad of phase a count: a world whose returns tell where the mirror is
 SHORT = Sampling(64, 8, 1000)

@@ -2,7 +2,6 @@
 
 import asyncio
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +15,9 @@ from catseye.simulator.twin_faults import Fault, FaultBoard
 from catseye.simulator.twin_site import TwinSite
 from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from ranger.clocked_head import ClockedHead
+from repository import ROOT
 
-GBT = Path(__file__).parents[2] / "examples" / "sites" / "gbt"
+GBT = ROOT / "examples" / "sites" / "gbt"
 SUN = {"ZY113": ("SUN 0, 0, 1",)}  # along the dish's axis: away from ZRG
 NIGHT = 52_889.125  # 22:00 at Green Bank
 

@@ -5,7 +5,6 @@ it, a motion is planted, and the pose must find it. A difference of two nights i
 """
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from catseye.reduction.live_bodies import bodies_of
 from catseye.reduction.places import nominal_frame
 from catseye.reduction.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose import pose_of_group
+from repository import ROOT
 
 ARM = [f"ZY11{k}" for k in range(3, 9)]
 RANGE = 26e-6  # m, of one range of the example night to a prism, from its covariance given the rangers (checked below)
@@ -130,7 +130,7 @@ def seen_by_the_arm(x, epoch, zeros):
 
 @pytest.fixture(scope="module")
 def whole(epoch, night_01, reduced_night_01):
-    site = read_site(Path(__file__).parents[2] / "examples" / "sites" / "gbt")
+    site = read_site(ROOT / "examples" / "sites" / "gbt")
     local = [t.position_mm for n, t in sorted(site.targets.items()) if n.startswith("DP")]
     assert len(local) == 2209
     x = nominal_frame(night_01).points(np.array(local) * MILLIMETRE)

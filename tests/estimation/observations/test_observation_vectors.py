@@ -2,14 +2,14 @@
 
 import tomllib
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from catseye.estimation import observations
+from repository import TESTS
 
-TABLES = sorted((Path(__file__).parents[2] / "vectors").glob("observations*.toml"))
+TABLES = sorted((TESTS / "vectors").glob("observations*.toml"))
 VECTORS = [v for table in TABLES for v in tomllib.loads(table.read_text(encoding="utf-8"))["vector"]]
 ABOUT = {"kind", "name", "x", "expected", "expected_deg", "observed_deg", "tolerance", "source"}
 

@@ -1,12 +1,11 @@
 """The examples of the lab's kinds are as `lab_scene` writes them."""
 
-from pathlib import Path
-
 import pytest
 
 from lab_scene import EXAMPLES, write_example
+from repository import ROOT
 
-HERE = Path(__file__).parents[3] / "examples" / "calibrations"
+HERE = ROOT / "examples" / "calibrations"
 
 
 @pytest.mark.parametrize("kind", EXAMPLES)
