@@ -33,8 +33,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from catseye.coordinator.journal_entries import AnsweredShot
 from catseye.coordinator.journal_reader import JournalReader
-from catseye.gateways.live_coordinator import LiveCoordinator, Orders
 from catseye.records.site_folder import REFERENCE
+from catseye.service.coordinator import LiveCoordinator, Orders
 from load_scene import LoadChild, load_site, lost_and_doubled
 
 TICK = 864e-6  # s

@@ -13,7 +13,7 @@ from catseye.atmosphere.sound import sound
 from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.atmosphere.sound_path import bent_ray_excess, travel_time
 from catseye.estimation.tomography import Prior, Scale
-from catseye.gateways.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.acoustic import path_temperatures
 from catseye.reduction.acoustic_field import sound_field
 

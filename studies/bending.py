@@ -17,7 +17,7 @@ from catseye.atmosphere.bending import excess_bound, index_gradient, pointing_of
 from catseye.atmosphere.path import hydrostatic_pressure_hpa
 from catseye.atmosphere.ray import FOUND, bent_ray, layered
 from catseye.constants import ARCSECOND
-from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.encoder import BEAM_PER_COUNT
 
 LENGTHS = (30.0, 60.0, 120.0, 300.0)  # m

@@ -21,7 +21,7 @@ import numpy as np
 from catseye.atmosphere import ciddor_hill1999
 from catseye.atmosphere.air import MODELS, group_refractivity
 from catseye.atmosphere.humidity import vapour_pressure_hpa
-from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 
 WAVELENGTH_UM, CO2_PPM = 0.780, 450.0
 HUMIDITIES = (0.0, 50.0, 100.0)

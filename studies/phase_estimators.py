@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.signal.frequency_plan import FrequencyPlan
 from catseye.signal.phase import detect
 from catseye.signal.spectral import bin_phasor, strongest_tone

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
-from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.records.campaign import REFERENCE, read_campaign
 from catseye.reduction.ranges import follow_electronics, measure_phases
 from catseye.reduction.settings import Settings

@@ -13,7 +13,7 @@ import numpy as np
 
 from catseye.atmosphere.air import group_refractivity
 from catseye.constants import DEGREE, SPEED_OF_LIGHT, TWO_PI
-from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry import visibility
 from catseye.geometry.triplet_mount import aim_angles, misaim
 from catseye.optics.prism import obliquity_correction

@@ -9,7 +9,7 @@ import pytest
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import AnsweredShot, Solution
-from catseye.gateways.samplers_fits import read_samplers
+from catseye.gateways.writers.samplers_fits import read_samplers
 from catseye.geometry.antenna import ground_from_reflector
 from catseye.geometry.rotation import from_vector
 from catseye.records.live import LiveShot, LiveWeather

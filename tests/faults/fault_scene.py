@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 from catseye.coordinator.journal_entries import AnsweredShot, Solution
-from catseye.gateways.live_coordinator import LiveCoordinator, Orders
-from catseye.gateways.live_rangers import Listening, RangersServed
-from catseye.gateways.live_running import FastLoop
-from catseye.gateways.live_simulation import addresses_of
-from catseye.gateways.live_warm import WarmingClock
-from catseye.gateways.live_world import World, twin_heads
-from catseye.gateways.twin_comparison import EpochComparison, TwinComparison
 from catseye.records.live import Happening
 from catseye.records.site_folder import SiteFolder, read_site
+from catseye.service.comparison import EpochComparison, TwinComparison
+from catseye.service.coordinator import LiveCoordinator, Orders
+from catseye.service.rangers import Listening, RangersServed
+from catseye.service.running import FastLoop
+from catseye.service.simulation import addresses_of
+from catseye.service.warm import WarmingClock
+from catseye.service.world import World, twin_heads
 from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock
 from repository import ROOT
 

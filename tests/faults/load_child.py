@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
-from catseye.gateways.live_warm import WarmingClock, warm
-from catseye.gateways.live_world import World, twin_heads
 from catseye.ranger.server import LOOPBACK
+from catseye.service.warm import WarmingClock, warm
+from catseye.service.world import World, twin_heads
 from catseye.simulator.site_feed import SiteFeed
 from catseye.simulator.twin_faults import FaultBoard
 from catseye.simulator.twin_site import TwinSite

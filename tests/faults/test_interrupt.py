@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from catseye.gateways.output import FORMAT
+from catseye.gateways.writers.output import FORMAT
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -127,7 +127,7 @@ def test_steps_that_belong_together_are_not_cut_in_two(tmp_path):
     code = (
         "import os, signal, sys\n"
         "from pathlib import Path\n"
-        "from catseye.gateways.interruption import deferred, leave_on_signals, undone_when_interrupted\n"
+        "from catseye.gateways.writers.interruption import deferred, leave_on_signals, undone_when_interrupted\n"
         "leave_on_signals()\n"
         "with undone_when_interrupted(Path(sys.argv[1], 'undone').touch):\n"
         "    with deferred():\n"
@@ -143,7 +143,7 @@ def test_steps_that_belong_together_are_not_cut_in_two(tmp_path):
 def test_they_cannot_hold_it_up_for_ever():
     code = (
         "import os, signal\n"
-        "from catseye.gateways import interruption\n"
+        "from catseye.gateways.writers import interruption\n"
         "interruption.LONGEST_DEFERRAL = 0.05\n"
         "interruption.leave_on_signals()\n"
         "with interruption.deferred():\n"

@@ -15,9 +15,9 @@ from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import AnsweredShot, Run
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.coordinator.ziy import Coordinator
-from catseye.gateways.live_solver import SolverProcess
-from catseye.gateways.live_warm import initialising_commands
 from catseye.reduction.live import Live
+from catseye.service.solver import SolverProcess
+from catseye.service.warm import initialising_commands
 from load_scene import EverySecond, LoadChild, load_site, lost_and_doubled
 
 TARGETS = 4

@@ -9,7 +9,7 @@ import pytest
 from catseye.atmosphere.air import MODELS, air, group_refractivity
 from catseye.errors import ValidityError
 from catseye.gateways.air_figures import NAMES, VARIABLES, _draw, air_plot
-from catseye.gateways.drawing import Figure
+from catseye.gateways.writers.drawing import Figure
 
 USUAL = {"u_temperature_c": 0.2, "u_pressure_hpa": 0.3, "u_humidity_percent": 3.0}
 

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.gateways.beam_figures import beam_figure, beam_object, coating_plot, lines, read_beam, write_beam
-from catseye.gateways.objects import json_line
+from catseye.gateways.writers.objects import json_line
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "beams" / "head.toml"

@@ -12,7 +12,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.gateways.certificate import _cell, _form, certificate, rounded
 from catseye.gateways.certificate_record import MARK, calibration_object, calibration_toml
-from catseye.gateways.objects import json_line
+from catseye.gateways.writers.objects import json_line
 from catseye.records.calibration import CalibrationRecord
 from catseye.records.mirror import Mirror
 from catseye.records.reading import read_record

@@ -9,7 +9,7 @@ import pytest
 
 from catseye.gateways.explain import budget_lines, explanation_object, explanation_passages
 from catseye.gateways.explain_page import MARK, explanation_page, figures
-from catseye.gateways.objects import json_line
+from catseye.gateways.writers.objects import json_line
 from catseye.reduction.budget import Assumptions, explain_shot
 
 KEYS = {

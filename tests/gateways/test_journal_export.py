@@ -11,9 +11,9 @@ from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import AnsweredShot, Run, Solution
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.errors import InputError
-from catseye.gateways import output
 from catseye.gateways.journal_campaign import export_campaign
 from catseye.gateways.journal_export import FORMAT, TABLES, export_tables, stamp
+from catseye.gateways.writers import output
 from catseye.records.campaign import read_campaign
 from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
 from catseye.simulator.world_clock import ManualClock

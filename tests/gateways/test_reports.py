@@ -9,11 +9,12 @@ from xml.etree import ElementTree
 
 import pytest
 
+from catseye.gateways.epoch.objects import pose_object
 from catseye.gateways.figures import figures
-from catseye.gateways.objects import json_page, pose_object
 from catseye.gateways.reports import report
 from catseye.gateways.summary import passages
 from catseye.gateways.tables import ranges_csv
+from catseye.gateways.writers.objects import json_page
 from catseye.reduction.epoch import reduce_epoch
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)

@@ -9,7 +9,6 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from catseye.gateways.objects import json_line, plain
 from catseye.gateways.triplet_figure import triplet_figure
 from catseye.gateways.triplet_files import triplets_csv
 from catseye.gateways.triplet_form import DATA_SHEET, HEAD, PLATE, RANGES, blank_form
@@ -17,6 +16,7 @@ from catseye.gateways.triplet_objects import triplet_object
 from catseye.gateways.triplet_sheet import cell, html_sheet, text_sheet, verdict
 from catseye.gateways.triplet_symbols import PLACEMENT, UNIT, point_places, symbol_values
 from catseye.gateways.triplet_symbols import PLATE as PLATE_SYMBOLS
+from catseye.gateways.writers.objects import json_line, plain
 from catseye.records.reading import read_record
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet import reduce_triplet

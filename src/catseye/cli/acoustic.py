@@ -48,7 +48,7 @@ def acoustic(
 ) -> None:
     """Temperature of the air along a path from the travel time of sound."""
     from catseye.gateways.acoustic_objects import MARK, acoustic_object, path_temperatures_csv, words
-    from catseye.gateways.output import refuse_output, whole_directory, whole_file
+    from catseye.gateways.writers.output import refuse_output, whole_directory, whole_file
     from catseye.reduction.acoustic_recording import reduce_acoustic
 
     _refuse_outputs(files, sheet, out, write)
@@ -65,7 +65,7 @@ def acoustic(
             with whole_directory(out, files[0]) as directory:
                 write_acoustic(paths, directory)
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(acoustic_object(paths)))
     elif not quiet:

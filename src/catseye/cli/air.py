@@ -68,7 +68,8 @@ def air(
     json: Json = False,
 ) -> None:
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
-    from catseye.gateways.objects import air_object, json_line
+    from catseye.gateways.air.objects import air_object
+    from catseye.gateways.writers.objects import json_line
     from catseye.reduction.air_routes import air_by, station_pressure, surface_of
 
     u_of = {

@@ -150,7 +150,7 @@ def baseline(
     )
     sources = [p for p in (observations, heights, against) if p is not None]
     if out is not None:
-        from catseye.gateways.output import refuse_output
+        from catseye.gateways.writers.output import refuse_output
 
         for source in sources:
             refuse_output(out, source)
@@ -169,7 +169,7 @@ def baseline(
         found, inputs = _calibrated(observations, heights, against, settings, progress)
         if out is not None:
             from catseye.gateways.baseline_files import write_calibration
-            from catseye.gateways.output import whole_directory
+            from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, observations) as directory:
                 write_calibration(found, directory, inputs, progress)
@@ -205,7 +205,7 @@ def _tell(found: "BaselineCalibration", json: bool, quiet: bool, out: Path | Non
     from catseye.gateways.baseline_objects import baseline_object, passages, spans
 
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(baseline_object(found)))
         return

@@ -35,8 +35,8 @@ def beam(
 ) -> None:
     """A laser beam through lenses, mirrors and a retroreflector to the detector: sizes, clipping, power."""
     from catseye.gateways.beam_figures import beam_object, lines, read_beam, write_beam
-    from catseye.gateways.objects import json_line
-    from catseye.gateways.output import refuse_output, whole_directory
+    from catseye.gateways.writers.objects import json_line
+    from catseye.gateways.writers.output import refuse_output, whole_directory
 
     if out is not None:
         refuse_output(out, file)

@@ -64,7 +64,7 @@ def calibrate(
     _write(found, write, certificate)
     if json:
         from catseye.gateways.certificate_record import calibration_object
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(calibration_object(found)))
     elif not quiet:
@@ -89,7 +89,7 @@ def _write(found: "Calibration", write: Path | None, certificate: Path | None) -
     from contextlib import ExitStack
     from datetime import UTC, datetime
 
-    from catseye.gateways.output import whole_file
+    from catseye.gateways.writers.output import whole_file
 
     pages = []
     if write is not None:

@@ -51,7 +51,7 @@ def certificate(
     if out is not None:
         _write(report, out, record)
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(report_object(report, None if out is None else str(out))))
     elif not quiet:
@@ -63,7 +63,7 @@ def _write(report: "Report", out: Path, record: Path | None) -> None:
     from datetime import UTC, datetime
 
     from catseye.gateways.field_report import field_report, mark
-    from catseye.gateways.output import whole_file
+    from catseye.gateways.writers.output import whole_file
 
     if record is not None and out.resolve() == record.resolve():
         raise InputError(f"--out {out}: is the record that fills the page (expected another name)")

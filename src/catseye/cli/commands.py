@@ -137,7 +137,7 @@ def demo(
 
 def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "Reduction":
     """Read, reduce and, when there is an `out`, write it whole or not at all."""
-    from catseye.gateways.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import refuse_output, whole_directory
 
     if out is not None:
         refuse_output(out, campaign)
@@ -159,7 +159,8 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
 
 
 def _say_reduction(reduction: "Reduction") -> None:
-    from catseye.gateways.objects import json_line, reduction_object
+    from catseye.gateways.epoch.objects import reduction_object
+    from catseye.gateways.writers.objects import json_line
 
     say(json_line(reduction_object(reduction)))
 

@@ -57,7 +57,7 @@ def explain(
         progress.clear()
     if json:
         from catseye.gateways.explain import explanation_object
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(explanation_object(found, seed if monte_carlo else None)))
     elif not quiet:
@@ -68,7 +68,7 @@ def _page(page: Path | None) -> AbstractContextManager[list[str]]:
     if page is None:
         return nullcontext([])
     from catseye.gateways.explain_page import MARK
-    from catseye.gateways.output import whole_file
+    from catseye.gateways.writers.output import whole_file
 
     return whole_file(page, "--page", MARK)
 

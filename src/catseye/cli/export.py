@@ -39,7 +39,7 @@ def export(
     from catseye.coordinator.journal_reader import JournalReader
     from catseye.gateways.journal_campaign import export_campaign
     from catseye.gateways.journal_export import export_tables
-    from catseye.gateways.output import refuse_output
+    from catseye.gateways.writers.output import refuse_output
 
     span = _span(since, until)
     refuse_output(out, Path(journal))
@@ -57,7 +57,7 @@ def export(
         finally:
             progress.clear()
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         told = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
         say(json_line(told))

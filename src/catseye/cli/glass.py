@@ -30,7 +30,7 @@ def glass(
 ) -> None:
     """Index of a glass, its slopes, what a prism of it does to a range, and what a wrong glass costs."""
     from catseye.gateways.glass_objects import glass_object, glass_rows, table_object, table_rows
-    from catseye.gateways.objects import json_line
+    from catseye.gateways.writers.objects import json_line
 
     found = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm)
     if json:

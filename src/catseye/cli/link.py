@@ -47,7 +47,7 @@ def link(
     json: Json = False,
 ) -> None:
     """Link budget: laser's power to expected return and the range's noise."""
-    from catseye.gateways.objects import json_line
+    from catseye.gateways.writers.objects import json_line
     from catseye.reduction.link_budget import link_budget
 
     head = Link(

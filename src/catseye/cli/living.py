@@ -12,10 +12,10 @@ from catseye.cli.terminal import say
 from catseye.errors import CatseyeError
 
 if TYPE_CHECKING:
-    from catseye.gateways.live_running import LiveRun
     from catseye.records.site_folder import SiteFolder
+    from catseye.service.running import LiveRun
 
-CONDITIONS = "night|windy-day|dewy-night"  # as in catseye.gateways.live_world, whose import --help spares itself
+CONDITIONS = "night|windy-day|dewy-night"  # as in catseye.service.world, whose import --help spares itself
 MODES = "active|passive|hold"
 FILTERS = "random_walk|constant_velocity"
 MOTION = "track 145.3 45"
@@ -169,7 +169,7 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
 
 def orders_of(*, drop: list[str] | None, **given: Any) -> Any:
     """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
-    from catseye.gateways.live_coordinator import Orders
+    from catseye.service.coordinator import Orders
 
     names = tuple(name.upper() for name in drop or ())
     return Orders(drop=names, **{key: value for key, value in given.items() if value is not None})

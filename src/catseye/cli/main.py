@@ -9,7 +9,7 @@ def run() -> None:
     """`catseye`: exits with 0 done, 1 could not, 2 wrong usage, 130 on Ctrl-C, 143 when terminated."""
     for number in (signal.SIGINT, signal.SIGTERM):  # nothing to undo yet; what knows how to is imported next
         signal.signal(number, lambda caught, frame: os._exit(128 + caught))
-    from catseye.gateways.interruption import ignore_signals, leave_on_signals
+    from catseye.gateways.writers.interruption import ignore_signals, leave_on_signals
 
     leave_on_signals()
     from catseye.cli.terminal import finish

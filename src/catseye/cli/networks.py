@@ -111,7 +111,7 @@ def adjust(
     progress = ProgressLine(quiet)
     sources = [network] if later is None else [network, later]
     if out is not None:
-        from catseye.gateways.output import refuse_output
+        from catseye.gateways.writers.output import refuse_output
 
         for source in sources:
             refuse_output(out, source)
@@ -165,7 +165,7 @@ def _write_adjusted(
     if out is None:
         return
     from catseye.gateways.network_files import input_hashes, write_network
-    from catseye.gateways.output import whole_directory
+    from catseye.gateways.writers.output import whole_directory
 
     with whole_directory(out, source) as directory:
         write_network(found, directory, input_hashes(source), progress, treated=treated)
@@ -209,7 +209,7 @@ def _compared(
 ) -> None:
     from catseye.estimation.comparison import compare
     from catseye.gateways.network_comparison import Comparison, comparison_object
-    from catseye.gateways.objects import json_line
+    from catseye.gateways.writers.objects import json_line
 
     for one, source in zip(found, sources, strict=True):
         if not one.answered:
@@ -219,7 +219,7 @@ def _compared(
     compared = Comparison(found[0], found[1], moved)
     if out is not None:
         from catseye.gateways.network_files import input_hashes, write_comparison
-        from catseye.gateways.output import whole_directory
+        from catseye.gateways.writers.output import whole_directory
 
         hashes = {f"{k + 1}: {name}": h for k, s in enumerate(sources) for name, h in input_hashes(s).items()}
         with whole_directory(out, sources[0]) as directory:
@@ -273,7 +273,7 @@ def plan(
     """A network before it is measured: what it will be worth, where it is weak, what to measure next."""
     progress = ProgressLine(quiet)
     if out is not None:
-        from catseye.gateways.output import refuse_output
+        from catseye.gateways.writers.output import refuse_output
 
         refuse_output(out, network)
     try:
@@ -306,7 +306,7 @@ def plan(
         if out is not None:
             from catseye.gateways.network_files import input_hashes
             from catseye.gateways.network_plan import write_plan
-            from catseye.gateways.output import whole_directory
+            from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, network) as directory:
                 write_plan(told, directory, input_hashes(network), progress)

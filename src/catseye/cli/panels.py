@@ -55,8 +55,8 @@ def panels(
     quiet: Quiet = False,
 ) -> None:
     """Panel corners from the panel setting instrument: heights, turns of screws, a crew's statistics."""
-    from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.panels_objects import panels_object, passages
+    from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.reduction.panel_job import PanelFiles, panel_work
 
     files = PanelFiles(readings, instrument, survey, cmm, as_left, survey_left)
@@ -74,7 +74,7 @@ def panels(
     finally:
         progress.clear()
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(panels_object(work)))
     elif not quiet:

@@ -213,8 +213,8 @@ def _finish(
     inputs: Sequence[Path | None] = (),
 ) -> None:
     """Write the figure whole or not at all, and say what it says."""
-    from catseye.gateways.objects import json_line
-    from catseye.gateways.output import whole_file
+    from catseye.gateways.writers.objects import json_line
+    from catseye.gateways.writers.output import whole_file
 
     text, told = drawn
     for given in inputs:

@@ -133,8 +133,8 @@ def point(
     """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun, keep-out boxes, visibility."""
     import numpy as np
 
-    from catseye.gateways.objects import json_line
     from catseye.gateways.pointing_objects import MARK, output_dat, pointing_objects, pointing_remarks, pointing_table
+    from catseye.gateways.writers.objects import json_line
     from catseye.geometry.time_tag import mjd_of
     from catseye.records.coordinate_list import read_coordinates
     from catseye.records.keep_out import KeepOut
@@ -179,7 +179,7 @@ def point(
             reachable=found.allowed | found.prime_allowed,
         )
     if write is not None:
-        from catseye.gateways.output import whole_file
+        from catseye.gateways.writers.output import whole_file
 
         with whole_file(write, "--write", MARK) as page:
             page.append(output_dat(found, f"{mirrors.zp} on {stands.monument}"))

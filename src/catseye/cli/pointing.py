@@ -91,9 +91,9 @@ def fit(
     quiet: Quiet = False,
 ) -> None:
     """The eight-term series by least squares, with covariance and what it cannot tell apart."""
-    from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.pointing_series_files import write_fit, write_model
     from catseye.gateways.pointing_series_objects import fit_object, fit_rows, fit_words
+    from catseye.gateways.writers.output import refuse_output, whole_directory
 
     if out is not None:
         for file in files:
@@ -114,7 +114,7 @@ def fit(
     if write_stars is not None and observed.stars is not None:
         _write_stars(found, observed, write_stars)
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(fit_object(found, observed, compared)))
         return
@@ -163,7 +163,7 @@ def _fitted(
 def _write_stars(found: "PointingFit", observed: "Observed", path: Path) -> None:
     from dataclasses import replace
 
-    from catseye.gateways.output import whole_file
+    from catseye.gateways.writers.output import whole_file
     from catseye.records.star_offsets import MARK, star_offsets_text
 
     stars, keep = observed.stars, found.used
@@ -188,8 +188,8 @@ def predict(
     """What the series adds to a direction on the sky to give the encoders'."""
     import numpy as np
 
-    from catseye.gateways.objects import json_line
     from catseye.gateways.pointing_series_objects import read_series
+    from catseye.gateways.writers.objects import json_line
 
     series, _ = read_series(model)
     a, e = azimuth_deg * DEGREE, elevation_deg * DEGREE
@@ -232,10 +232,10 @@ def track(
     """How the alidade tilts as it goes round: poses and inclinometer in one least squares, as a Fourier series."""
     import numpy as np
 
-    from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.pointing_series_files import track_rows, track_words, write_track
     from catseye.gateways.pointing_series_objects import track_object
     from catseye.gateways.pose_objects import tilt_of_pose
+    from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.reading import Folder
     from catseye.records.tilts import read_tilts
     from catseye.reduction.track_profile import track_profile
@@ -267,7 +267,7 @@ def track(
         with whole_directory(out, sources[0]) as directory:
             write_track(found, directory, hashes)
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(track_object(found)))
         return

@@ -140,8 +140,8 @@ def pose(
         raise typer.BadParameter("belongs to --group alidade in the frame alidade.", param_hint="'--tilt'")
     if pointing is not None and (points is not None or frame not in (None, "reflector") or group not in (None, "dish")):
         raise typer.BadParameter("is of the dish in the frame reflector.", param_hint="'--pointing'")
-    from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.pose_objects import beam_rows, pose_result_object, pose_rows, pose_words
+    from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.site_folder import read_site
     from catseye.records.solved_points import read_solved_points
 
@@ -180,7 +180,7 @@ def pose(
     finally:
         progress.clear()
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(pose_result_object(found)))
         return

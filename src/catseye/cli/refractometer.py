@@ -82,7 +82,7 @@ def refractometer(
     quiet: Quiet = False,
 ) -> None:
     """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase."""
-    from catseye.gateways.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import refuse_output, whole_directory
 
     given = {
         "path_length_m": path_length_m,
@@ -117,7 +117,7 @@ def refractometer(
     from catseye.gateways.refractometer_report import passages, refractometer_object
 
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(refractometer_object(found)))
         return

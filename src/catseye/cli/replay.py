@@ -35,7 +35,7 @@ def replay(
     quiet: Quiet = False,
 ) -> None:
     """A run again: the same to the last bit, or how far other calibrations move each point."""
-    from catseye.gateways.live_replay import replay_object, replay_passages, replayed
+    from catseye.service.replay import replay_object, replay_passages, replayed
 
     progress = ProgressLine(quiet)
     try:
@@ -43,7 +43,7 @@ def replay(
     finally:
         progress.clear()
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(replay_object(found)))
     elif not quiet:

@@ -55,8 +55,8 @@ def safety(
     json: Json = False,
 ) -> None:
     """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
-    from catseye.gateways.objects import json_line
     from catseye.gateways.safety_objects import Question, safety_object, safety_passages, safety_table
+    from catseye.gateways.writers.objects import json_line
     from catseye.optics.safety import LaserBeam
 
     if scan_period_s is not None and scan_rad_per_s is None:

@@ -71,9 +71,9 @@ def serve(
 ) -> None:
     """Run a site until it is told to end (SIGTERM: status 0): children are started again, everything is logged."""
     records = site_of(site)
-    from catseye.gateways.live_child import LiveChild
-    from catseye.gateways.live_simulation import twin_arguments
-    from catseye.gateways.live_world import World
+    from catseye.service.child import LiveChild
+    from catseye.service.simulation import twin_arguments
+    from catseye.service.world import World
 
     if twin and port_base == 0:
         raise typer.BadParameter("a twin that is started again needs ports that stay.", param_hint="'--port-base'")

@@ -31,7 +31,7 @@ from catseye.cli.living import (
 from catseye.cli.terminal import say, wrapped
 
 if TYPE_CHECKING:
-    from catseye.gateways.live_simulation import Simulation, View
+    from catseye.service.simulation import Simulation, View
 
 NIGHT = 60_635.125  # MJD: 22 h at Green Bank, no Sun and no Moon that matter
 UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from about the first round on
@@ -67,9 +67,9 @@ def simulate(
 ) -> None:
     """A whole site for a minute: twin, rangers, coordinator, and how far its epochs are from the truth."""
     records = site_of(site)
-    from catseye.gateways.live_running import FastLoop, LiveRun
-    from catseye.gateways.live_simulation import Simulation
-    from catseye.gateways.live_world import World
+    from catseye.service.running import FastLoop, LiveRun
+    from catseye.service.simulation import Simulation
+    from catseye.service.world import World
 
     told: dict[str, Any] = {"seed": seed, "motion": motion, "conditions": conditions, "faults": tuple(fault or ())}
     begins = mjd_start(start, NIGHT)
@@ -95,7 +95,7 @@ def simulate(
 
 def _view(*, json: bool, quiet: bool) -> "View":
     """A screen on a terminal, lines where none is, nothing where none is wanted."""
-    from catseye.gateways.live_screen import LinesView, ScreenView, SilentView
+    from catseye.service.screen import LinesView, ScreenView, SilentView
 
     if not quiet and sys.stderr is not None and sys.stderr.isatty():
         return ScreenView()
@@ -103,12 +103,12 @@ def _view(*, json: bool, quiet: bool) -> "View":
 
 
 def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
-    from catseye.gateways.live_objects import simulation_object, summary
+    from catseye.service.objects import simulation_object, summary
 
     book, world, journal = simulation.book, simulation.world, simulation.orders.journal
     told: dict[str, Any] = {"seconds": simulation.seconds, "rangers": len(simulation.site.rangers)}
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(simulation_object(book, world, journal, **told)))
     elif not quiet:

@@ -47,8 +47,8 @@ def sound(
 ) -> None:
     """Speed of sound in air, its sensitivities and its uncertainty, by the notes' formula and today's."""
     from catseye.atmosphere.sound import sound as sound_of
-    from catseye.gateways.objects import json_line
     from catseye.gateways.sound_objects import sound_object, sound_rows
+    from catseye.gateways.writers.objects import json_line
 
     weather = (temperature_c, pressure_hpa, humidity_percent)
     state = sound_of(*weather, model=model, co2_ppm=co2_ppm)

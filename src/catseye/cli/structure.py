@@ -126,7 +126,7 @@ def structure(
 
 def _refuse(out: Path | None, inputs: list[Path]) -> None:
     """Before hours of work: the place to write must be none of the inputs."""
-    from catseye.gateways.output import refuse_output
+    from catseye.gateways.writers.output import refuse_output
 
     for source in inputs if out is not None else []:
         refuse_output(cast(Path, out), source)
@@ -175,15 +175,15 @@ def _structure(
         notes += predicted.outside
     told = structure_object(fit, check, predicted, asked, notes)
     if out is not None:
-        from catseye.gateways.output import whole_directory
         from catseye.gateways.structure_files import write_structure
+        from catseye.gateways.writers.output import whole_directory
 
         with whole_directory(out, source) as directory:
             write_structure(
                 fit, directory, told=told, check=check, predicted=predicted, inputs=given.inputs, progress=progress
             )
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(told))
     elif not quiet:
@@ -263,14 +263,14 @@ def _vibration(
     progress("finding modes", 0, 0)
     found = found_in(series, stretch=stretch_s)
     if out is not None:
-        from catseye.gateways.output import whole_directory
         from catseye.gateways.structure_files import write_vibration
+        from catseye.gateways.writers.output import whole_directory
 
         with whole_directory(out, Path(journal)) as directory:
             write_vibration(found, directory, zero_mjd=zero_mjd, inputs=inputs, progress=progress)
     progress.clear()
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(vibration_object(found)))
         return

@@ -128,7 +128,7 @@ def surface(
         if place is not None and any(place.resolve() == source.resolve() for source in inputs):
             raise InputError(f"{place}: is an input, too (expected another file)")
     if out is not None:
-        from catseye.gateways.output import refuse_output
+        from catseye.gateways.writers.output import refuse_output
 
         for source in inputs:
             refuse_output(out, source)
@@ -151,8 +151,8 @@ def surface(
         )
         found, hashes = _found(inputs, reading, settings, asked, progress)
         if out is not None:
-            from catseye.gateways.output import whole_directory
             from catseye.gateways.surface_files import write_surface
+            from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, inputs[0]) as directory:
                 write_surface(found, directory, hashes, progress)
@@ -249,8 +249,8 @@ def _tell(found: "SurfaceResult", json: bool, quiet: bool, out: Path | None, act
     )
 
     if json:
-        from catseye.gateways.objects import json_line
         from catseye.gateways.surface_files import surface_object
+        from catseye.gateways.writers.objects import json_line
 
         say(json_line(surface_object(found)))
         return

@@ -50,8 +50,8 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
     """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
     if not files:
         return []
-    from catseye.gateways.output import refuse_output, whole_directory
     from catseye.gateways.triplet_files import refuse_namesakes, write_triplets
+    from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.reading import Folder
     from catseye.records.triplet_measurement import TripletMeasurement
     from catseye.reduction.triplet import reduce_triplet
@@ -78,8 +78,8 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
 
 
 def _write_blank(path: Path) -> None:
-    from catseye.gateways.output import whole_file
     from catseye.gateways.triplet_form import MARK, blank_form
+    from catseye.gateways.writers.output import whole_file
 
     with whole_file(path, "--blank", MARK) as pieces:
         pieces.append(blank_form())
@@ -87,8 +87,8 @@ def _write_blank(path: Path) -> None:
 
 def _say_objects(units: "Units") -> None:
     """One object, or a list of them for several files."""
-    from catseye.gateways.objects import json_line
     from catseye.gateways.triplet_objects import triplet_object
+    from catseye.gateways.writers.objects import json_line
 
     told = [triplet_object(found, path.name) for path, found in units]
     say(json_line(told[0] if len(told) == 1 else told))

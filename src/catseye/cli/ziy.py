@@ -123,8 +123,8 @@ def where_of(
         raise typer.BadParameter("is a known motion; --feed says otherwise.", param_hint="'--motion-script'")
     from catseye.coordinator.feed import MotionScript
     from catseye.coordinator.link_settings import Address
-    from catseye.gateways.live_addresses import read_addresses
     from catseye.ranger.addresses import Addresses, feed_address, ranger_addresses
+    from catseye.service.addresses import read_addresses
 
     where: Addresses = "loopback" if loopback else port_base
     if addresses is not None:
@@ -153,9 +153,9 @@ def run_coordinator(
 
     beside   a coroutine function that runs beside it, told the log: its children
     """
-    from catseye.gateways.live_coordinator import LiveCoordinator
-    from catseye.gateways.live_logs import LiveLog
-    from catseye.gateways.live_running import LiveRun
+    from catseye.service.coordinator import LiveCoordinator
+    from catseye.service.logs import LiveLog
+    from catseye.service.running import LiveRun
     from catseye.simulator.world_clock import SystemClock
 
     clock = SystemClock(offset)

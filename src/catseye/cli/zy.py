@@ -28,9 +28,9 @@ from catseye.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from catseye.gateways.live_rangers import Listening, RangersServed
     from catseye.ranger.addresses import Addresses
     from catseye.records.site_folder import SiteFolder
+    from catseye.service.rangers import Listening, RangersServed
 
 
 def _ports(text: str | None) -> str | None:
@@ -107,15 +107,15 @@ def zy(
         "ports": None if ports is None else _pair(ports),
         "files": files,
     }
-    from catseye.gateways.live_rangers import RangersServed, heads_of
-    from catseye.gateways.live_running import LiveRun
+    from catseye.service.rangers import RangersServed, heads_of
+    from catseye.service.running import LiveRun
     from catseye.simulator.world_clock import SystemClock
 
     if head is not None:
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **told)
     else:
-        from catseye.gateways.live_warm import WarmingClock
-        from catseye.gateways.live_world import World, twin_heads
+        from catseye.service.warm import WarmingClock
+        from catseye.service.world import World, twin_heads
 
         made = World.starting_now if clock_offset_s is None else World
         more = {} if clock_offset_s is None else {"offset": clock_offset_s}
@@ -142,7 +142,7 @@ def _named(site: "SiteFolder", asked: list[str]) -> tuple[str, ...]:
 
 def _say(at: "Listening", json: bool, quiet: bool) -> None:
     if json:
-        from catseye.gateways.objects import json_line
+        from catseye.gateways.writers.objects import json_line
 
         say_now(json_line(at.plain()))
     elif not quiet:

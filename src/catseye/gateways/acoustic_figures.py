@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 
 if TYPE_CHECKING:
     from catseye.reduction.acoustic_recording import AcousticPath, Trace

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.constants import PPM
-from catseye.gateways.written import csv_text
+from catseye.gateways.writers.written import csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.acoustic_recording import AcousticPath

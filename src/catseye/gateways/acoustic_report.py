@@ -11,9 +11,9 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.gateways.acoustic_figures import acoustic_figures
 from catseye.gateways.acoustic_objects import full_object, mean, path_temperatures_csv, shots_csv, words
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.page import card, page, paragraph, picture, section, table
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.written import Files, origin, write_files
 
 if TYPE_CHECKING:
     from catseye.reduction.acoustic_recording import AcousticPath

@@ -14,7 +14,7 @@ from catseye.atmosphere.air import MODELS, Air, air
 from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.atmosphere.model import Limit, Model
 from catseye.constants import PPM
-from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 
 WIDTH, HEIGHT = 9.4, 10.4  # inches
 POINTS = 121

@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.gateways.baseline_tables import shot_residuals
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline import BaselineCalibration

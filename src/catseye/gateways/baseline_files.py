@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from catseye.gateways.baseline_objects import baseline_object
 from catseye.gateways.baseline_tables import distances_csv, observations_csv, pillars_csv
-from catseye.gateways.objects import json_page
-from catseye.gateways.output import whole_file
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline import record_values
 

@@ -7,17 +7,11 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline_iso17123 import FullTest
+from catseye.gateways.writers.passage import Passage
 from catseye.records.baseline import FORMAT
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline import BaselineCalibration
-
-
-class Passage(NamedTuple):
-    """A title and what is to be said under it."""
-
-    title: str
-    text: str
 
 
 class Span(NamedTuple):

@@ -13,8 +13,8 @@ from catseye.estimation.baseline_iso17123 import FullTest
 from catseye.gateways.baseline_figures import baseline_figures
 from catseye.gateways.baseline_objects import baseline_object, passages, spans
 from catseye.gateways.baseline_tables import shot_residuals
-from catseye.gateways.objects import versions
-from catseye.gateways.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline import BaselineCalibration

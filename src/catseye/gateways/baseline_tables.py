@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM
 from catseye.gateways.baseline_objects import baseline_object, spans
-from catseye.gateways.written import cell, csv_text
+from catseye.gateways.writers.written import cell, csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline import BaselineCalibration

@@ -11,9 +11,9 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.gateways.objects import json_page
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import Folder

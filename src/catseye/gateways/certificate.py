@@ -7,8 +7,8 @@ from typing import Any
 
 from catseye.gateways.certificate_figure import calibration_figure
 from catseye.gateways.certificate_record import record_lines
-from catseye.gateways.objects import versions
-from catseye.gateways.page import folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
 from catseye.reduction.calibration import Calibration, Decision, Quantity
 
 TITLE = "Certificate of calibration"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.calibration import Calibration
 
 PANELS = {"residuals": "residual", "spectrum": "amplitude of residuals"}

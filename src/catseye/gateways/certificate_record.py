@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from catseye import __version__
-from catseye.gateways.objects import plain
+from catseye.gateways.writers.objects import plain
 from catseye.reduction.calibration import Calibration
 from catseye.reduction.calibrations.kind import PROVENANCE
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.estimation.propagation import Input, agreement
-from catseye.gateways.summary import MEANING, Passage
+from catseye.gateways.summary import MEANING
+from catseye.gateways.writers.passage import Passage
 from catseye.records.campaign import REFERENCE
 from catseye.reduction.budget import Explanation
 

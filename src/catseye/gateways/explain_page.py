@@ -6,7 +6,6 @@ from html import escape
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.gateways.explain import (
     MICROMETRE,
     SMALLEST_SHARE,
@@ -16,8 +15,9 @@ from catseye.gateways.explain import (
     micrometres,
     when,
 )
-from catseye.gateways.objects import versions
-from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.records.campaign import Campaign
 from catseye.reduction.budget import Assumptions, Explanation
 

@@ -19,7 +19,7 @@ from catseye.gateways.field_report_fields import (
     written_u,
     written_value,
 )
-from catseye.gateways.page import page
+from catseye.gateways.writers.page import page
 from catseye.geometry.mount import gamma, lambda_
 
 SERVO_ROWS = 9  # an axis's position at the cube and its eight chip settings

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
-from catseye.gateways.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.gateways.tables import kind_of
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.reduction.epoch import Reduction
 
 COLOURS = {

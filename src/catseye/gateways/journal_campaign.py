@@ -20,8 +20,8 @@ from catseye.coordinator.journal_entries import AnsweredShot
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal_export import seal, stamp
-from catseye.gateways.output import whole_directory
-from catseye.gateways.written import origin
+from catseye.gateways.writers.output import whole_directory
+from catseye.gateways.writers.written import origin
 from catseye.records.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
 from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveWeather
 from catseye.records.shot import Shot

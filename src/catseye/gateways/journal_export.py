@@ -20,9 +20,9 @@ from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
 from catseye.coordinator.journal_entries import Entry, Solution
 from catseye.coordinator.journal_reader import JournalReader, Kind
 from catseye.errors import InputError
-from catseye.gateways.objects import json_page, plain
-from catseye.gateways.output import PROVENANCE, whole_directory
-from catseye.gateways.written import Progress, origin
+from catseye.gateways.writers.objects import json_page, plain
+from catseye.gateways.writers.output import PROVENANCE, whole_directory
+from catseye.gateways.writers.written import Progress, origin
 from catseye.records.live import TICKS_PER_DAY
 
 FORMAT = "catseye-journal-export-1"

@@ -13,8 +13,8 @@ from catseye.estimation.congruence import VarianceFactor
 from catseye.estimation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network_findings import Findings, in_file_axes
 from catseye.gateways.network_tables import Formats, cell, table
-from catseye.gateways.objects import plain
-from catseye.gateways.summary import Passage
+from catseye.gateways.writers.objects import plain
+from catseye.gateways.writers.passage import Passage
 
 FORMAT = "catseye-comparison-1"
 NAMED = 8  # points told in sentences

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.drawing import BAD, FAINT, INK, STYLE, nice, svg
 from catseye.gateways.network_comparison import Comparison, comparison_passages
 from catseye.gateways.network_figures import (
     Drawn,
@@ -26,7 +25,8 @@ from catseye.gateways.network_figures import (
 from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_report import network_cards, provenance_section
 from catseye.gateways.network_summary import quantity, verdict
-from catseye.gateways.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, STYLE, nice, svg
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 
 CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "Epochs", "provenance": "Provenance"}
 CONFIDENCE = 0.95

@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
-from catseye.gateways.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
 from catseye.gateways.network_findings import Findings
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
 
 STATION, TARGET, HELD, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
 DENSE = 300  # points or marks from which they are rasterised, and only some are named

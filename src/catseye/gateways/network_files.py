@@ -12,8 +12,8 @@ from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_objects import FORMAT, network_json
 from catseye.gateways.network_tables import coordinates_csv, observations_csv, parameters_csv
 from catseye.gateways.network_xml import network_xml
-from catseye.gateways.objects import json_page
-from catseye.gateways.written import Files, Progress, origin, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.written import Files, Progress, origin, write_files
 
 if TYPE_CHECKING:
     from catseye.reduction.networks import Adjusted

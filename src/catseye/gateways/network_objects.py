@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.estimation.adjustment import NONCENTRALITY
 from catseye.gateways.network_findings import MEASURES, ROLES, Findings
-from catseye.gateways.objects import plain
+from catseye.gateways.writers.objects import plain
 
 if TYPE_CHECKING:
     from catseye.reduction.networks import Adjusted

@@ -17,10 +17,10 @@ from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_objects import network_object
 from catseye.gateways.network_summary import direction_words, quantity
 from catseye.gateways.network_tables import coordinates_csv
-from catseye.gateways.objects import json_page, plain
-from catseye.gateways.page import card, page, paragraph, picture, section, table
-from catseye.gateways.summary import Passage
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page, plain
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.written import Files, origin, write_files
 
 FORMAT = "catseye-plan-1"
 LISTED = 10  # weakest points, and observations that hold most, in text and report

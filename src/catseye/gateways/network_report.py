@@ -11,8 +11,8 @@ from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.network_figures import Drawn, network_figures
 from catseye.gateways.network_findings import Findings
 from catseye.gateways.network_summary import passages, quantity, treatment_passages, verdict
-from catseye.gateways.objects import versions
-from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 
 if TYPE_CHECKING:
     from catseye.reduction.networks import Adjusted

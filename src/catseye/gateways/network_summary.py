@@ -7,7 +7,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.reliability import TOO_LARGE, TOO_SMALL
 from catseye.gateways.network_findings import Findings
-from catseye.gateways.summary import Passage
+from catseye.gateways.writers.passage import Passage
 
 if TYPE_CHECKING:
     from catseye.reduction.networks import Adjusted

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from catseye.gateways.writers.passage import Passage
 from catseye.reduction.panel_crew import members, sessions, standing, zeros
 from catseye.reduction.panel_job import verdicts
 from catseye.reduction.panels import surface_rms
@@ -16,11 +17,6 @@ if TYPE_CHECKING:
     from catseye.reduction.panels import Doubt, PanelHeights
 
 FORMAT = "catseye-panels-1"
-
-
-class Passage(NamedTuple):
-    title: str
-    text: str
 
 
 class Screw(NamedTuple):

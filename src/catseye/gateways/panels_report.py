@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.panels_objects import (
     FORMAT,
     doubt_text,
@@ -19,8 +17,10 @@ from catseye.gateways.panels_objects import (
     screws,
 )
 from catseye.gateways.panels_tables import actuators_csv, crew_csv, panels_csv, readings_csv, screws_csv
-from catseye.gateways.samplers_fits import join_tables
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import join_tables
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.panel_crew import members, sessions, standing
 
 if TYPE_CHECKING:

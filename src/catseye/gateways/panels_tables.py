@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.gateways.panels_objects import screws
-from catseye.gateways.written import cell, csv_text
+from catseye.gateways.writers.written import cell, csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.panel_job import PanelWork

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.reduction.pointing_fit import PointingFit
 from catseye.reduction.track_profile import TrackProfile
 

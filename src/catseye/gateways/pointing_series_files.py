@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.output import whole_file
-from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.pointing_series_objects import (
     FORMAT,
     TRACK,
@@ -22,8 +19,11 @@ from catseye.gateways.pointing_series_objects import (
     model_record,
     track_object,
 )
-from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable, join_tables
-from catseye.gateways.written import Files, csv_text, origin, write_files
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
+from catseye.gateways.writers.written import Files, csv_text, origin, write_files
 from catseye.records.pointing_model import FORMAT as MODEL
 from catseye.records.toml_text import record_toml
 from catseye.reduction.pointing_fit import PointingFit, SeriesComparison

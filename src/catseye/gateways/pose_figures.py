@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.gateways.pose_objects import PoseResult
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
 from catseye.reduction.pointing_offsets import PointingOffset
 
 NAMED = 14  # points up to which each is named

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.pose_objects import FORMAT, PoseResult, beam_rows, pose_result_object, pose_rows, pose_words
-from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable, join_tables
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
+from catseye.gateways.writers.written import Files, origin, write_files
 
 HEADER = (
     "point",

@@ -3,10 +3,11 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from catseye.gateways.objects import coordinates_object, json_page, pose_object, provenance_object
+from catseye.gateways.epoch.objects import coordinates_object, pose_object, provenance_object
 from catseye.gateways.reports import report
 from catseye.gateways.tables import coordinates_csv, ranges_csv, surface_csv
-from catseye.gateways.written import Files, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.written import Files, write_files
 from catseye.reduction.epoch import Reduction
 from catseye.reduction.ranges import Progress
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.constants import PPM, TWO_PI
-from catseye.gateways.baseline_objects import Passage
-from catseye.gateways.objects import json_page, versions
-from catseye.gateways.page import card, page, paragraph, picture, section, table
-from catseye.gateways.written import Files, origin, write_files
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.refractometer import phase_slope
 from catseye.reduction.refractometer_calibration import STATUS
 from catseye.signal.cycles import CycleStatus
@@ -184,7 +184,7 @@ def series_csv(found: "PathCalibration") -> str:
 
 def refractometer_figures(found: "PathCalibration") -> dict[str, str]:
     """The night and its residuals, and phase against weather, as SVG text."""
-    from catseye.gateways.drawing import STYLE, mpl, svg  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import STYLE, mpl, svg  # matplotlib is heavy
 
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -193,7 +193,7 @@ def refractometer_figures(found: "PathCalibration") -> dict[str, str]:
 
 
 def _night(found: "PathCalibration"):
-    from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, Figure
+    from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure
 
     hours, good = found.readings.hours, np.isfinite(found.refractivity)
     used = np.array([s == "good" for s in found.status])
@@ -230,7 +230,7 @@ def _night(found: "PathCalibration"):
 
 
 def _line(found: "PathCalibration"):
-    from catseye.gateways.drawing import INK, SERIES, Figure
+    from catseye.gateways.writers.drawing import INK, SERIES, Figure
 
     sheet = found.readings.sheet
     slope = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))

@@ -7,11 +7,12 @@ from html import escape
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.epoch.objects import benchmark_object
 from catseye.gateways.figures import figures
-from catseye.gateways.objects import benchmark_object, versions
-from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.summary import feed_arm_rows, passages, pointing, trust_limits
 from catseye.gateways.tables import kind_of
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.reduction.epoch import Reduction
 from catseye.reduction.refractometer import benchmark_refractometers
 from catseye.reduction.surface import UNOBSERVED

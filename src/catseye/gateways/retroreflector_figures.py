@@ -8,7 +8,7 @@ import numpy as np
 from catseye.atmosphere.air import air
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
-from catseye.gateways.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.optics import prism
 from catseye.optics.cats_eye import BallCatsEye, focal_radius
 from catseye.optics.glass import index_over_air

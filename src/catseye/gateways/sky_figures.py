@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE
-from catseye.gateways.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.keep_out import TOUCH
 from catseye.geometry.pointing import ray

@@ -3,7 +3,7 @@
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.gateways.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.structure_check import LeaveOut
 from catseye.reduction.structure_series import StructureFit
 from catseye.reduction.vibration import Vibration

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.gateways.objects import json_page
-from catseye.gateways.page import card, page, paragraph, picture, section, table
-from catseye.gateways.samplers_fits import SAMPLERS, join_samplers
 from catseye.gateways.structure_figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure_objects import FORMAT, structure_samplers, vibration_object, vibration_samplers
-from catseye.gateways.written import Files, Progress, cell, csv_text, origin, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
+from catseye.gateways.writers.written import Files, Progress, cell, csv_text, origin, write_files
 from catseye.reduction.structure_check import LeaveOut
 from catseye.reduction.structure_series import Prediction, StructureFit
 from catseye.reduction.vibration import Vibration

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
-from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable
+from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
 from catseye.geometry.deformation import COMPONENTS
 from catseye.reduction.structure_check import LeaveOut
 from catseye.reduction.structure_series import Prediction, StructureFit

@@ -1,12 +1,12 @@
 """A reduction told in sentences, for people who did not design it."""
 
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
 from catseye.gateways.tables import kind_of
+from catseye.gateways.writers.passage import Passage
 from catseye.records.campaign import REFERENCE
 from catseye.reduction.epoch import Reduction
 
@@ -20,14 +20,6 @@ MEANING = {
     "bad reference": "something else in the beam of the internal cube",
     "no reference": "the drift of the electronics is unknown",
 }
-
-
-@dataclass(frozen=True)
-class Passage:
-    """A few sentences under a word or two."""
-
-    title: str
-    text: str
 
 
 def passages(reduction: Reduction) -> list[Passage]:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.optics.zernike import number
 from catseye.reduction.actuators import Actuators
 from catseye.reduction.surface_lookup import HYSTERESIS, Lookup

@@ -7,9 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.objects import json_page
-from catseye.gateways.output import whole_file
-from catseye.gateways.samplers_fits import join_tables, write_samplers
 from catseye.gateways.surface_objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
 from catseye.gateways.surface_report import SurfaceResult, surface_report
 from catseye.gateways.surface_tables import (
@@ -22,7 +19,10 @@ from catseye.gateways.surface_tables import (
     prisms_csv,
     zernike_csv,
 )
-from catseye.gateways.written import Files, Progress, origin, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
+from catseye.gateways.writers.written import Files, Progress, origin, write_files
 from catseye.reduction.actuators import rows_of
 
 

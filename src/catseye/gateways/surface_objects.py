@@ -1,11 +1,12 @@
 """Surfaces as plain objects for JSON, and as text for people; SI, with the unit in the key elsewhere."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import Numbering, number
 from catseye.reduction.actuators import Actuators
 from catseye.reduction.surface_change import Change
@@ -15,13 +16,6 @@ from catseye.reduction.surface_shape import Expansion, Gain, MeanSquare, Shape
 FORMAT = "catseye-surface-1"
 TAKEN = 0.5  # share of a term's square from which a note is due
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
-
-
-class Passage(NamedTuple):
-    """A title and what is to be said under it."""
-
-    title: str
-    text: str
 
 
 def root(square: float) -> float | None:

@@ -8,17 +8,17 @@ from html import escape
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.objects import versions
-from catseye.gateways.page import card, page, paragraph, picture, section, table
 from catseye.gateways.surface_figures import actuator_map, elevation_terms, surface_map, zernike_bars
 from catseye.gateways.surface_objects import (
-    Passage,
     actuators_passage,
     change_passages,
     lookup_passages,
     root,
     shape_passages,
 )
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import number
 from catseye.reduction.actuators import Actuators
 from catseye.reduction.surface_change import Change

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.samplers_fits import SamplerColumn, SamplerTable
-from catseye.gateways.written import csv_text
+from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
+from catseye.gateways.writers.written import csv_text
 from catseye.optics.zernike import Numbering, number
 from catseye.records.actuators import ActuatorCorrection
 from catseye.reduction.surface_change import Change

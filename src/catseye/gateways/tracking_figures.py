@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.gateways.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.search_pattern import count_size
 from catseye.reduction.spot_fit import Spot
 from catseye.reduction.tracking import Following, Track

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.gateways.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.triplet import TOLERANCE, TripletReduction
 
 MICROMETRES = 1e6

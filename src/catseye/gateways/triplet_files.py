@@ -11,11 +11,11 @@ from typing import Any
 
 from catseye.errors import InputError
 from catseye.gateways.certificate_record import FORMAT
-from catseye.gateways.objects import json_page
-from catseye.gateways.output import PROVENANCE
 from catseye.gateways.triplet_objects import triplet_object
 from catseye.gateways.triplet_sheet import html_sheet, text_sheet
-from catseye.gateways.written import origin, write_files
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import PROVENANCE
+from catseye.gateways.writers.written import origin, write_files
 from catseye.reduction.triplet import TripletReduction
 
 COLUMNS = (

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from html import escape
 
-from catseye.gateways.page import page
+from catseye.gateways.writers.page import page
 
 TITLE = "Triplet calibration, blank sheet"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours

@@ -6,8 +6,6 @@ from datetime import datetime
 from html import escape
 from typing import Any
 
-from catseye.gateways.objects import versions
-from catseye.gateways.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.triplet_symbols import (
     PLACEMENT,
     PLATE,
@@ -17,6 +15,8 @@ from catseye.gateways.triplet_symbols import (
     point_places,
     symbol_values,
 )
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.reduction.triplet import NOT_A_TRIANGLE, SLIPPED, TripletReduction
 
 TITLE = "Triplet calibration"

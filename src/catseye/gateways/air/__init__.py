@@ -1,0 +1,1 @@
+"""Air, sound and the instruments that measure them, on the way out."""

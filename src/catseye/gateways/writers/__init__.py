@@ -1,0 +1,1 @@
+"""How anything is written: pages, figures, JSON, FITS, tables, whole or not at all. Knows no subject."""

@@ -1,0 +1,60 @@
+"""How figures look, and how they become SVG text, drawn without a display."""
+
+import io
+import logging
+from typing import Any
+
+import numpy as np
+
+from catseye.gateways.writers.interruption import deferred
+
+logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it announces its font cache on stderr
+with deferred():  # its first import writes that cache under a lock file
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "svg"]
+
+INK, FAINT, GRID, BAD = "#22303c", "#6b7883", "#e3e8ec", "#c8323c"
+SERIES = ("#1f5a99", "#d9641e", "#1e8e74", "#8a5fa8", "#b08a1e", "#6f8fa8")
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 8.0,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "text.color": INK,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "catseye",
+}
+
+
+def svg(figure: Figure) -> str:
+    """A figure as SVG text, the same for the same figure."""
+    stream = io.StringIO()
+    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+    return stream.getvalue()
+
+
+def nice(value: float) -> float:
+    """The number 1, 2 or 5 times a power of ten that is nearest below."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step <= value / power * (1 + 1e-9)))

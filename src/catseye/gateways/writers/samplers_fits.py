@@ -1,0 +1,320 @@
+"""Results as FITS binary tables in the manner of a telescope's samplers: one table a quantity, time as MJD.
+
+Every table is one extension, named after its quantity. Its first column is MJD (unit d, UTC, the middle of what was
+measured), where the quantity has a time; the others say their unit in TUNITn and what they are in TCOMMn. The header
+says TIMESYS, MJDREF, ORIGIN, the version of catseye, and in words the frame and the pivot that the numbers refer to.
+Doubles, whole numbers, truth values and ASCII text are stored as they are: what is read back is the same bit for bit.
+"""
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye import __version__
+from catseye.errors import InputError
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import PROVENANCE, write_whole
+from catseye.records.record import EARLIEST_MJD, LATEST_MJD
+
+MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
+TIME = "MJD"
+SAMPLERS = "samplers.fits"
+UNITS = {
+    "m": "m",
+    "mm": "mm",
+    "um": "um",
+    "rad": "rad",
+    "urad": "urad",
+    "deg": "deg",
+    "arcsec": "arcsec",
+    "s": "s",
+    "hz": "Hz",
+}
+NOT_ASCII = {"°": " deg", "µ": "u", "″": " arcsec", "′": " arcmin", "·": "*", "–": "-", "−": "-", "±": "+-"}
+STANDARD = {"XTENSION", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "PCOUNT", "GCOUNT", "TFIELDS", "END", "EXTNAME"}
+OURS = {"TIMESYS", "MJDREF", "ORIGIN", "FRAME", "PIVOT", "REMARK", "CHECKSUM", "DATASUM", MARK}
+OF_COLUMNS = ("TTYPE", "TFORM", "TUNIT", "TCOMM", "TDIM")
+FORMS = {"f": ("D", np.float64), "i": ("K", np.int64), "u": ("K", np.int64), "b": ("L", np.bool_)}
+
+
+@dataclass(frozen=True, eq=False)
+class SamplerColumn:
+    """A column of a table.
+
+    unit      as the FITS standard writes it ("m", "rad", "mm", "deg", "arcsec", "K", "m2 / Hz"); "" of none
+    values    (n, ...) numbers, truth values, or (n,) text; a row of an array column has its shape in TDIMn
+    comment   what it is, a few words
+    """
+
+    unit: str
+    values: ArrayLike
+    comment: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SamplerTable:
+    """A quantity as a table.
+
+    name      of the extension: capital letters, digits and _
+    columns   by name: capital letters, digits and _
+    mjd       (n,) d, UTC; None for what has no time, as coefficients have none
+    comment   what the table holds, in a sentence
+    frame     of its numbers, in words: "ground", "reflector frame at rest"; "" where none is meant
+    pivot     about which its turns are, in words or numbers with their unit; "" where none is meant
+    header    more keywords, of at most 8 characters, with numbers or text
+    """
+
+    name: str
+    columns: Mapping[str, SamplerColumn]
+    mjd: ArrayLike | None = None
+    comment: str = ""
+    frame: str = ""
+    pivot: str = ""
+    header: Mapping[str, str | int | float | bool] = field(default_factory=dict)
+
+
+def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
+    """A whole FITS file of some tables, checked by astropy against the standard.
+
+    tables   in order; the keys are the names of the extensions
+
+    Raises InputError for names, units, lengths or values that FITS cannot hold.
+
+    >>> height = SamplerColumn("m", [48.26, 48.27], "elevation axis")
+    >>> len(sampler_tables({"AXIS": SamplerTable("AXIS", {"Z": height}, mjd=[60000.0, 60000.5])})) % 2880
+    0
+    """
+    from astropy.io import fits
+
+    if not tables:
+        raise InputError("a FITS file of samplers needs one table at least")
+    pages = [fits.PrimaryHDU()]
+    pages[0].header["ORIGIN"] = "catseye"
+    pages[0].header[MARK] = (__version__, "version of catseye")
+    for name, table in tables.items():
+        if name != table.name:
+            raise InputError(f"table {table.name!r} stands under the key {name!r} (expected the same)")
+        pages.append(_page(table))
+    whole = io.BytesIO()
+    made = fits.HDUList(pages)
+    made.verify("exception")
+    made.writeto(whole, checksum=True, output_verify="exception")
+    return whole.getvalue()
+
+
+def write_samplers(path: Path, tables: Mapping[str, SamplerTable], *, option: str = "--fits") -> None:
+    """The tables as a file that appears whole or not at all.
+
+    path     new, or an earlier file of catseye
+    tables   as for `sampler_tables`
+    option   that named the file, for messages
+
+    Raises InputError where another's file would be lost, nothing can be written, or FITS cannot hold a value.
+    """
+    mark = f"{MARK:<8}=".encode()
+    write_whole(path, sampler_tables(tables), option=option, ours=lambda content: mark in content[:2880])
+
+
+def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]) -> None:
+    """The tables as one more file of an output directory, named in its provenance with its hash.
+
+    directory   that `output.whole_directory` gave and `written.write_files` has filled
+    name        of the file, such as "samplers.fits"
+    tables      as for `sampler_tables`
+    """
+    content = sampler_tables(tables)
+    (directory / name).write_bytes(content)
+    place = directory / PROVENANCE
+    told = json.loads(place.read_text(encoding="utf-8"))
+    told["outputs"] = {**told["outputs"], name: hashlib.sha256(content).hexdigest()}
+    place.write_bytes(json_page(told).encode("utf-8"))
+
+
+def join_tables(
+    directory: Path, *, frame: str = "", pivot: str = "", tables: Mapping[str, SamplerTable] | None = None
+) -> None:
+    """All CSV tables of an output directory once more, as samplers.fits, with the same numbers.
+
+    directory      as for `join_samplers`
+    frame, pivot   of the tables, as in `SamplerTable`
+    tables         more, which stand first
+    """
+    told = dict(tables or {})
+    for path in sorted(directory.glob("*.csv")):
+        name = path.stem.upper().replace("-", "_")
+        told[name] = _of_csv(name, path.read_text(encoding="utf-8"), frame, pivot)
+    join_samplers(directory, SAMPLERS, told)
+
+
+def _of_csv(name: str, text: str, frame: str, pivot: str) -> SamplerTable:
+    """A table by its CSV: units by the ends of its columns' names, blanks as NaN, text where a cell is no number."""
+    header, *rows = csv.reader(io.StringIO(text))
+    columns = {}
+    for k, title in enumerate(header):
+        cells = [row[k] for row in rows]
+        try:
+            values: ArrayLike = np.array([float(cell) if cell else np.nan for cell in cells])
+            what, _, unit = title.rpartition("_")
+            unit = UNITS.get(unit, "") if what else ""
+        except ValueError:
+            values, unit = np.array([_as_ascii(cell) for cell in cells]), ""
+        columns[title.upper()] = SamplerColumn(unit, values)
+    return SamplerTable(name, columns, comment=f"as {name.lower()}.csv", frame=frame, pivot=pivot)
+
+
+def _as_ascii(text: str) -> str:
+    for sign, plain in NOT_ASCII.items():
+        text = text.replace(sign, plain)
+    return text.encode("ascii", "replace").decode("ascii")
+
+
+def read_samplers(path: Path) -> dict[str, SamplerTable]:
+    """The tables of a file that `write_samplers` made, bit for bit.
+
+    Raises InputError for a file that is missing, damaged (its checksums are proved) or not catseye's.
+    """
+    import warnings
+
+    from astropy.io import fits
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a checksum that does not hold is a warning of astropy's
+            with fits.open(io.BytesIO(path.read_bytes()), checksum=True) as pages:
+                if MARK not in pages[0].header:
+                    raise InputError(f"{path}: is not a file of catseye's samplers (no keyword {MARK})")
+                return {page.name: _read(page) for page in pages[1:]}
+    except (OSError, TypeError, ValueError, Warning) as problem:
+        reason = str(getattr(problem, "strerror", None) or problem).splitlines()[0]
+        raise InputError(f"{path}: cannot be read as FITS: {reason}") from problem
+
+
+def _page(table: SamplerTable) -> Any:
+    """One extension."""
+    from astropy.io import fits
+
+    columns = dict(table.columns)
+    if table.mjd is not None:
+        columns = {TIME: SamplerColumn("d", np.asarray(table.mjd, dtype=float), "UTC, as MJD"), **columns}
+        _refuse_times(table)
+    _refuse_names(table, columns)
+    made = [_column(table.name, name, column) for name, column in columns.items()]
+    lengths = {name: len(np.asarray(column.values)) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"table {table.name}: columns have unlike lengths {lengths} (expected one)")
+    page = fits.BinTableHDU.from_columns(made, name=table.name)
+    header = page.header
+    header["TIMESYS"] = ("UTC", "time scale of MJD")
+    header["MJDREF"] = (0.0, "[d] zero of the column MJD")
+    header["ORIGIN"] = "catseye"
+    header[MARK] = (__version__, "version of catseye")
+    for key, text in (("FRAME", table.frame), ("PIVOT", table.pivot)):
+        if text:
+            header[key] = _ascii(table.name, text)
+    for key, value in table.header.items():
+        header[key] = _ascii(table.name, value) if isinstance(value, str) else value
+    for number, column in enumerate(columns.values(), start=1):
+        if column.comment:
+            header[f"TCOMM{number}"] = _ascii(table.name, column.comment)
+    if table.comment:
+        header["REMARK"] = _ascii(table.name, table.comment)
+    return page
+
+
+def _column(table: str, name: str, column: SamplerColumn) -> Any:
+    """A column in the form of FITS that loses nothing."""
+    from astropy.io import fits
+
+    values = np.asarray(column.values)
+    where = f"table {table}, column {name}"
+    unit = _unit(where, column.unit)
+    if values.dtype.kind == "U" and values.ndim == 1:
+        text = [str(v) for v in values]
+        if any(v != v.rstrip(" \0") for v in text):
+            raise InputError(f"{where}: a text ends in a blank, which FITS would lose (expected none)")
+        raw = np.array([_ascii(where, v).encode("ascii") for v in text] or [b""])[: len(text)]
+        return fits.Column(name, f"{max(1, raw.dtype.itemsize)}A", unit=unit, array=raw)
+    if values.ndim < 1 or values.dtype.kind not in FORMS:
+        raise InputError(
+            f"{where}: {values.dtype} in {values.ndim} dimensions (expected rows of numbers, truth values or text)"
+        )
+    letter, dtype = FORMS[values.dtype.kind]
+    stored: NDArray[Any] = values.astype(dtype)
+    if values.dtype.kind == "u" and np.any(stored < 0):
+        raise InputError(f"{where}: holds {values.max()} (expected whole numbers below 2^63)")
+    inner = values.shape[1:]
+    count = int(np.prod(inner)) if inner else 1
+    if count == 0:
+        raise InputError(f"{where}: its rows are empty, shape {values.shape} (expected one value at least)")
+    dims = "(" + ",".join(str(n) for n in inner[::-1]) + ")" if len(inner) > 1 else None
+    return fits.Column(name, f"{count if inner else ''}{letter}", unit=unit, dim=dims, array=stored)
+
+
+def _unit(where: str, unit: str) -> str | None:
+    """The unit as given, when the FITS standard knows it."""
+    if not unit:
+        return None
+    from astropy import units
+
+    try:
+        units.Unit(unit, format="fits", parse_strict="raise")
+    except ValueError as problem:
+        hint = ": FITS has no degree Celsius, give K" if unit in ("degC", "deg_C", "Celsius") else ""
+        raise InputError(f"{where}: unit {unit!r} is none of the FITS standard{hint}") from problem
+    return unit
+
+
+def _refuse_times(table: SamplerTable) -> None:
+    mjd = np.asarray(table.mjd, dtype=float)
+    bad = ~((mjd >= EARLIEST_MJD) & (mjd <= LATEST_MJD))
+    if mjd.ndim != 1 or bad.any():
+        first = f"{mjd[bad][0]!r}" if mjd.ndim == 1 else f"shape {mjd.shape}"
+        expected = f"(n,), {EARLIEST_MJD:g} to {LATEST_MJD:g} d: no Julian Date"
+        raise InputError(f"table {table.name}: MJD {first} (expected {expected})")
+
+
+def _refuse_names(table: SamplerTable, columns: Mapping[str, SamplerColumn]) -> None:
+    """Names that every reader of FITS takes; keywords that do not hide the file's own."""
+    for name in (table.name, *columns):
+        if not name or not name.isascii() or not name.replace("_", "A").isalnum() or name != name.upper():
+            raise InputError(f"table {table.name!r}: the name {name!r} (expected capital letters, digits and _)")
+    if not columns:
+        raise InputError(f"table {table.name}: has no column (expected one at least)")
+    if TIME in table.columns and table.mjd is not None:
+        raise InputError(f"table {table.name}: the column {TIME} is made of `mjd` (expected another name)")
+    for key in table.header:
+        if len(key) > 8 or key != key.upper() or key in STANDARD | OURS or key.startswith(OF_COLUMNS):
+            raise InputError(f"table {table.name}: the keyword {key!r} (expected up to 8 capitals, none of FITS's own)")
+
+
+def _ascii(where: str, text: str) -> str:
+    if text.isascii() and text.isprintable():
+        return text
+    raise InputError(f"{where}: {text!r} is not printable ASCII, and FITS holds nothing else (expected ASCII)")
+
+
+def _read(page: Any) -> SamplerTable:
+    """A table as it was given to the writer."""
+    header, columns, mjd = page.header, {}, None
+    for number, column in enumerate(page.columns, start=1):
+        values = np.array(page.data[column.name])
+        values = values.astype(values.dtype.newbyteorder("=")) if values.dtype.kind in "fi" else values
+        if column.name == TIME:
+            mjd = values
+        else:
+            columns[column.name] = SamplerColumn(column.unit or "", values, header.get(f"TCOMM{number}", ""))
+    comment, frame, pivot = (str(header.get(key, "")) for key in ("REMARK", "FRAME", "PIVOT"))
+    return SamplerTable(page.name, columns, mjd, comment, frame, pivot, _more(header))
+
+
+def _more(header: Any) -> dict[str, Any]:
+    """The keywords that are nobody's but the table's own."""
+    return {key: header[key] for key in header if key not in STANDARD | OURS and not key.startswith(OF_COLUMNS)}

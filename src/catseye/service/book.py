@@ -1,0 +1,101 @@
+"""What a person wants to see of a running site, kept as it comes: shots, last ranges, epochs, what went wrong."""
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+from typing import Any
+
+from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.records.live import Happening, LivePosture
+from catseye.service.comparison import EpochComparison, TwinComparison
+from catseye.service.logs import epoch_of
+
+GOOD = ("used", "reference")
+KEPT_EVENTS, KEPT_EPOCHS = 60, 10_000
+
+
+@dataclass(frozen=True)
+class LastShot:
+    """A ranger's last: range and its u, m, NaN where it gave none."""
+
+    target: str
+    status: str
+    range_: float
+    u_range: float
+
+
+@dataclass
+class Troubles:
+    """What went wrong: how often, and the last words, by who and kind."""
+
+    counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+    texts: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def add(self, what: Happening) -> None:
+        key = (str(what.details.get("ranger", what.who)), what.kind)
+        self.counts[key] += 1 + int(float(what.details.get("unsaid", 0)))
+        self.texts[key] = what.text
+
+
+class LiveBook:
+    """Fed with what is durable, in its order.
+
+    comparison   against the twin's truth; None: there is none
+    """
+
+    def __init__(self, comparison: TwinComparison | None = None):
+        self._comparison = comparison
+        self.posture: LivePosture | None = None
+        self.last: dict[str, LastShot] = {}
+        self.shots: Counter[str] = Counter()  # good ones by ranger
+        self.statuses: Counter[str] = Counter()
+        self.left_out: Counter[str] = Counter()  # why epochs did not use shots that were good by themselves
+        self.events: deque[Happening] = deque(maxlen=KEPT_EVENTS)
+        self.troubles = Troubles()
+        self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, points, used, rejected
+        self.comparisons: dict[int, EpochComparison] = {}
+        self.answer: dict[str, Any] = {}  # of the last epoch
+
+    def entry(self, entry: Any) -> None:
+        """One more."""
+        if isinstance(entry, AnsweredShot):
+            self._shot(entry)
+        elif isinstance(entry, Solution):
+            self._solution(entry)
+        elif isinstance(entry, LivePosture):
+            self.posture = entry
+        elif isinstance(entry, Happening):
+            self.events.append(entry)
+            if entry.severity != "note":
+                self.troubles.add(entry)
+
+    @property
+    def acknowledged(self) -> int:
+        """Shots that are durable."""
+        return sum(self.statuses.values())
+
+    @property
+    def latest(self) -> EpochComparison | None:
+        """The last epoch that was compared."""
+        return next(reversed(self.comparisons.values()), None)
+
+    def _shot(self, answered: AnsweredShot) -> None:
+        shot = answered.shot
+        self.statuses[answered.status] += 1
+        self.shots[shot.ranger] += answered.status in GOOD
+        self.last[shot.ranger] = LastShot(shot.target, answered.status, answered.range_, answered.u_range)
+        if self._comparison is not None:
+            self._comparison.shot(answered)
+
+    def _solution(self, solution: Solution) -> None:
+        compared = None if self._comparison is None else self._comparison.epoch(solution)
+        answer = solution.answer
+        self.events.append(epoch_of(solution))
+        if not answer:
+            return
+        self.answer = answer
+        if compared is not None:
+            self.comparisons[compared.number] = compared
+        counts = {key: len(answer.get(key, ())) for key in ("names", "used", "rejected")}
+        self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
+        for reason in (answer.get("rejected") or {}).values():
+            self.left_out[str(reason).partition(":")[0]] += 1

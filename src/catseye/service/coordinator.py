@@ -1,0 +1,228 @@
+"""A coordinator put together: reduction, planner, guard, journal, its own port; run until cancelled."""
+
+import asyncio
+import gc
+import sys
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from catseye.coordinator.feed import MotionScript
+from catseye.coordinator.guard import SafetyGuard
+from catseye.coordinator.journal import Journal
+from catseye.coordinator.journal_entries import Run
+from catseye.coordinator.link_settings import Address
+from catseye.coordinator.modes import Mode
+from catseye.coordinator.parts import Clock
+from catseye.coordinator.round import RoundPlanner, RoundSettings
+from catseye.coordinator.server import ZiyServer
+from catseye.coordinator.surroundings import KeepClear
+from catseye.coordinator.ziy import Coordinator
+from catseye.errors import InputError
+from catseye.ranger.addresses import COORDINATOR_PORT
+from catseye.ranger.network import Network
+from catseye.ranger.server import LOOPBACK
+from catseye.records.interlock import Interlocks
+from catseye.records.keep_out import KeepOut
+from catseye.records.reading import read_record
+from catseye.records.site_folder import SiteFolder
+from catseye.records.solids import Solids
+from catseye.reduction.live import Live, LiveSettings
+from catseye.service.settings import settings_object
+from catseye.service.solver import SolverProcess
+from catseye.service.warm import initialising_commands
+
+SWITCH = 0.0005  # s after which a thread gives way: epochs are solved beside the loop, which must not wait for them
+GROUP = 0.0005  # s that a commit waits for more; what comes while one is written is in the next
+SOLVER_AFTER = 4.0  # s
+SETTLE = 0.35  # s from the end of a planned move to its buffer: a mirror that begins to follow a line swings so long
+Filter = Literal["random_walk", "constant_velocity"]
+Feed = tuple[str, int] | MotionScript | None
+
+
+@dataclass(frozen=True)
+class Orders:
+    """How a coordinator shall work.
+
+    mode           active, passive or hold
+    drop           rangers left out from the start
+    round_s        of a round
+    filter         between epochs
+    journal        file or URL; None: nothing is kept
+    keep_buffers   samples too: only with them a replay is the same bit for bit
+    host, port     of its own clients; port 0: any free one
+    keep_out, interlocks, solids   files; None: only the Sun is kept clear of, nothing stands in the way
+    """
+
+    mode: Mode = "active"
+    drop: tuple[str, ...] = ()
+    round_s: float = 10.0
+    filter: Filter = "random_walk"
+    journal: str | None = None
+    keep_buffers: bool = True
+    host: str = LOOPBACK
+    port: int = COORDINATOR_PORT
+    keep_out: Path | None = None
+    interlocks: Path | None = None
+    solids: Path | None = None
+
+
+class NoJournal:
+    """Nothing is kept: everything is acknowledged at once."""
+
+    trouble: str | None = None
+
+    def append(self, *items: Any) -> "Future[int]":
+        done: Future[int] = Future()
+        done.set_result(0)
+        return done
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+class WaitingJournal:
+    """A journal whose entries are durable before `append` returns: in virtual time no time passes meanwhile."""
+
+    def __init__(self, journal: Journal):
+        self._journal = journal
+
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing is durable at present."""
+        return self._journal.trouble
+
+    def append(self, *items: Any) -> "Future[int]":
+        done = self._journal.append(*items)
+        with suppress(InputError):  # whoever has the future sees why
+            done.result()
+        return done
+
+    def close(self) -> None:
+        self._journal.close()
+
+
+class LiveCoordinator:
+    """A site's coordinator, ready to run.
+
+    addresses   of the rangers, by name; those that are not in it are not of this coordinator
+    feed        host and port, a motion known beforehand, or None
+    seed        of a simulated site, for the journal
+    virtual     its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
+    tell        told of the journal's trouble at once, by any thread
+
+    Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        orders: Orders,
+        *,
+        addresses: Mapping[str, Address],
+        feed: Feed,
+        clock: Clock,
+        seed: int | None = None,
+        network: Network | None = None,
+        virtual: bool = False,
+        tell: Callable[[str, bool], None] = lambda text, alarm: None,
+    ):
+        strange = sorted(set(orders.drop) - set(addresses))
+        if strange:
+            raise InputError(f"--drop {strange[0]}: no such ranger here (expected one of {', '.join(addresses)})")
+        self.site, self.orders = site, orders
+        self.settings = LiveSettings(filter=orders.filter)
+        self.live = Live(site, self.settings)
+        keep_clear = KeepClear(site, None if orders.keep_out is None else read_record(orders.keep_out, KeepOut))
+        locks = None if orders.interlocks is None else read_record(orders.interlocks, Interlocks)
+        solids = None if orders.solids is None else read_record(orders.solids, Solids)
+        plan = replace(RoundSettings(), period=orders.round_s, settle=SETTLE)
+        self.planner = RoundPlanner(site, keep_clear=keep_clear, solids=solids, settings=plan)
+        self.guard = SafetyGuard(site, keep_clear=keep_clear, interlocks=locks)
+        self._journal = self._opened(clock, seed, virtual, tell)
+        self._solver = None if virtual else SolverProcess(self.live.site)
+        self.ziy = Coordinator(
+            site,
+            addresses=addresses,
+            live=self.live,
+            planner=self.planner,
+            guard=self.guard,
+            journal=self._journal,
+            clock=clock,
+            feed=feed,
+            mode=orders.mode,
+            commands=initialising_commands(site),
+            seed=seed or 0,
+            network=network,
+            solver=None if self._solver is None else self._solver.solve,
+        )
+        for name in orders.drop:
+            self.ziy.firing.dropped.add(name)
+            self.ziy.links[name].wanted = "hold"
+        self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network)
+
+    def _opened(
+        self, clock: Clock, seed: int | None, virtual: bool, tell: Callable[[str, bool], None]
+    ) -> NoJournal | Journal | WaitingJournal:
+        if self.orders.journal is None:
+            return NoJournal()
+        journal = Journal.open(
+            self.orders.journal,
+            run=Run(self.site, settings=settings_object(self.settings), seed=seed),
+            clock=clock,
+            group=0.0 if virtual else GROUP,
+            keep_buffers=self.orders.keep_buffers,
+            on_alarm=lambda text: tell(text, True),
+            on_recovery=lambda text: tell(text, False),
+        )
+        return WaitingJournal(journal) if virtual else journal
+
+    async def _start_solver(self, solver: SolverProcess) -> None:
+        """Seconds before the first epoch, but not before the rangers are initialised: it loads for a second or two."""
+        await asyncio.sleep(SOLVER_AFTER)
+        await asyncio.to_thread(solver.start)
+
+    @property
+    def solver_pid(self) -> int | None:
+        """Of the process that solves epochs."""
+        return None if self._solver is None else self._solver.pid
+
+    async def run(self, started: Callable[[], None] = lambda: None) -> None:
+        """Measure until cancelled; everything is switched off and closed then, within five seconds.
+
+        Raises InputError: its own port cannot be had.
+        """
+        before, loading = sys.getswitchinterval(), None
+        sys.setswitchinterval(SWITCH)
+        try:
+            await self.server.start()
+            started()
+            if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
+                loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
+                gc.collect()
+                gc.freeze()  # a site of thousands of records is looked through at each full collection: 40 ms
+            await self.ziy.run()
+        finally:
+            if loading is not None:
+                loading.cancel()
+                await asyncio.gather(loading, return_exceptions=True)
+            if self._solver is not None:
+                self._solver.stop()
+            gc.unfreeze()
+            sys.setswitchinterval(before)
+            await self.server.stop()
+            if self._journal is not None:
+                with suppress(InputError):  # what could not be written has been told
+                    await asyncio.to_thread(self._journal.close)
+
+
+def _load_kernel() -> None:
+    """What the first buffer needs, compiled code from its cache: 0.5 s in which a loop would hear nobody."""
+    from catseye.signal.buffer_kernel import one_buffer
+
+    one_buffer(np.zeros(64, dtype=np.int16), 16, (-32768, 32767), 0.0, 0j, np.zeros(16), np.zeros(8))

@@ -1,0 +1,89 @@
+"""The log of a living command: a line for each happening and each epoch, for people or for programs."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.parts import Clock, ticks_now
+from catseye.gateways.writers.objects import plain
+from catseye.geometry.time_tag import MJD_EPOCH
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, Happening
+
+COLOURS = {"note": "", "warning": "\x1b[33m", "alarm": "\x1b[1;31m"}
+PLAIN = "\x1b[0m"
+
+
+class LiveLog:
+    """Lines about what happens.
+
+    write    takes a line without its end
+    json     one JSON object a line: time_utc, mjd, severity, who, kind, text, details
+    colour   warnings yellow, alarms red
+    clock    for what has no time of its own
+    least    severities that are left out: "note" leaves out nothing
+    """
+
+    def __init__(self, write: Callable[[str], None], *, clock: Clock, json: bool = False, colour: bool = False):
+        self._write, self._clock, self._json, self._colour = write, clock, json, colour
+
+    def entry(self, entry: Any) -> None:
+        """What was made durable: happenings and solutions have a line."""
+        if isinstance(entry, Happening):
+            self.happened(entry)
+        elif isinstance(entry, Solution):
+            self.happened(epoch_of(entry))
+
+    def tell(self, who: str, kind: str, text: str, severity: Any = "note") -> None:
+        """Something of now."""
+        self.happened(Happening(ticks_now(self._clock), who, kind, text, severity))
+
+    def happened(self, what: Happening) -> None:
+        """One line."""
+        if self._json:
+            row = {
+                "time_utc": time_text(what.ticks),
+                "mjd": what.ticks / TICKS_PER_DAY,
+                "severity": what.severity,
+                "who": what.who,
+                "kind": what.kind,
+                "text": one_line(what.text),
+                "details": plain(what.details),
+            }
+            self._write(json.dumps(row, allow_nan=False, ensure_ascii=True))
+            return
+        colour = COLOURS[what.severity] if self._colour else ""
+        line = f"{time_text(what.ticks)}  {what.severity:<7}  {what.who:<11}  {one_line(what.text)}"
+        self._write(f"{colour}{line}{PLAIN}" if colour else line)
+
+
+def epoch_of(solution: Solution) -> Happening:
+    """An epoch as something that happened."""
+    answer = solution.answer
+    if not answer:
+        return Happening(solution.ticks, "reduction", "epoch-empty", "nothing could be solved", "warning")
+    text = (
+        f"epoch {answer.get('number')}: {len(answer.get('names', ()))} points from {len(answer.get('used', ()))} shots"
+        f", {len(answer.get('rejected', ()))} not used"
+    )
+    factor = answer.get("variance_factor")
+    return Happening(
+        solution.ticks, "reduction", "epoch", text if factor is None else f"{text}, variance factor {factor:.2f}"
+    )
+
+
+def time_text(ticks: int) -> str:
+    """UTC to a hundredth of a second, cut.
+
+    >>> time_text(5288963344910)
+    '2003-09-07T15:12:10.00Z'
+    """
+    from datetime import timedelta
+
+    when = MJD_EPOCH + timedelta(days=ticks // TICKS_PER_DAY, seconds=(ticks % TICKS_PER_DAY) * TICK_SECONDS)
+    return f"{when:%Y-%m-%dT%H:%M:%S}.{when.microsecond // 10_000:02d}Z"
+
+
+def one_line(text: str) -> str:
+    """Whatever it holds."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())

@@ -1,0 +1,141 @@
+"""What a simulation came to: one JSON object for programs, a few lines for people."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from catseye.constants import ARCSECOND
+from catseye.coordinator.firing import OF_THE_LINE
+from catseye.records.live import TICKS_PER_DAY
+from catseye.service.book import GOOD, LiveBook
+from catseye.service.comparison import EpochComparison
+from catseye.service.world import World
+
+TOLD = 5  # troubles that people are told of: first those that are of more than single shots
+OFFSETS = (
+    ("cross_elevation_arcsec", "beam azimuth × cos E", ARCSECOND, "″"),
+    ("elevation_arcsec", "beam elevation", ARCSECOND, "″"),
+    ("focus_mm", "focus", 1e-3, "mm"),
+)
+
+
+def simulation_object(
+    book: LiveBook, world: World, journal: str | None, *, seconds: float, rangers: int
+) -> dict[str, Any]:
+    """What `catseye simulate --json` prints.
+
+    seconds   of the site's time, from the first round on
+    """
+    return {
+        "seed": world.seed,
+        "start_mjd": world.start_mjd,
+        "motion": world.motion,
+        "seconds": seconds,
+        "rangers": rangers,
+        "shots": sum(book.statuses.values()),
+        "acknowledged": book.acknowledged,
+        "used": sum(book.statuses[status] for status in GOOD),
+        "rejected": {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD},
+        "epochs": [_epoch(row, book.comparisons.get(row["number"])) for row in book.epochs],
+        "faults": list(world.faults),
+        "troubles": [
+            {"who": who, "kind": kind, "count": n, "text": book.troubles.texts[who, kind]}
+            for (who, kind), n in sorted(book.troubles.counts.items())
+        ],
+        "journal": journal,
+    }
+
+
+def _epoch(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
+    told = {
+        "number": row["number"],
+        "mjd": row["ticks"] / TICKS_PER_DAY,
+        "points": row["names"],
+        "shots": row["used"],
+        "rejected": row["rejected"],
+    }
+    if compared is None:
+        return told
+    return told | {
+        "compared": compared.points,
+        "rms_mm": compared.rms_mm,
+        "worst_mm": compared.worst_mm,
+        "worst": compared.worst,
+        "mean_u_mm": compared.mean_u_mm,
+        "chi2_per_coordinate": compared.chi2,
+        "chi2_band": list(compared.band),
+        "beam": {
+            key: {"found": found / unit, "u": u / unit, "true": true / unit}
+            for (key, _, unit, _), found, u, true in zip(
+                OFFSETS, compared.offset, compared.u_offset, compared.true_offset, strict=True
+            )
+        },
+    }
+
+
+def epoch_line(compared: EpochComparison) -> str:
+    """An epoch beside the truth, in one line."""
+    low, high = compared.band
+    verdict = (
+        "as claimed" if compared.fits else ("better than claimed" if compared.chi2 < low else "worse than claimed")
+    )
+    return (
+        f"epoch {compared.number}: {compared.points} points, off by {compared.rms_mm:.3f} mm rms "
+        f"({compared.worst} {compared.worst_mm:.2f} mm), claimed u {compared.mean_u_mm:.3f} mm, "
+        f"chi² {compared.chi2:.2f} a coordinate (99 % within {low:.2f} to {high:.2f}): {verdict}"
+    )
+
+
+def beam_lines(compared: EpochComparison) -> Iterator[str]:
+    """Where the beam points since the reference epoch, beside the truth; nothing before."""
+    for (_, name, unit, symbol), found, u, true in zip(
+        OFFSETS, compared.offset, compared.u_offset, compared.true_offset, strict=True
+    ):
+        if math.isfinite(found):
+            yield f"{name:<21} {found / unit:+7.3f} ± {u / unit:.3f} {symbol}   true {true / unit:+7.3f} {symbol}"
+
+
+def summary(
+    book: LiveBook, world: World, journal: str | None, *, seconds: float, rangers: int
+) -> list[tuple[str, str]]:
+    """Title and text of each passage."""
+    bad = {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD}
+    told = [
+        (
+            "Shots",
+            f"{sum(book.statuses.values())} by {rangers} rangers in {seconds:.0f} s, all acknowledged; "
+            + (", ".join(f"{n} {reason}" for reason, n in bad.items()) or "none left out")
+            + ".",
+        )
+    ]
+    if not book.epochs:
+        told.append(("Epochs", "none was solved: the time was too short (expected half a minute at least)."))
+    compared = list(book.comparisons.values())
+    if compared:
+        last = compared[-1]
+        inside = sum(each.fits for each in compared)
+        told.append(
+            (
+                "Truth",
+                f"{len(book.epochs)} epochs. The last, {epoch_line(last)}. In {inside} of {len(compared)} epochs "
+                "chi² is within its band.",
+            )
+        )
+        lines = list(beam_lines(last))
+        if lines:
+            told.append(("Beam", "; ".join(" ".join(line.split()) for line in lines) + ", since the reference epoch."))
+    counts = book.troubles.counts
+    worst = sorted(counts.items(), key=lambda pair: (pair[0][1] in OF_THE_LINE, -pair[1]))[:TOLD]
+    if worst:
+        told.append(
+            (
+                "Noticed",
+                "; ".join(f"{book.troubles.texts[key]}" + (f" ({n} times)" if n > 1 else "") for key, n in worst) + ".",
+            )
+        )
+    if world.faults:
+        told.append(("Faults", "on command: " + "; ".join(world.faults) + "."))
+    told.append(
+        ("Journal", f"{journal}: catseye replay {journal}" if journal else "none was kept (--journal FILE keeps it).")
+    )
+    return told

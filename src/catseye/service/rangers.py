@@ -1,0 +1,164 @@
+"""The rangers of a site served by this process, and a twin's feed with them."""
+
+import asyncio
+import importlib
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from catseye.errors import CatseyeError, InputError
+from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
+from catseye.ranger.head import Head
+from catseye.ranger.network import Network, SocketListener, Sockets
+from catseye.records.site_folder import SiteFolder
+from catseye.service.warm import WarmingClock, warm
+from catseye.simulator.site_feed import SiteFeed
+from catseye.simulator.twin import Twin
+from catseye.simulator.twin_faults import FaultBoard
+from catseye.simulator.twin_site import TwinSite
+from catseye.simulator.world_clock import Clock
+
+
+@dataclass(frozen=True)
+class Listening:
+    """Where what is served listens: host and both ports of each ranger; host and port of the feed, if any."""
+
+    rangers: Mapping[str, Address]
+    feed: tuple[str, int] | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "rangers": {name: list(at) for name, at in self.rangers.items()},
+            "feed": None if self.feed is None else list(self.feed),
+        }
+
+
+class LateSockets(Sockets):
+    """TCP whose ports are had at once, and answer from `open` on: nobody connects to rangers that are not ready."""
+
+    def __init__(self) -> None:
+        self._closed: list[asyncio.Server] | None = []
+
+    async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> SocketListener:
+        if self._closed is None:
+            return await super().serve(factory, host, port)
+        server = await asyncio.get_running_loop().create_server(factory, host, port, start_serving=False)
+        self._closed.append(server)
+        return SocketListener(server)
+
+    async def open(self) -> None:
+        """Answer from now on. Raises InputError: somebody else has taken a port meanwhile."""
+        servers, self._closed = self._closed, None
+        for server in servers or ():
+            try:
+                await server.start_serving()
+            except OSError as problem:
+                host, port = server.sockets[0].getsockname()[:2]
+                raise InputError(
+                    f"{host} port {port} cannot be had: {problem.strerror} (expected a free one)"
+                ) from problem
+
+
+class RangersServed:
+    """Rangers on TCP, with the twin's feed where there is a twin.
+
+    site        its records
+    heads       by ranger; only these are served
+    clock       of the twin, or of the machine
+    twin        whose faults and feed count; None: real heads, no feed
+    addresses   "loopback", a port base, 0 for any free ports
+    host        of all ports; None: as `addresses` says
+    ports       of the one ranger that is served; None: as `addresses` says
+    files       folder of initialisation files; None: a temporary one
+    warming     the heads' clock: with it the rangers are ready before anybody connects
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        heads: Mapping[str, Head],
+        *,
+        clock: Clock,
+        twin: Twin | None = None,
+        addresses: Addresses = PORT_BASE,
+        host: str | None = None,
+        ports: tuple[int, int] | None = None,
+        files: Path | None = None,
+        network: Network | None = None,
+        warming: WarmingClock | None = None,
+    ):
+        self._site, self._twin, self._warming = site, twin, warming
+        self._late = LateSockets() if network is None else None
+        network = network or self._late
+        begun = clock.now_ns()
+        self._served = TwinSite(
+            site,
+            heads,
+            world_faults=FaultBoard() if twin is None else twin.faults,
+            seconds=lambda: (clock.now_ns() - begun) * 1e-9 if twin is None else twin.seconds(clock.now_ns()),
+            addresses=addresses,
+            files=files,
+            network=network,
+        )
+        for name, (usual, *both) in list(self._served.addresses.items()):
+            first, second = ports or both
+            self._served.addresses[name] = (host or usual, first, second)
+        self._feed: SiteFeed | None = None
+        self._feed_at = feed_address(addresses) if addresses else (feed_address()[0], 0)
+        if host is not None:
+            self._feed_at = (host, self._feed_at[1])
+        if twin is not None:
+            stations = tuple(station.name for station in site.site.weather_station)
+            self._feed = SiteFeed(site.site.campaign.name, stations, twin, clock, network=network)
+
+    async def serve(self, listening: Callable[[Listening], None]) -> None:
+        """Listen, say where, and serve until cancelled. Raises InputError: a port or a folder that cannot be had."""
+        try:
+            await self._served.start()
+            if self._warming is not None and self._twin is not None:
+                await warm(self._site, self._served.rangers, self._warming, self._twin.told)
+            if self._late is not None:
+                await self._late.open()
+            at = None
+            if self._feed is not None:
+                await self._feed.start(*self._feed_at)
+                at = (self._feed_at[0], self._feed.port)
+            listening(Listening(dict(self._served.addresses), at))
+            await asyncio.gather(self._served.serve(), *([] if self._feed is None else [self._feed.serve()]))
+        finally:
+            if self._feed is not None:
+                await self._feed.stop()
+            await self._served.stop()
+
+
+def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, Head]:
+    """A real head for each ranger: `package.module:factory` is called with the ranger's name.
+
+    The current directory is looked in, too. Raises InputError: no such module or factory, or it gives no head.
+    """
+    module, _, name = factory.partition(":")
+    if not module or not name:
+        raise InputError(f"--head {factory!r}: expected package.module:factory")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        made = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, SyntaxError) as problem:
+        raise InputError(f"--head {factory}: cannot be had: {problem} (expected package.module:factory)") from problem
+    if not callable(made):
+        raise InputError(f"--head {factory}: {name} cannot be called (expected a function of a ranger's name)")
+    heads: dict[str, Head] = {}
+    for ranger in rangers:
+        try:
+            head = made(ranger)
+        except (CatseyeError, OSError) as problem:
+            raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
+        missing = [each for each in dir(Head) if not each.startswith("_") and not hasattr(head, each)]
+        if missing:
+            raise InputError(f"--head {factory}: what it gives for {ranger} has no {missing[0]} (expected a Head)")
+        heads[ranger] = head
+    return heads

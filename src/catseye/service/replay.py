@@ -1,0 +1,160 @@
+"""A run of a journal reduced again: the same to the last bit, or how far other calibrations move its points."""
+
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.journal_reader import JournalReader, StoredRun
+from catseye.coordinator.replay import Replayed, replay
+from catseye.errors import InputError
+from catseye.records.site_folder import SiteFolder, read_site
+from catseye.reduction.live import Live
+from catseye.service.settings import live_settings
+
+TOLD = 20  # points that people are told of: those that move most
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A point's difference, new less stored: mean (x, y, z), largest length, mm, and in how many epochs."""
+
+    mean_mm: tuple[float, float, float]
+    largest_mm: float
+    epochs: int
+
+
+@dataclass
+class ReplayFound:
+    """What came of it.
+
+    run            that was replayed
+    calibrations   folder of other records, None for the run's own
+    epochs, shots  fed
+    same_epochs    that are the same to the last bit
+    same_shots     the same
+    first          number of the first epoch that differs, and of what
+    moved          by point
+    lost           points of stored epochs that the new ones do not have
+    """
+
+    run: StoredRun
+    calibrations: Path | None
+    epochs: int = 0
+    shots: int = 0
+    same_epochs: int = 0
+    same_shots: int = 0
+    first: str = ""
+    moved: dict[str, Moved] = field(default_factory=dict)
+    lost: int = 0
+
+    @property
+    def same(self) -> bool:
+        """All to the last bit."""
+        return self.epochs == self.same_epochs and self.shots == self.same_shots
+
+
+def replayed(journal: str, which: int | str | None, calibrations: Path | None, progress: Progress) -> ReplayFound:
+    """A run again, with its own records or others.
+
+    Raises InputError: no such journal, run or folder; a run that does not say how it was reduced; nothing solved in it.
+    """
+    other = None if calibrations is None else read_site(calibrations)
+    with JournalReader(journal) as reader:
+        run = reader.run(which)
+        settings = live_settings(run.settings, f"journal {reader.place}: run {run.run}")
+
+        def made(site: SiteFolder, _: StoredRun) -> Live:
+            return Live(site if other is None else other, settings)
+
+        total = sum(1 for _ in reader.solutions(run.run))
+        if not total:
+            raise InputError(f"journal {reader.place}: run {run.run} holds no epoch (expected one at least)")
+        found = ReplayFound(run, calibrations)
+        off: dict[str, list[np.ndarray]] = defaultdict(list)
+        for each in replay(reader, run.run, made):
+            progress("epochs", found.epochs, total)
+            _count(found, each)
+            _compare(found, each, off)
+    found.moved = {name: _moved(np.array(rows) / MILLIMETRE) for name, rows in sorted(off.items())}
+    return found
+
+
+def _count(found: ReplayFound, each: Replayed) -> None:
+    found.epochs += 1
+    found.shots += each.shots
+    found.same_epochs += each.stored.same(each.new)
+    found.same_shots += each.shots - len(each.differing)
+    if not each.same and not found.first:
+        what = "a shot" if each.differing else "its solution"
+        found.first = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
+
+
+def _compare(found: ReplayFound, each: Replayed, off: dict[str, list[np.ndarray]]) -> None:
+    before, after = _places(each.stored), _places(each.new)
+    found.lost += len(set(before) - set(after))
+    for name in set(before) & set(after):
+        off[name].append(after[name] - before[name])
+
+
+def _places(solution: Solution) -> dict[str, np.ndarray]:
+    names, x = solution.answer.get("names") or [], solution.answer.get("x") or []
+    return {name: np.array(place, dtype=float) for name, place in zip(names, x, strict=False)}
+
+
+def _moved(rows: np.ndarray) -> Moved:
+    mean = rows.mean(axis=0)
+    return Moved((float(mean[0]), float(mean[1]), float(mean[2])), float(np.linalg.norm(rows, axis=1).max()), len(rows))
+
+
+def replay_object(found: ReplayFound) -> dict[str, Any]:
+    """What `catseye replay --json` prints."""
+    return {
+        "run": found.run.run,
+        "uuid": found.run.uuid,
+        "site": found.run.site,
+        "calibrations": None if found.calibrations is None else str(found.calibrations),
+        "epochs": found.epochs,
+        "epochs_same": found.same_epochs,
+        "shots": found.shots,
+        "shots_same": found.same_shots,
+        "same": found.same,
+        "first_difference": found.first or None,
+        "points": {
+            name: {"mean_mm": list(m.mean_mm), "largest_mm": m.largest_mm, "epochs": m.epochs}
+            for name, m in found.moved.items()
+        },
+        "points_lost": found.lost,
+    }
+
+
+def replay_passages(found: ReplayFound) -> list[tuple[str, str]]:
+    """Title and text of each."""
+    run = found.run
+    told = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {found.shots} shots.")]
+    if found.same:
+        told.append(("Epochs", f"{found.epochs} the same bit for bit, and all {found.shots} shots."))
+        return told
+    told.append(
+        (
+            "Epochs",
+            f"{found.same_epochs} of {found.epochs} the same bit for bit, {found.same_shots} of {found.shots} shots; "
+            f"the first that differs is {found.first}.",
+        )
+    )
+    if found.calibrations is None and not run.buffers:
+        told.append(("Why", "the run kept no samples (catseye ziy --keep-buffers keeps them)."))
+    for name, m in sorted(found.moved.items(), key=lambda pair: -pair[1].largest_mm)[:TOLD]:
+        x, y, z = m.mean_mm
+        told.append(
+            (name, f"{x:+.3f}, {y:+.3f}, {z:+.3f} mm on the mean of {m.epochs} epochs, at most {m.largest_mm:.3f} mm")
+        )
+    if len(found.moved) > TOLD:
+        told.append(("And", f"{len(found.moved) - TOLD} more points, which moved less (--json has them)."))
+    return told

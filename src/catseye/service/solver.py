@@ -1,0 +1,158 @@
+"""Epochs solved in a process beside: a second of algebra must not hold up a loop that hears eighteen rangers.
+
+The process has the site from the start, and is sent what differs. It leaves when its pipe ends, whatever became of us,
+and gives way to everything else (`nice`). Should it die, the epoch is solved here, and it is started again.
+"""
+
+import asyncio
+import io
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from functools import partial
+from typing import Any, BinaryIO
+
+from catseye.coordinator.parts import EpochJob
+from catseye.records.site_folder import SiteFolder
+
+PROGRAM = (sys.executable, "-P", "-c", "from catseye.service.solver import serve; serve()")
+NICE = 5
+SITE = "site"  # what stands for the site in a message
+LENGTH = 8  # bytes before each message
+
+
+class SolverProcess:
+    """One process for one site; `solve` is what an `Intake` wants.
+
+    site   the very object that jobs carry: `Live.site`
+    """
+
+    def __init__(self, site: SiteFolder):
+        self._site = site
+        self._process: subprocess.Popen[bytes] | None = None
+        self._changing, self._ended = threading.Lock(), False
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process that runs."""
+        return None if self._process is None else self._process.pid
+
+    def start(self) -> None:
+        """Begin it, if it does not run, and give it the site: some 0.1 s; what it needs it loads by itself."""
+        with self._changing:
+            if self._process is not None or self._ended:
+                return
+            self._process = subprocess.Popen(
+                PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+            )  # its own session: Ctrl-C is for us, who end it in our turn
+            with suppress(OSError):  # whoever asks it first finds out that it died
+                _send(self._process.stdin, dumped(self._site, None))
+
+    async def solve(self, job: EpochJob) -> Any:
+        """What `job.solve()` gives, from the process; where that died, from here."""
+        loop = asyncio.get_running_loop()
+        try:
+            return await loop.run_in_executor(None, partial(self._asked, job))
+        except (EOFError, OSError):
+            self._discard()
+            await loop.run_in_executor(None, self.start)
+        return await loop.run_in_executor(None, job.solve)
+
+    def stop(self) -> None:
+        """End it, whatever it does, for good."""
+        with self._changing:
+            self._ended = True
+        self._discard()
+
+    def _discard(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+
+    def _asked(self, job: EpochJob) -> Any:
+        process = self._process
+        if process is None:
+            raise EOFError("no process")
+        _send(process.stdin, dumped(job, self._site))
+        answer = loaded(_received(process.stdout), self._site)
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, file: io.BytesIO, site: SiteFolder | None):
+        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
+        self._site = site
+
+    def persistent_id(self, obj: Any) -> str | None:
+        return SITE if obj is self._site and obj is not None else None
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, site: SiteFolder | None):
+        super().__init__(file)
+        self._site = site
+
+    def persistent_load(self, pid: Any) -> SiteFolder:
+        if pid != SITE or self._site is None:
+            raise pickle.UnpicklingError(f"{pid!r} stands for nothing (expected {SITE!r})")
+        return self._site
+
+
+def dumped(what: Any, site: SiteFolder | None) -> bytes:
+    """A message; the site itself does not travel."""
+    file = io.BytesIO()
+    _Pickler(file, site).dump(what)
+    return file.getvalue()
+
+
+def loaded(message: bytes, site: SiteFolder | None) -> Any:
+    """What `dumped` was given, with this site in it."""
+    return _Unpickler(io.BytesIO(message), site).load()
+
+
+def serve() -> None:
+    """The process: a site, then one job after another, until its standard input ends."""
+    with suppress(OSError):
+        os.nice(NICE)
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever prints must not stand between answers
+    try:
+        site = loaded(_received(sys.stdin.buffer), None)
+        while True:
+            message = _received(sys.stdin.buffer)
+            try:
+                answer = loaded(message, site).solve()
+            except Exception as problem:  # noqa: BLE001 - a mistake of ours: the coordinator's to raise
+                answer = problem
+            _send(answers, dumped(answer, site))
+    except (EOFError, OSError):
+        return
+
+
+def _send(pipe: Any, message: bytes) -> None:
+    pipe.write(len(message).to_bytes(LENGTH, "big") + message)
+    pipe.flush()
+
+
+def _received(pipe: Any) -> bytes:
+    """One message. Raises EOFError: there is no more, or only a part."""
+    length = int.from_bytes(_exactly(pipe, LENGTH), "big")
+    return _exactly(pipe, length)
+
+
+def _exactly(pipe: BinaryIO, count: int) -> bytes:
+    found = pipe.read(count)
+    if len(found) < count:
+        raise EOFError(f"{len(found)} bytes of {count}")
+    return found

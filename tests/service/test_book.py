@@ -1,0 +1,169 @@
+"""What is kept of a running site, and what it comes to in words and for programs."""
+
+import json
+import math
+from io import StringIO
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.gateways.writers.objects import json_line
+from catseye.records.live import Happening, LivePosture, LiveShot
+from catseye.service.book import LiveBook
+from catseye.service.comparison import EpochComparison
+from catseye.service.objects import epoch_line, simulation_object, summary
+from catseye.service.screen import LinesView, ScreenView
+from catseye.service.world import World
+
+NAN3 = np.full(3, math.nan)
+
+
+class Judge:
+    """Gives each epoch the same comparison."""
+
+    def __init__(self, **other):
+        self.shots, self.other = [], other
+
+    def shot(self, answered):
+        self.shots.append(answered)
+
+    def epoch(self, solution):
+        if not solution.answer:
+            return None
+        told = {
+            "number": solution.answer["number"],
+            "ticks": solution.ticks,
+            "points": 30,
+            "worst": "TR01-B",
+            "worst_mm": 0.5,
+            "rms_mm": 0.1,
+            "mean_u_mm": 0.12,
+            "chi2": 0.9,
+            "band": (0.7, 1.4),
+            **dict.fromkeys(("offset", "u_offset", "true_offset"), NAN3),
+        }
+        return EpochComparison(**(told | self.other))
+
+
+def shot(number, ranger="ZY101", status="used", range_=100.0):
+    taken = LiveShot(ranger, "TR01-B", number, 128, 64, 1000, 1e-4, None, number=number)
+    return AnsweredShot(taken, status, "", range_, 3e-5, 0.0)
+
+
+def epoch(number, **rejected):
+    answer = {
+        "number": number,
+        "names": ["A"] * 30,
+        "used": [1, 2],
+        "rejected": {str(k): v for k, v in enumerate(rejected.values())},
+    }
+    return Solution(number, answer)
+
+
+def filled(**other):
+    judge = Judge(**other)
+    book = LiveBook(judge)
+    for entry in [
+        shot(1),
+        shot(2, "ZY102", "reference", math.nan),
+        shot(3, status="blocked"),
+        LivePosture(5, 2.5, 0.5),
+    ]:
+        book.entry(entry)
+    book.entry(epoch(1, a="reflected: range +1 mm off"))
+    book.entry(
+        Happening(6, "coordinator", "blocked", "ZY101 A: blocked", "warning", {"ranger": "ZY101", "unsaid": 4.0})
+    )
+    book.entry(Happening(7, "ZY104", "hung", "VER was not answered", "alarm"))
+    book.entry(Happening(8, "ZY104", "ready", "made ready"))
+    book.entry(Solution(9, {}))
+    return book, judge
+
+
+def test_it_counts_what_comes():
+    book, judge = filled()
+    assert (book.acknowledged, dict(book.statuses)) == (3, {"used": 1, "reference": 1, "blocked": 1})
+    assert dict(book.shots) == {"ZY101": 1, "ZY102": 1}
+    assert book.last["ZY101"].status == "blocked"
+    assert len(judge.shots) == 3
+    assert [row["number"] for row in book.epochs] == [1]
+    assert dict(book.left_out) == {"reflected": 1}
+    assert dict(book.troubles.counts) == {("ZY101", "blocked"): 5, ("ZY104", "hung"): 1}
+    assert book.latest.rms_mm == 0.1
+
+
+def test_programs_get_numbers_and_null_for_what_is_not_known():
+    book, _ = filled()
+    world = World(60635.125, faults=("dead-ranger ZY104 1 2",))
+    text = json_line(simulation_object(book, world, "night.db", seconds=60.0, rangers=18))
+    told = json.loads(text, parse_constant=lambda name: pytest.fail(name))
+    assert (told["shots"], told["acknowledged"], told["used"], told["journal"]) == (3, 3, 2, "night.db")
+    assert told["rejected"] == {"blocked": 1, "reflected": 1}
+    assert told["faults"] == ["dead-ranger ZY104 1 2"]
+    first = told["epochs"][0]
+    assert (first["number"], first["rms_mm"], first["chi2_per_coordinate"]) == (1, 0.1, 0.9)
+    assert first["beam"]["focus_mm"] == {"found": None, "u": None, "true": None}
+
+
+def test_people_are_told_first_what_is_of_more_than_one_shot():
+    book, _ = filled()
+    passages = dict(summary(book, World(60635.125), None, seconds=60.0, rangers=18))
+    assert passages["Noticed"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
+    assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
+    assert "In 1 of 1 epochs" in passages["Truth"]
+    assert "none was kept" in passages["Journal"]
+    assert "none was solved" in dict(summary(LiveBook(), World(60635.125), None, seconds=1.0, rangers=1))["Epochs"]
+
+
+@pytest.mark.parametrize(
+    ("chi2", "said"), [(0.5, "better than claimed"), (1.0, "as claimed"), (2.0, "worse than claimed")]
+)
+def test_an_epochs_line_judges_the_claim(chi2, said):
+    assert epoch_line(filled(chi2=chi2)[0].latest).endswith(said)
+
+
+def running(troubles=()):
+    link = SimpleNamespace(state="ready", troubles=troubles)
+    ziy = SimpleNamespace(
+        links={"ZY101": link, "ZY102": link},
+        firing=SimpleNamespace(dropped={"ZY102"}),
+        mode="active",
+        round_number=4,
+        site=SimpleNamespace(site=SimpleNamespace(campaign=SimpleNamespace(name="gbt"))),
+    )
+    return SimpleNamespace(ziy=ziy)
+
+
+@pytest.mark.parametrize("width", [80, 150])
+def test_the_screen_shows_rangers_epochs_and_events_within_its_width(width):
+    screen = StringIO()
+    console = Console(file=screen, width=width, height=40, force_terminal=True, color_system=None)
+    book, _ = filled(offset=np.array([1e-6, -1e-6, 1e-4]), u_offset=np.full(3, 1e-6), true_offset=np.zeros(3))
+    view = ScreenView(console)
+    view.begin(book, running(troubles=("slow",)))
+    view.entry(epoch(1))
+    view.end()
+    text = screen.getvalue()
+    for piece in ("ZY101", "slow", "dropped", "TR01-B blocked", "0.100", "0.70-1.40", "beam elevation", "143.2394°"):
+        assert piece in text
+    assert ("VER was not answered" in text) == (width == 150)
+    assert text.rstrip().endswith("\x1b[?25h")  # the cursor is there again
+
+
+def test_plain_lines_are_of_epochs_and_of_what_lasts():
+    said = []
+    view = LinesView(said.append)
+    book, _ = filled()
+    view.begin(book, running())
+    for entry in (
+        epoch(1),
+        Happening(6, "coordinator", "blocked", "one shot", "warning"),
+        Happening(7, "ZY1", "hung", "no VER", "alarm"),
+    ):
+        view.entry(entry)
+    assert len(said) == 2
+    assert "epoch 1: 30 points" in said[0]
+    assert said[1].endswith("alarm: no VER")

@@ -1,0 +1,108 @@
+"""A process beside this one."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from catseye.errors import InputError
+from catseye.service.child import LiveChild
+
+SPEAKS = "import sys; print('here', flush=True); sys.stdin.read()"
+DEAF = (
+    "import signal, sys, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('here', flush=True); "
+    "sys.stdin.read(); time.sleep(60)"
+)
+DIES = "import sys; sys.stderr.write('catseye: port 5240 is taken\\n'); sys.exit(1)"
+
+
+def child(text, said=None, warned=None):
+    lists = [] if said is None else said, [] if warned is None else warned
+    return LiveChild("twin", (), said=lists[0].append, warned=lists[1].append, program=(sys.executable, "-c", text))
+
+
+def alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_it_is_there_when_it_has_spoken_and_gone_when_it_was_stopped():
+    async def story():
+        said = []
+        one = child(SPEAKS, said)
+        await one.start()
+        pid = one.pid
+        assert (said, alive(pid)) == (["here"], True)
+        await one.stop()
+        assert not alive(pid)
+        assert one.pid is None
+
+    asyncio.run(story())
+
+
+def test_one_that_does_not_listen_is_killed_in_time():
+    async def story():
+        one = child(DEAF)
+        await one.start()
+        pid, since = one.pid, time.monotonic()
+        await one.stop()
+        assert not alive(pid)
+        assert time.monotonic() - since < 4.0  # two for it to obey, and a busy machine
+
+    asyncio.run(story())
+
+
+def test_one_that_cannot_start_says_why_in_its_own_words():
+    async def story():
+        with pytest.raises(InputError, match=r"^twin: port 5240 is taken$"):
+            await child(DIES).keep()
+
+    asyncio.run(story())
+
+
+def test_one_that_dies_is_started_again_and_ends_with_its_keeper():
+    async def story():
+        said, warned = [], []
+        one = child(SPEAKS, said, warned)
+        kept = asyncio.create_task(one.keep())
+        while not said:
+            await asyncio.sleep(0.01)
+        first = one.pid
+        os.kill(first, signal.SIGKILL)
+        async with asyncio.timeout(30.0):
+            while len(said) < 2:
+                await asyncio.sleep(0.05)
+        second = one.pid
+        assert second != first
+        assert f"ended with status {-signal.SIGKILL}" in warned[0]
+        kept.cancel()
+        await asyncio.gather(kept, return_exceptions=True)
+        assert not alive(second)
+
+    asyncio.run(story())
+
+
+def test_it_does_not_outlive_a_keeper_that_is_killed():
+    keeper = (
+        "import asyncio, sys\n"
+        "from catseye.service.child import LiveChild\n"
+        f"one = LiveChild('twin', (), said=lambda line: print(one.pid, flush=True), warned=print, "
+        f"program=(sys.executable, '-c', {SPEAKS!r}))\n"
+        "asyncio.run(one.keep())\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", keeper], stdout=subprocess.PIPE, text=True) as process:
+        pid = int(process.stdout.readline())
+        assert alive(pid)
+        process.kill()
+        process.communicate()
+    until = time.monotonic() + 10.0
+    while alive(pid) and time.monotonic() < until:
+        os.sched_yield()
+    assert not alive(pid)

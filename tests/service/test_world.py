@@ -1,0 +1,71 @@
+"""A twin in words: the same words make the same twin in every process."""
+
+import numpy as np
+import pytest
+import typer
+
+from catseye.errors import InputError
+from catseye.service.world import World
+from simulator.living_scene import site
+
+
+def test_its_options_say_the_same_world_to_another_process(monkeypatch):
+    import catseye.cli.zy as command
+    from catseye.cli.commands import app, join_commands
+
+    join_commands()
+    world = World(60635.1234567891, seed=5, offset=-1.25e8 - 1e-7, motion="slew 10 30 40 50", faults=("dew * 5 9 0.1",))
+    made = []
+
+    def noted(*given, **named):
+        made.append(World(*given, **named))
+        raise InputError("enough")
+
+    monkeypatch.setattr("catseye.service.world.World", noted)
+    monkeypatch.setattr(command, "site_of", lambda name: site())
+    with pytest.raises(InputError, match="enough"):
+        typer.main.get_command(app).main(["zy", "gbt", *world.options()])
+    assert made == [world]
+
+
+def test_two_of_the_same_words_tell_the_same_truth_and_time():
+    one, two = (World(60635.125, seed=3, offset=12.5) for _ in "ab")
+    a, b = one.twin(site()).point("ZEG41040L", 7.0), two.twin(site()).point("ZEG41040L", 7.0)
+    assert np.array_equal(a, b)
+    first, second = one.clock(), two.clock()
+    low, middle, high = first.now_ns(), second.now_ns(), first.now_ns()
+    assert low - 10**7 <= middle <= high + 10**7  # each read UTC once, between which its steps would show
+
+
+def test_one_that_starts_now_reads_its_start_and_one_that_is_late_reads_earlier():
+    world = World.starting_now(52889.25)
+    assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
+    late = world.late(100.0)
+    assert (world.clock().now_ns() - late.clock().now_ns()) * 1e-9 == pytest.approx(100.0, abs=5.0)
+
+
+@pytest.mark.parametrize("words", [{"motion": "dance"}, {"faults": ("sleepy ZY101",)}, {"conditions": "nice"}])
+def test_what_there_is_not_is_refused(words):
+    with pytest.raises(InputError, match="expected"):
+        World(60635.125, **words)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("dead-ranger ZY999", "ZY999 is no ranger"),
+        ("lying-station ZY101", "ZY101 is no weather station"),
+        ("silent-telescope ZY101", "is no telescope"),
+        ("dew ZY999", "no target"),
+        ("stuck-axis ZY101:2", "2 is no axis"),
+        ("blocked-beam ZY101:NOWHERE", "NOWHERE is no target"),
+    ],
+)
+def test_a_fault_on_nobody_is_refused(fault, said):
+    with pytest.raises(InputError, match=said):
+        World(60635.125, faults=(fault,)).twin(site())
+
+
+@pytest.mark.parametrize("fault", ["dead-ranger *", "blocked-beam ZY101:ZEG41040L", "lost-index ZY101:1", "dew *"])
+def test_a_fault_on_somebody_is_not(fault):
+    assert World(60635.125, faults=(fault,)).twin(site()).faults.faults[0].whom == fault.split()[1]
