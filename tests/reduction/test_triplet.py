@@ -15,8 +15,9 @@ from catseye.gateways.writers.objects import plain
 from catseye.optics import cats_eye, prism
 from catseye.records.reading import read_record
 from catseye.records.triplet_measurement import TripletMeasurement
-from catseye.reduction.triplet import TOLERANCE, combined, conformity_probability, reduce_triplet, triplet_readings
+from catseye.reduction.triplet import combined, reduce_triplet, triplet_readings
 from catseye.reduction.triplet_geometry import half_wavelengths
+from catseye.reduction.triplet_result import TOLERANCE, conformity_probability
 from repository import TESTS
 from triplet_scene import SHEET, N, document, measurement, noisy_unit
 

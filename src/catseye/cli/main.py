@@ -14,6 +14,12 @@ def run() -> None:
     leave_on_signals()
     from catseye.cli.terminal import finish
 
-    status = finish()
+    status = finish(_main)
     ignore_signals()
     sys.exit(status)
+
+
+def _main() -> None:
+    from catseye.cli.commands import main  # under `finish`: what fails while it is imported is one line, too
+
+    main()

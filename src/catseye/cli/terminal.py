@@ -15,21 +15,15 @@ WIDTH = 100  # columns; longer lines are hard to read
 INTERVAL = 0.1  # s between two refreshes of the progress line
 
 
-def finish() -> int:
-    """Run the command of this process and flush what it said; the exit status."""
+def finish(command: Callable[[], None]) -> int:
+    """Run a command and flush what it said; the exit status of this process."""
     sys.excepthook = _unexpected
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # stderr is for people and one-line failures; tests make warnings errors
-    return attempt(_command) or attempt(lambda: say(""))
-
-
-def _command() -> None:
-    from catseye.cli.commands import main
-
-    main()
+    return attempt(command) or attempt(lambda: say(""))
 
 
 def attempt(command: Callable[[], None]) -> int:

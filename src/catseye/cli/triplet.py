@@ -10,7 +10,7 @@ from catseye.cli.networks import Out
 from catseye.cli.terminal import ProgressLine, say, wrapped
 
 if TYPE_CHECKING:
-    from catseye.reduction.triplet import TripletReduction
+    from catseye.reduction.triplet_result import TripletReduction
 
     Units = list[tuple[Path, TripletReduction]]
 

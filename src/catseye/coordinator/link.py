@@ -18,8 +18,9 @@ from catseye.coordinator.journal_entries import Command
 from catseye.coordinator.link_settings import Address, LinkSettings, Wanted
 from catseye.coordinator.parts import Clock, PlannedShot, SafetyGuard, Tell, ticks_now
 from catseye.coordinator.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
-from catseye.coordinator.shooting import Sent, Shooter
+from catseye.coordinator.shooting import Shooter
 from catseye.coordinator.status_watch import StatusWatch
+from catseye.coordinator.wire import Sent
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS

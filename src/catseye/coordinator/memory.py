@@ -16,7 +16,7 @@ from catseye.geometry.slew import Pace
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
 from catseye.ranger.motion_units import acceleration_counts, velocity_counts
-from catseye.ranger.ranger import AxisSettings
+from catseye.ranger.state import AxisSettings
 from catseye.ranger.status import Status
 from catseye.ranger.values import Value
 from catseye.records.site_folder import REFERENCE

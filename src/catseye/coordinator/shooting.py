@@ -6,20 +6,16 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from catseye.coordinator.decode import BufferRead, Measurement, buffer_of, measurement_of, reals_of, shot_of
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, PlannedShot, ticks_now
 from catseye.coordinator.preparation import Refused
+from catseye.coordinator.wire import Sent, Wire
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request, stamp_text
 from catseye.records.live import LiveShot
 
-if TYPE_CHECKING:
-    from catseye.coordinator.link import RangerLink
-
-Sent = tuple[int, "asyncio.Future[Reply]"]  # TID, and what will be answered
 SURELY = 12  # ticks, 10 ms: a start stamp so long ago is over by the ranger's clock, too
 IN_HAND = 0.05  # s of it for replies and samples, which are over when the next shot is asked for
 LONGEST_WAY = 5_000  # ticks, 4.3 s: what is planned farther apart waits for something else
@@ -51,7 +47,7 @@ class Shooter:
     `aimed` is the cube that the mirror rests on, None where it is not known or the mirror follows one.
     """
 
-    def __init__(self, link: "RangerLink", herald: Herald, clock: Clock):
+    def __init__(self, link: Wire, herald: Herald, clock: Clock):
         self._link, self._herald, self._clock = link, herald, clock
         self.aimed: int | None = None
         self._before: PlannedShot | None = None

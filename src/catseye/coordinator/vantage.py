@@ -18,7 +18,7 @@ from catseye.geometry.pointing import Station, counts
 from catseye.geometry.slew import Pace
 from catseye.ranger.initialisation import frame_of, own_station
 from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
-from catseye.ranger.ranger import AxisSettings
+from catseye.ranger.state import AxisSettings
 from catseye.records.live import TICK_SECONDS, LivePosture
 from catseye.records.mirror import Mirror
 from catseye.records.site_folder import SiteFolder

@@ -6,7 +6,7 @@ from catseye.errors import InputError
 from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger import motion_units
-from catseye.ranger.ranger import Ranger, Values, Work
+from catseye.ranger.state import RangerState, Values, Work
 from catseye.ranger.values import Value
 
 FILTER = ("FKP", "FKI", "FKD", "FIL", "FSI")
@@ -16,7 +16,7 @@ HOMING_TIME = 30.0  # s, [CREAGER02] page FHM
 Handler = Callable[..., Values | Work]
 
 
-def _aba(z: Ranger, _: int, axis: int, value: int | None = None) -> Values:
+def _aba(z: RangerState, _: int, axis: int, value: int | None = None) -> Values:
     settings = z.axes[axis]
     if value is not None:
         motion_units.checked_rates("ABA", settings.velocity, value)
@@ -24,7 +24,7 @@ def _aba(z: Ranger, _: int, axis: int, value: int | None = None) -> Values:
     return str(axis), str(settings.acceleration)
 
 
-def _abv(z: Ranger, _: int, axis: int, value: int | None = None) -> Values:
+def _abv(z: RangerState, _: int, axis: int, value: int | None = None) -> Values:
     settings = z.axes[axis]
     if value is not None:
         motion_units.checked_rates("ABV", value, settings.acceleration)
@@ -32,18 +32,18 @@ def _abv(z: Ranger, _: int, axis: int, value: int | None = None) -> Values:
     return str(axis), str(settings.velocity)
 
 
-def _abp(z: Ranger, _: int, axis: int, counts: int) -> Values:
+def _abp(z: RangerState, _: int, axis: int, counts: int) -> Values:
     z.axes[axis].position = counts
     return str(axis), str(counts)
 
 
-def _stt(z: Ranger, _: int, axis: int) -> Values:
+def _stt(z: RangerState, _: int, axis: int) -> Values:
     start_moves(z, {axis: z.axes[axis].position})
     z.aimed = None
     return (str(axis),)
 
 
-def start_moves(z: Ranger, targets: dict[int, int]) -> None:
+def start_moves(z: RangerState, targets: dict[int, int]) -> None:
     """Begin moves of one or both axes, unless amplifiers are off, a stop or the Sun forbids it."""
     end = [targets.get(axis, z.head.desired(axis)) for axis in (0, 1)]
     for axis in targets:
@@ -60,13 +60,13 @@ def start_moves(z: Ranger, targets: dict[int, int]) -> None:
             raise InputError(f"axis {axis} did not start (expected the last move to have ended: WAI {axis})")
 
 
-def _wai(z: Ranger, _: int, axis: int) -> Work:
+def _wai(z: RangerState, _: int, axis: int) -> Work:
     yield from wait_until(z, lambda: not z.head.moving(axis), MOVE_TIME, f"axis {axis} has not arrived")
     refuse_motors_off(z, (axis,))
     return str(axis), str(z.head.actual(axis))
 
 
-def refuse_motors_off(z: Ranger, axes: tuple[int, ...]) -> None:
+def refuse_motors_off(z: RangerState, axes: tuple[int, ...]) -> None:
     for axis in axes:
         if z.head.motor_off(axis):
             raise InputError(
@@ -75,7 +75,7 @@ def refuse_motors_off(z: Ranger, axes: tuple[int, ...]) -> None:
 
 
 def wait_until(
-    z: Ranger, done: Callable[[], bool], seconds: float, what: str, *, earliest: float | None = None
+    z: RangerState, done: Callable[[], bool], seconds: float, what: str, *, earliest: float | None = None
 ) -> Generator[int | None, None, None]:
     """Give the turn back until it is done, `earliest` in so many s; InputError after `seconds`."""
     begin = z.now_ns()
@@ -87,21 +87,21 @@ def wait_until(
         yield ask
 
 
-def _acp(z: Ranger, _: int, axis: int) -> Values:
+def _acp(z: RangerState, _: int, axis: int) -> Values:
     return str(axis), str(z.head.actual(axis))
 
 
-def _dsp(z: Ranger, _: int, axis: int) -> Values:
+def _dsp(z: RangerState, _: int, axis: int) -> Values:
     return str(axis), str(z.head.desired(axis))
 
 
-def _axis(z: Ranger, _: int, axis: int, on: int | None = None) -> Values:
+def _axis(z: RangerState, _: int, axis: int, on: int | None = None) -> Values:
     if on is not None:
         z.head.enable(axis, bool(on))
     return str(axis), str(int(z.head.enabled(axis)))
 
 
-def _erl(z: Ranger, _: int, axis: int, counts: int | None = None) -> Values:
+def _erl(z: RangerState, _: int, axis: int, counts: int | None = None) -> Values:
     if counts is not None:
         z.head.set_error_limit(axis, counts)
         z.axes[axis].error_limit = counts
@@ -109,7 +109,7 @@ def _erl(z: Ranger, _: int, axis: int, counts: int | None = None) -> Values:
 
 
 def _filter_value(place: int) -> Handler:
-    def handler(z: Ranger, _: int, axis: int, value: int | None = None) -> Values:
+    def handler(z: RangerState, _: int, axis: int, value: int | None = None) -> Values:
         if value is not None:
             old = list(z.axes[axis].filter)
             old[place] = value
@@ -119,7 +119,7 @@ def _filter_value(place: int) -> Handler:
     return handler
 
 
-def _flt(z: Ranger, _: int, axis: int, *values: int) -> Values:
+def _flt(z: RangerState, _: int, axis: int, *values: int) -> Values:
     if values:
         kp, ki, kd, il, interval = values
         z.head.set_filter(axis, (kp, ki, kd, il, interval))
@@ -127,7 +127,7 @@ def _flt(z: Ranger, _: int, axis: int, *values: int) -> Values:
     return str(axis), *map(str, z.axes[axis].filter)
 
 
-def _fhm(z: Ranger, _: int, axis: int) -> Work:
+def _fhm(z: RangerState, _: int, axis: int) -> Work:
     if not z.head.enabled(axis):
         raise InputError(f"amplifier of axis {axis} is off (expected AXIS {axis}, 1 first)")
     if z.homed and z.head.laser_on():
@@ -148,13 +148,13 @@ def _fhm(z: Ranger, _: int, axis: int) -> Work:
     return (str(axis),)
 
 
-def _cwt(z: Ranger, _: int, key: Value) -> Work:
+def _cwt(z: RangerState, _: int, key: Value) -> Work:
     cube = z.cubes.find(key)
     yield from settle(z, z.cubes.counts(cube))
     return (str(cube.number),)
 
 
-def settle(z: Ranger, counts: tuple[float, float]) -> Generator[int | None, None, None]:
+def settle(z: RangerState, counts: tuple[float, float]) -> Generator[int | None, None, None]:
     """WCNT reads in a row within WTOL of both axes, before WTMO."""
     wanted, row = [round(n) for n in counts], 0
     end = z.now_ns() + round(z.timeout * PER_SECOND)
@@ -174,7 +174,7 @@ def settle(z: Ranger, counts: tuple[float, float]) -> Generator[int | None, None
 def _number(name: str, text: Callable[[float], str] = str) -> Handler:
     """A setting that is one attribute of the ranger."""
 
-    def handler(z: Ranger, _: int, value: float | None = None) -> Values:
+    def handler(z: RangerState, _: int, value: float | None = None) -> Values:
         if value is not None:
             setattr(z, name, value)
         return (text(getattr(z, name)),)
@@ -183,7 +183,7 @@ def _number(name: str, text: Callable[[float], str] = str) -> Handler:
 
 
 def _switch(name: str) -> Handler:
-    def handler(z: Ranger, _: int, value: int | None = None) -> Values:
+    def handler(z: RangerState, _: int, value: int | None = None) -> Values:
         if value is not None:
             setattr(z, name, bool(value))
         return (str(int(getattr(z, name))),)

@@ -8,12 +8,12 @@ from catseye.ranger.cubes import GEOMETRY, Cube
 from catseye.ranger.handlers_axes import MOVE_TIME, Handler, refuse_motors_off, settle, start_moves, wait_until
 from catseye.ranger.line import stamp_text as stamp
 from catseye.ranger.line import tag_of
-from catseye.ranger.ranger import Ranger, Values, Work
+from catseye.ranger.state import RangerState, Values, Work
 from catseye.ranger.values import Value
 
 
 def _geometry(name: str) -> Handler:
-    def handler(z: Ranger, _: int, *values: float) -> Values:
+    def handler(z: RangerState, _: int, *values: float) -> Values:
         if values:
             z.cubes.set_geometry(name, values)
             z.given.add(name)
@@ -23,14 +23,14 @@ def _geometry(name: str) -> Handler:
     return handler
 
 
-def _d0(z: Ranger, _: int, value: float | None = None) -> Values:
+def _d0(z: RangerState, _: int, value: float | None = None) -> Values:
     if value is not None:
         z.d0_mm = value
         z.given.add("D0")
     return (f"{z.d0_mm:.4f}",)
 
 
-def _ini(z: Ranger, _: int, count: int) -> Values:
+def _ini(z: RangerState, _: int, count: int) -> Values:
     z.cubes.allocate(count)
     z.order, z.aimed = [], None
     return (str(count),)
@@ -40,7 +40,7 @@ def listed(cube: Cube) -> Values:
     return str(cube.number), cube.name, *(f"{v:.3f}" for v in cube.place_mm)
 
 
-def _coo(z: Ranger, _: int, *values: Value) -> Values | Work:
+def _coo(z: RangerState, _: int, *values: Value) -> Values | Work:
     if not values:
         return _all(z)
     key, *rest = values
@@ -53,14 +53,14 @@ def _coo(z: Ranger, _: int, *values: Value) -> Values | Work:
     return listed(cube)
 
 
-def _all(z: Ranger) -> Work:
+def _all(z: RangerState) -> Work:
     for number in sorted(z.cubes.by_number):
         if number in z.cubes.by_number:
             yield listed(z.cubes.by_number[number])
     return None
 
 
-def _knd(z: Ranger, _: int, key: Value, kind: str | None = None, value: float = 0.0) -> Values:
+def _knd(z: RangerState, _: int, key: Value, kind: str | None = None, value: float = 0.0) -> Values:
     cube = z.cubes.find(key)
     if kind is not None:
         if cube.number == 0 or kind.upper() not in ("S", "B"):
@@ -71,7 +71,7 @@ def _knd(z: Ranger, _: int, key: Value, kind: str | None = None, value: float = 
 
 
 def _encoder(axis: int) -> Handler:
-    def handler(z: Ranger, _: int, key: Value, value: float | None = None) -> Values:
+    def handler(z: RangerState, _: int, key: Value, value: float | None = None) -> Values:
         cube = z.cubes.find(key)
         if value is not None:
             z.cubes.set_counts(cube, axis, value)
@@ -80,7 +80,7 @@ def _encoder(axis: int) -> Handler:
     return handler
 
 
-def _cil(z: Ranger, _: int, key: Value, *where: float) -> Work:
+def _cil(z: RangerState, _: int, key: Value, *where: float) -> Work:
     cube = z.cubes.find(key)
     if len(where) == 2:
         counts = (where[0], where[1])
@@ -93,7 +93,7 @@ def _cil(z: Ranger, _: int, key: Value, *where: float) -> Work:
     return *listed(cube), *(f"{n:.3f}" for n in counts)
 
 
-def illuminate(z: Ranger, cube: Cube, counts: tuple[float, float]) -> Generator[int | None, None, None]:
+def illuminate(z: RangerState, cube: Cube, counts: tuple[float, float]) -> Generator[int | None, None, None]:
     refuse_unready(z)
     z.aimed = None
     start_moves(z, {0: round(counts[0]), 1: round(counts[1])})
@@ -107,7 +107,7 @@ def illuminate(z: Ranger, cube: Cube, counts: tuple[float, float]) -> Generator[
     z.aimed = cube.number
 
 
-def refuse_unready(z: Ranger) -> None:
+def refuse_unready(z: RangerState) -> None:
     if not z.auto:
         raise InputError("not in Auto mode (expected MOD 1 first)")
     for axis in (0, 1):
@@ -117,7 +117,7 @@ def refuse_unready(z: Ranger) -> None:
         raise InputError("not initialised (expected BP, ALPHA, BETA, MO, EZ and D0, or INITZY, first)")
 
 
-def _trk(z: Ranger, _: int, key: Value, t0: int, *rest: float) -> Work:
+def _trk(z: RangerState, _: int, key: Value, t0: int, *rest: float) -> Work:
     """[PARKER04] eq. 2.45, 2.46: encoder counts linear between t0 and t1. A move that is under way ends first."""
     cube, start, t1, end = z.cubes.find(key), rest[:3], int(rest[3]), rest[4:]
     refuse_unready(z)

@@ -14,8 +14,8 @@ from catseye.ranger.handlers_axes import Handler, wait_until
 from catseye.ranger.handlers_cubes import illuminate, refuse_unready
 from catseye.ranger.head import Buffer, Sampling
 from catseye.ranger.line import TICK_NS, Reply, nanoseconds_of, nanoseconds_to_ticks
-from catseye.ranger.ranger import Measured, Outgoing, Ranger, Stream, Values, Work
 from catseye.ranger.ranging import distance_mm, group_index
+from catseye.ranger.state import Measured, Outgoing, RangerState, Stream, Values, Work
 from catseye.ranger.values import Value
 from catseye.signal.cycles import fraction
 from catseye.signal.phase import detect, phasors
@@ -25,7 +25,7 @@ CONVERTER_END = 32_767  # code
 
 
 def _sampled(name: str) -> Handler:
-    def handler(z: Ranger, _: int, value: int | None = None) -> Values:
+    def handler(z: RangerState, _: int, value: int | None = None) -> Values:
         if value is not None:
             z.sampling = Sampling(**{**vars(z.sampling), name: value})
         return (str(getattr(z.sampling, name)),)
@@ -33,14 +33,14 @@ def _sampled(name: str) -> Handler:
     return handler
 
 
-def _shoot(z: Ranger) -> Generator[int | None, None, None]:
+def _shoot(z: RangerState) -> Generator[int | None, None, None]:
     owner = z.aimed
     _fire(z)
     z.measured = None
     z.measured = Measured((yield from _taken(z)), owner)
 
 
-def _fire(z: Ranger) -> None:
+def _fire(z: RangerState) -> None:
     if z.in_sun:
         raise InputError("the beam looks into the Sun (expected a move away first)")
     if not z.head.laser_on():
@@ -48,7 +48,7 @@ def _fire(z: Ranger) -> None:
     z.head.trigger(z.sampling)
 
 
-def _taken(z: Ranger) -> Generator[int | None, None, Buffer]:
+def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
     """The buffer that was fired for, when it is whole."""
     seconds, found = z.sampling.duration, z.head.buffer
 
@@ -59,7 +59,7 @@ def _taken(z: Ranger) -> Generator[int | None, None, Buffer]:
     return buffer
 
 
-def _computed(z: Ranger) -> Measured:
+def _computed(z: RangerState) -> Measured:
     """Amplitude and phase of the buffer. Source: [PARKER04] eq. 5.5, 5.6."""
     measured = z.measured
     if measured is None:
@@ -75,33 +75,33 @@ def _computed(z: Ranger) -> Measured:
     return measured
 
 
-def _trg(z: Ranger, _: int) -> Work:
+def _trg(z: RangerState, _: int) -> Work:
     yield from _shoot(z)
     return ()
 
 
-def _mpc(z: Ranger, _: int) -> Values:
+def _mpc(z: RangerState, _: int) -> Values:
     measured = _computed(z)
     if measured.cube is not None:
         _keep(z, z.cubes.find(measured.cube), measured)
     return ()
 
 
-def _known(z: Ranger) -> Measured:
+def _known(z: RangerState) -> Measured:
     if z.measured is None or z.measured.phase is None:
         raise InputError("nothing is computed (expected TRG, then MPC, first)")
     return z.measured
 
 
-def _rad(z: Ranger, _: int) -> Values:
+def _rad(z: RangerState, _: int) -> Values:
     return (f"{_known(z).phase:.7f}",)
 
 
-def _mag(z: Ranger, _: int) -> Values:
+def _mag(z: RangerState, _: int) -> Values:
     return (f"{_known(z).amplitude:.6g}",)
 
 
-def _seq(z: Ranger, _: int) -> Work:
+def _seq(z: RangerState, _: int) -> Work:
     measured = _computed(z)
     n = measured.buffer.sampling.samples
     each = detect(measured.buffer.samples.reshape(-1, n), n, measured.buffer.volts_per_code, harmonics=())
@@ -110,7 +110,7 @@ def _seq(z: Ranger, _: int) -> Work:
     return None
 
 
-def _keep(z: Ranger, cube: Cube, measured: Measured) -> Shot:
+def _keep(z: RangerState, cube: Cube, measured: Measured) -> Shot:
     """The shot of a cube, with its distance where a reference phase is known."""
     amplitude, phase = measured.amplitude or 0.0, measured.phase or 0.0
     if cube.number == 0:
@@ -133,11 +133,11 @@ def _distance_text(cube: Cube, distance: float | None) -> str:
     return "none" if distance is None else f"{distance:.9f}" if cube.kind == "B" else f"{distance:.3f}"
 
 
-def _cmeas(z: Ranger, _: int, how: int, key: Value) -> Work:
+def _cmeas(z: RangerState, _: int, how: int, key: Value) -> Work:
     return (yield from measure(z, how, key))
 
 
-def measure(z: Ranger, how: int, key: Value) -> Generator[int | None, None, Values]:
+def measure(z: RangerState, how: int, key: Value) -> Generator[int | None, None, Values]:
     cube = z.cubes.find(key)
     if how == 1:
         yield from illuminate(z, cube, z.cubes.counts(cube))
@@ -147,12 +147,12 @@ def measure(z: Ranger, how: int, key: Value) -> Generator[int | None, None, Valu
     return _measured(z, how, cube.number)
 
 
-def _refuse_other(z: Ranger, cube: Cube) -> None:
+def _refuse_other(z: RangerState, cube: Cube) -> None:
     if z.aimed not in (None, cube.number):
         raise InputError(f"the beam is on cube {z.aimed}, not on {cube.number} (expected CIL {cube.number}, or f = 1)")
 
 
-def _measured(z: Ranger, how: int, number: int) -> Values:
+def _measured(z: RangerState, how: int, number: int) -> Values:
     """The buffer computed as a cube's: what CMEAS says of it."""
     cube = z.cubes.find(number)
     if z.measured is not None:
@@ -169,7 +169,7 @@ def _measured(z: Ranger, how: int, number: int) -> Values:
 
 
 def _last(pick: Callable[[Cube, Shot], str]) -> Handler:
-    def handler(z: Ranger, _: int, key: Value) -> Values:
+    def handler(z: RangerState, _: int, key: Value) -> Values:
         cube = z.cubes.find(key)
         if cube.shot is None:
             raise InputError(f"cube {cube.name} has not been measured (expected CMEAS 1, {cube.number} first)")
@@ -184,7 +184,7 @@ def _dst(cube: Cube, shot: Shot) -> str:
     return _distance_text(cube, shot.distance)
 
 
-def _buf(z: Ranger, _: int) -> Values:
+def _buf(z: RangerState, _: int) -> Values:
     if z.measured is None:
         raise InputError("there is no buffer (expected TRG or CMEAS first)")
     buffer, s = z.measured.buffer, z.measured.buffer.sampling
@@ -194,7 +194,7 @@ def _buf(z: Ranger, _: int) -> Values:
     return cube, str(s.cycles), str(s.samples), str(s.frequency_hz), volts, check, base64.b64encode(raw).decode("ascii")
 
 
-def _stm(z: Ranger, client: int, key: Value, count: int) -> Values:
+def _stm(z: RangerState, client: int, key: Value, count: int) -> Values:
     cube = z.cubes.find(key)
     if count == 0:
         z.end_stream()
@@ -207,7 +207,7 @@ def _stm(z: Ranger, client: int, key: Value, count: int) -> Values:
     return str(cube.number), str(count)
 
 
-def stream_shots(z: Ranger, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
+def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
     """Measure one cube again and again; the next buffer is fired before the last is computed and told."""
 
     def fire() -> str | None:
@@ -234,13 +234,13 @@ def stream_shots(z: Ranger, stream: Stream) -> Generator[Outgoing | int | None, 
             return
 
 
-def _num(z: Ranger, _: int, count: int | None = None) -> Values:
+def _num(z: RangerState, _: int, count: int | None = None) -> Values:
     if count is not None:
         z.order = (z.order + [0] * count)[:count]
     return (str(len(z.order)),)
 
 
-def _ord(z: Ranger, _: int, place: int, key: Value | None = None) -> Values:
+def _ord(z: RangerState, _: int, place: int, key: Value | None = None) -> Values:
     if place > len(z.order):
         raise InputError(f"place {place} is not in the scan list of {len(z.order)} (expected NUM {place} first)")
     if key is not None:
@@ -248,7 +248,7 @@ def _ord(z: Ranger, _: int, place: int, key: Value | None = None) -> Values:
     return str(place), str(z.order[place - 1])
 
 
-def _scn(z: Ranger, _: int, on: int | None = None, start: int = 0, rounds: int = 0) -> Values:
+def _scn(z: RangerState, _: int, on: int | None = None, start: int = 0, rounds: int = 0) -> Values:
     if on == 1:
         if not z.order:
             raise InputError("the scan list is empty (expected NUM and ORD first)")
@@ -263,7 +263,7 @@ def _scn(z: Ranger, _: int, on: int | None = None, start: int = 0, rounds: int =
     return (str(int(z.scanning)),)
 
 
-def scan_rounds(z: Ranger) -> Generator[Reply | int | None, None, None]:
+def scan_rounds(z: RangerState) -> Generator[Reply | int | None, None, None]:
     """Measure the cubes of the list one after another, round after round, from the scan's start on."""
     while z.now_ns() < z.scan_start * TICK_NS:
         yield z.scan_start * TICK_NS

@@ -7,13 +7,13 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.handlers_axes import Handler
-from catseye.ranger.ranger import Ranger, Values
+from catseye.ranger.state import RangerState, Values
 from catseye.ranger.sun_watch import HALF_ANGLE, nearest_sun, way_out
 
 SUN_NS = PER_SECOND  # the Sun moves 15" in it
 
 
-def _sun(z: Ranger, _: int, *vector: float) -> Values:
+def _sun(z: RangerState, _: int, *vector: float) -> Values:
     if vector:
         size = float(np.linalg.norm(vector))
         if not 0.99 <= size <= 1.01:
@@ -24,7 +24,7 @@ def _sun(z: Ranger, _: int, *vector: float) -> Values:
     return tuple(f"{v:.7f}" for v in z.sun_vector)
 
 
-def watch_sun(z: Ranger) -> list[str]:
+def watch_sun(z: RangerState) -> list[str]:
     """The Sun that comes to a beam, looked for once a second: laser off, and away if a way is free.
 
     What is to be said: one line when it begins.
@@ -44,7 +44,7 @@ def watch_sun(z: Ranger) -> list[str]:
     return [text] if begun else []
 
 
-def _leave_sun(z: Ranger, suns: list[ArrayLike]) -> str:
+def _leave_sun(z: RangerState, suns: list[ArrayLike]) -> str:
     """Drive away where a way is free; what is done, in words."""
     station, moving = z.cubes.station, any(z.head.moving(axis) for axis in (0, 1))
     if moving and z.heading and nearest_sun(station, z.here, z.heading, suns, exact=True) >= HALF_ANGLE:

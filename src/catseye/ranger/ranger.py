@@ -7,27 +7,19 @@ updates, the status word. `rest` says how long nothing will be due.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from numpy.typing import ArrayLike
-
 from catseye.errors import CatseyeError, InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
-from catseye.ranger.commands import COMMANDS, schedule_of
-from catseye.ranger.cubes import Cubes
-from catseye.ranger.head import Buffer, Head, Sampling
+from catseye.geometry.time_tag import PER_SECOND
+from catseye.ranger.commands import COMMANDS
+from catseye.ranger.handlers_table import HANDLERS, scan_rounds, stream_shots, watch_sun
+from catseye.ranger.head import Head
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks, parse_request
-from catseye.ranger.ranging import NOMINAL_INDEX
-from catseye.ranger.schedule import Scheduler
+from catseye.ranger.state import VERSION, Outgoing, RangerState, Values, Work
 from catseye.ranger.status import Status, word_text
-from catseye.ranger.sun_watch import SunSource, refusal
+from catseye.ranger.sun_watch import SunSource
 
-Values = tuple[str, ...]
-# What a command that waits gives: values or a reply; else its turn back: None (ask soon) or when to ask, ns since MJD 0
-Work = Generator[Values | Reply | int | None, None, Values | None]
-VERSION = "2.20"
 MOST_QUEUED = 256  # commands of all connections
 REPLIES_A_TURN = 64
 UPDATE_NS = PER_SECOND // 2
@@ -35,15 +27,7 @@ POLL_NS = 5_000_000  # while something is under way
 FINE_NS, FINE_SPAN_NS = 1_000_000, 10_000_000  # when it is due, and for how long
 WATCH_NS = 100_000_000  # the head's own changes
 UNHEARD_NS = PER_SECOND  # the same where nobody listens
-SUN_AGE = 60.0  # s that a vector from the coordinator holds where the ranger's frame turns
-NEEDED = ("BP", "ALPHA", "BETA", "MO", "EZ", "D0")
-REFUSED_IN_A_SCAN = (
-    *("STT", "FHM", "CIL", "CMEAS", "CWT", "TRG", "TRK", "RST"),
-    *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
-)
-REFUSED_IN_A_STREAM = tuple(name for name in REFUSED_IN_A_SCAN if name != "TRK")
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
-BITS = tuple(int(bit) for bit in Status)  # in the order of `Ranger.status`
 WATCHED = (
     ("ACP", "0"),
     ("ACP", "1"),
@@ -51,47 +35,7 @@ WATCHED = (
 )
 
 
-@dataclass(frozen=True)
-class Outgoing:
-    """A reply and the one connection it is for, None for all."""
-
-    reply: Reply
-    client: int | None = None
-
-
-@dataclass(frozen=True)
-class Stream:
-    """What STM asked: `count` buffers of a cube, for a connection, under the TID of its request."""
-
-    client: int
-    tid: int
-    cube: int
-    count: int
-
-
-@dataclass
-class AxisSettings:
-    """What an axis's next move and filter are, in the motion chip's integers."""
-
-    velocity: int = 400_000
-    acceleration: int = 2_000
-    position: int = 0
-    filter: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)
-    error_limit: int = 5_000
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A buffer and what was computed from it: amplitude in V and phase in rad, None before MPC; whose it is."""
-
-    buffer: Buffer
-    cube: int | None
-    amplitude: float | None = None
-    phase: float | None = None
-    clipped: bool = False
-
-
-class Ranger:
+class Ranger(RangerState):
     """A ZY behind its head.
 
     name      as it greets: ZY101
@@ -114,56 +58,13 @@ class Ranger:
         sun: SunSource | None = None,
         turning: bool = False,
     ):
-        from catseye.ranger import handlers  # they know the ranger, so it asks late
-
-        self._handlers: dict[str, Callable[..., Values | Work]] = handlers.HANDLERS
-        self._scan_rounds, self._stream_shots = handlers.scan_rounds, handlers.stream_shots
-        self._watch_sun = handlers.watch_sun
-        self.name, self.head, self.limits, self.files, self.mirror, self.sun = name, head, limits, files, mirror, sun
+        super().__init__(name, head, HANDLERS, limits=limits, files=files, mirror=mirror, sun=sun, turning=turning)
         self._waiting: deque[tuple[int, Request]] = deque()
-        self.turning = turning
         self._running: tuple[int, Request, Work] | None = None
-        self._scan_work: Generator[Reply | int | None, None, None] | None = None
-        self._stream_work: Generator[Outgoing | int | None, None, None] | None = None
         self._ask_at: dict[str, int | None] = {}  # by what waits for the head: when to ask it again
-        self.tid = 0  # of the command that runs
-        self.scheduler = Scheduler()
         self._word: Status | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
-        self._next_update = self.next_sun_ns = 0
-        head_now = getattr(head, "now_ns", None)  # a head may offer it: the same as `now`, cheaper
-        self._head_now_ns: Callable[[], int] = head_now or (lambda: nanoseconds_of(head.now()))
-        self._boot()
-
-    def _boot(self) -> None:
-        """Everything but hardware and queues as when power comes on."""
-        self.cubes = Cubes(self.limits)
-        self.axes = (AxisSettings(), AxisSettings())
-        self.sampling = Sampling()
-        self.d0_mm, self.index = 0.0, NOMINAL_INDEX
-        self.auto, self.updates = True, False
-        self.given: set[str] = set()
-        self.reads, self.tolerance, self.timeout, self.strict = 5, 5, 18.0, True
-        self.measured: Measured | None = None
-        self.aimed: int | None = None
-        self.reference_phase: float | None = None
-        self.sun_vector: tuple[float, ...] | None = None
-        self.sun_told_ns = 0
-        self.sun_refused = self.in_sun = False
-        self.heading: tuple[float, float] | None = None  # counts where the last move ends
-        self.stream: Stream | None = None
-        self.order: list[int] = []
-        self.scan_start, self.scan_rounds, self.scanning = 0, 0, False
-        for axis, settings in enumerate(self.axes):
-            self.head.set_filter(axis, settings.filter)
-            self.head.set_error_limit(axis, settings.error_limit)
-
-    def reset(self) -> None:
-        """Cold boot: RST."""
-        self._scan_work = self._stream_work = None
-        self.scheduler = Scheduler()
-        self.head.reset()
-        self._boot()
+        self._next_update = 0
 
     # What a transport calls -----------------------------------------------------------------------------------------
 
@@ -209,7 +110,7 @@ class Ranger:
                 told += self._begin(entry.client, replace(entry.request, ticks=None))
         told += self._scan_step()
         told += self._stream_step()
-        told += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in self._watch_sun(self)]
+        told += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
         told += self._updates()
         word = self.status()
         if word != self._word:
@@ -258,99 +159,6 @@ class Ranger:
     def idle(self) -> bool:
         """Whether nothing runs, waits, scans or streams."""
         return self._running is None and not self._waiting and not self.scanning and self.stream is None
-
-    # What the handlers use ------------------------------------------------------------------------------------------
-
-    def now_ns(self) -> int:
-        """Nanoseconds since MJD 0."""
-        return self._head_now_ns()
-
-    def now_ticks(self) -> int:
-        """The stamp of now."""
-        return nanoseconds_to_ticks(self.now_ns())
-
-    def status(self) -> Status:
-        """The status word of now."""
-        head, measured = self.head, self.measured
-        on = (
-            self.auto,
-            head.homing(0) == "home",
-            head.homing(1) == "home",
-            self.updates,
-            self.scanning,
-            bool(self.scheduler.entries),
-            self.stream is not None,
-            measured is not None and measured.clipped,
-            head.motor_off(0),
-            head.motor_off(1),
-            not head.laser_on(),
-            not head.clock_locked(),
-            head.enabled(0),
-            head.enabled(1),
-            self.sun_refused or self.in_sun,
-            self.initialised,
-        )
-        return Status(sum(bit for bit, is_on in zip(BITS, on, strict=True) if is_on))
-
-    @property
-    def initialised(self) -> bool:
-        """Whether the geometry and D0 have been given since boot."""
-        return self.given.issuperset(NEEDED)
-
-    @property
-    def homed(self) -> bool:
-        """Whether counts are directions."""
-        return self.head.homing(0) == "home" and self.head.homing(1) == "home"
-
-    @property
-    def here(self) -> tuple[float, float]:
-        """Counts where the mirror is."""
-        return float(self.head.actual(0)), float(self.head.actual(1))
-
-    def suns(self) -> list[ArrayLike]:
-        """Directions of the Sun that are known, each with its cone."""
-        known: list[ArrayLike] = [] if self.sun_vector is None else [self.sun_vector]
-        own = None if self.sun is None else self.sun(self.now_ns() / PER_DAY)
-        return known if own is None else [*known, own]
-
-    def refuse_sun(self, end: ArrayLike, start: ArrayLike | None = None) -> None:
-        """Raises InputError where a move, from here unless told, could look into the Sun; the status word says so."""
-        if self.turning and not 0 <= self.now_ns() - self.sun_told_ns <= SUN_AGE * PER_SECOND:
-            said: str | None = (
-                f"where the Sun is was not told for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
-            )
-        else:
-            said = refusal(self.cubes.station, self.here if start is None else start, end, self.suns())
-        self.sun_refused = said is not None
-        if said is not None:
-            raise InputError(said)
-
-    def work_of(self, client: int, request: Request) -> Values | Work:
-        """What a command's handler gives.
-
-        Raises CatseyeError: refused, the state as it was.
-        """
-        if request.command == "AT":
-            start, repeats, interval, later = schedule_of(request.parameters)
-            self.scheduler.add(client, replace(later, tid=request.tid), start * TICK_NS, repeats, interval)
-            return (str(len(self.scheduler.entries)),)
-        values = COMMANDS[request.command].read(request)
-        if not COMMANDS[request.command].only_asks(request):
-            if self.scanning and request.command in REFUSED_IN_A_SCAN:
-                raise InputError("a scan is under way (expected SCN 0 first)")
-            if self.stream is not None and request.command in REFUSED_IN_A_STREAM:
-                raise InputError(f"a stream is under way (expected STM {self.stream.cube}, 0 first)")
-        self.tid = request.tid
-        return self._handlers[request.command](self, client, *values)
-
-    def end_scan(self) -> None:
-        """Stop the scan where it is."""
-        self.scanning, self._scan_work = False, None
-        self.head.stop()
-
-    def end_stream(self) -> None:
-        """No more buffers; the one being taken is not told."""
-        self.stream = self._stream_work = None
 
     # Inside ---------------------------------------------------------------------------------------------------------
 
@@ -417,7 +225,7 @@ class Ranger:
         if not self.scanning or self._running is not None:
             return []
         if self._scan_work is None:
-            self._scan_work = self._scan_rounds(self)
+            self._scan_work = scan_rounds(self)
         reply = next(self._scan_work, self)
         if reply is self:
             self.scanning, self._scan_work = False, None
@@ -432,7 +240,7 @@ class Ranger:
         if self.stream is None:
             return []
         if self._stream_work is None:
-            self._stream_work = self._stream_shots(self, self.stream)
+            self._stream_work = stream_shots(self, self.stream)
         told: list[Outgoing] = []
         for each in self._stream_work:
             if not isinstance(each, Outgoing):

@@ -15,7 +15,8 @@ from functools import partial
 from catseye.errors import InputError
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
 from catseye.ranger.network import Listener, Network, Sockets
-from catseye.ranger.ranger import Outgoing, Ranger
+from catseye.ranger.ranger import Ranger
+from catseye.ranger.state import Outgoing
 
 PORTS = (5240, 5241)
 LOOPBACK = "127.0.0.1"

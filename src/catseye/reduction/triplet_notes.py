@@ -1,14 +1,11 @@
 """What a reader of a triplet's calibration should know, a line each."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.optics.glass import absolute_index, group_index
-
-if TYPE_CHECKING:
-    from catseye.reduction.triplet import TripletReduction
+from catseye.reduction.triplet_result import TripletReduction
 
 CONSTANT_MM = 0.002  # data sheet against its own height and index
 NOTABLE = 0.2e-6  # m
@@ -19,7 +16,7 @@ MERCURY = (640.0, 790.0)  # a barometer's reading in mm of mercury below 1.4 km
 HPA_OF_MERCURY = 1.33322
 
 
-def triplet_notes(found: "TripletReduction") -> Iterator[str]:
+def triplet_notes(found: TripletReduction) -> Iterator[str]:
     """Lines about whole cycles, contradictions, the memo's own formulas, the glass and the sheet."""
     yield from _placements(found)
     yield from _memo(found)
@@ -27,7 +24,7 @@ def triplet_notes(found: "TripletReduction") -> Iterator[str]:
     yield from _sheet(found)
 
 
-def _placements(found: "TripletReduction") -> Iterator[str]:
+def _placements(found: TripletReduction) -> Iterator[str]:
     for number, status in enumerate(found.status, start=1):
         if status not in ("good", "suspect"):
             margin = float(found.cycles.margin[number - 1]) * 1e3
@@ -52,7 +49,7 @@ def _placements(found: "TripletReduction") -> Iterator[str]:
             )
 
 
-def _memo(found: "TripletReduction") -> Iterator[str]:
+def _memo(found: TripletReduction) -> Iterator[str]:
     own, memo = found.cycles, found.memo
     for k in range(len(found.h)):
         slips = [
@@ -72,7 +69,7 @@ def _memo(found: "TripletReduction") -> Iterator[str]:
         yield f"the memo's series for D_MP (3.19b) would move H_corr by up to {worst * 1e6:+.1f} µm: not used"
 
 
-def _glass(found: "TripletReduction") -> Iterator[str]:
+def _glass(found: TripletReduction) -> Iterator[str]:
     if abs(found.air_in_glass) > NOTABLE:
         yield (
             f"if the index ratio belongs to 20 °C, 933 hPa, 50 %, H_corr is {found.air_in_glass * 1e6:+.2f} µm more: "
@@ -91,7 +88,7 @@ def _glass(found: "TripletReduction") -> Iterator[str]:
         yield "no thickness of paint puts all three points within 0.15 mm of the bare top plate"
 
 
-def _against_vacuum(found: "TripletReduction") -> Iterator[str]:
+def _against_vacuum(found: TripletReduction) -> Iterator[str]:
     """Told where the ratio is the makers' index of BK 7, which is against air, divided by the air's once more."""
     m = found.measurement
     n, wavelength = m.bk7_to_air_group_index_ratio, m.wavelength_um
@@ -110,7 +107,7 @@ def _against_vacuum(found: "TripletReduction") -> Iterator[str]:
     )
 
 
-def _sheet(found: "TripletReduction") -> Iterator[str]:
+def _sheet(found: TripletReduction) -> Iterator[str]:
     m = found.measurement
     n = m.bk7_to_air_group_index_ratio
     if m.right_prism.serial != m.left_prism.serial + 1:

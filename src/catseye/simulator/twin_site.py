@@ -14,7 +14,7 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, ranger_addresses
-from catseye.ranger.handlers import file_names, replace_file
+from catseye.ranger.handlers_table import file_names, replace_file
 from catseye.ranger.head import Head
 from catseye.ranger.initialisation import Place, files_of_ranger, places_of
 from catseye.ranger.network import Network, Sockets

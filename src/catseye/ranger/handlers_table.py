@@ -16,19 +16,19 @@ from catseye.ranger.handlers_shots import SHOTS, scan_rounds, stream_shots
 from catseye.ranger.handlers_sun import SUN, watch_sun
 from catseye.ranger.line import Reply, Request, commands_of_file, nanoseconds_to_ticks, tag_of
 from catseye.ranger.line import stamp_text as stamp
-from catseye.ranger.ranger import VERSION, Ranger, Values, Work
+from catseye.ranger.state import VERSION, RangerState, Values, Work
 from catseye.ranger.status import word_text
 
 __all__ = ["HANDLERS", "file_names", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
 
 
-def _sti(z: Ranger, _: int, ticks: int | None = None) -> Values:
+def _sti(z: RangerState, _: int, ticks: int | None = None) -> Values:
     if ticks is not None:
         z.head.set_clock(tag_of(ticks))
     return (stamp(z.now_ticks()),)
 
 
-def _ps(z: Ranger, _: int, on: int | None = None) -> Values:
+def _ps(z: RangerState, _: int, on: int | None = None) -> Values:
     if on and z.in_sun:
         raise InputError("the beam looks into the Sun (expected a move away first)")
     if on is not None:
@@ -36,30 +36,30 @@ def _ps(z: Ranger, _: int, on: int | None = None) -> Values:
     return str(int(z.head.laser_on())), *(f"{k} {v:.2f}" for k, v in sorted(z.head.supplies().items()))
 
 
-def _entemp(z: Ranger, _: int) -> Values:
+def _entemp(z: RangerState, _: int) -> Values:
     temperature = z.head.enclosure_temperature_c()
     if not np.isfinite(temperature):
         raise InputError("the enclosure's temperature is not known")
     return (f"{temperature:.2f}",)
 
 
-def _rst(z: Ranger, _: int) -> Values:
+def _rst(z: RangerState, _: int) -> Values:
     z.reset()
     return ()
 
 
-def _lst(z: Ranger, client: int) -> Values:
+def _lst(z: RangerState, client: int) -> Values:
     mine = [e for e in z.scheduler.entries if e.client == client]
     return str(len(mine)), *(
         f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in mine[:24]
     )
 
 
-def _clr(z: Ranger, client: int) -> Values:
+def _clr(z: RangerState, client: int) -> Values:
     return (str(z.scheduler.clear(client)),)
 
 
-def _hlp(z: Ranger, _: int, name: str | None = None) -> Values | Work:
+def _hlp(z: RangerState, _: int, name: str | None = None) -> Values | Work:
     if name is None:
         return (" ".join(["AT", *sorted(COMMANDS)]),)
     if name.upper() not in COMMANDS:
@@ -73,7 +73,7 @@ def _commas(text: str) -> str:
     return text.replace(",", ";")
 
 
-def _initzy(z: Ranger, client: int) -> Work:
+def _initzy(z: RangerState, client: int) -> Work:
     """CUBES.INI, ZYnnn.INI, the head's own; the first command that fails ends it."""
     if z.files is None:
         raise InputError("this ranger has no initialisation files (expected their folder at its start)")
@@ -105,7 +105,7 @@ def _told(command: str, work: Work) -> Work:
         yield Reply(command, True, values) if isinstance(values, tuple) else values
 
 
-def file_names(z: Ranger) -> tuple[str, str, str]:
+def file_names(z: RangerState) -> tuple[str, str, str]:
     """Initialisation files of a ranger in their order: all rangers' cubes, the monument's, the head's."""
     return "CUBES.INI", f"{z.name.upper()}.INI", f"{z.mirror.lower()}.INI"
 
