@@ -16,12 +16,12 @@ from threadpoolctl import threadpool_limits
 from catseye.estimation.adjustment import adjust
 from catseye.estimation.rows import full_jacobian
 from catseye.records.campaign import read_campaign
-from catseye.reduction.coordinates import adjust_coordinates
-from catseye.reduction.epoch import reduce_epoch
-from catseye.reduction.network import build_network
-from catseye.reduction.ranges import follow_electronics, measure_phases
-from catseye.reduction.settings import Settings
-from catseye.reduction.shots import shot_group
+from catseye.reduction.epoch.coordinates import adjust_coordinates
+from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.shots import shot_group
+from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.phase import detect
 
 ROUNDS = 5

@@ -14,8 +14,8 @@ from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.atmosphere.sound_path import bent_ray_excess, travel_time
 from catseye.estimation.tomography import Prior, Scale
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.acoustic import path_temperatures
-from catseye.reduction.acoustic_field import sound_field
+from catseye.reduction.air.acoustic import path_temperatures
+from catseye.reduction.air.acoustic_field import sound_field
 
 LENGTH, T, P, H = 100.0, 15.0, 933.0, 60.0
 STATION = {"pressure_hpa": P, "u_pressure_hpa": 0.3, "humidity_percent": H, "u_humidity_percent": 3.0}

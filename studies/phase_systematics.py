@@ -14,8 +14,8 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.records.campaign import REFERENCE, read_campaign
-from catseye.reduction.ranges import follow_electronics, measure_phases
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
+from catseye.reduction.epoch.settings import Settings
 from catseye.signal.amplitude import amplitude_phase
 from catseye.signal.cyclic import imbalance_range, leakage_range
 from catseye.signal.feedback import fringe_contrast, fringe_uncertainty

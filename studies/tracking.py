@@ -28,8 +28,8 @@ from catseye.geometry.time_tag import TimeTag, tag_step
 from catseye.geometry.track import apparent_motion, line_bound, longest_interval
 from catseye.optics.spot import offset_range, offset_share, steering_range
 from catseye.records import read_campaign
-from catseye.reduction.pointing import station_of
-from catseye.reduction.tracking import (
+from catseye.reduction.site.stations import station_of
+from catseye.reduction.steering.tracking import (
     AZIMUTH_SLEW,
     BUFFER,
     ELEVATION_SLEW,

@@ -18,11 +18,11 @@ from catseye.geometry import visibility
 from catseye.geometry.triplet_mount import aim_angles, misaim
 from catseye.optics.prism import obliquity_correction
 from catseye.records.campaign import read_campaign
-from catseye.reduction.places import nominal_frame, places_of
-from catseye.reduction.triplet_memo import median_series
-from catseye.reduction.triplet_sensitivity import Departures, calibration_error, telescope_error, triplet_sensitivities
-from catseye.reduction.triplet_tolerances import SLOPES, TOLERANCE, glass_effect, refractivity_change
-from catseye.reduction.triplet_use import MountedTriplet, ball_distance_memo, ball_ranges, incidence_on_prisms
+from catseye.reduction.site.places import nominal_frame, places_of
+from catseye.reduction.triplet.memo import median_series
+from catseye.reduction.triplet.sensitivity import Departures, calibration_error, telescope_error, triplet_sensitivities
+from catseye.reduction.triplet.tolerances import SLOPES, TOLERANCE, glass_effect, refractivity_change
+from catseye.reduction.triplet.use import MountedTriplet, ball_distance_memo, ball_ranges, incidence_on_prisms
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
 UNITS = 200_000  # of the Monte Carlo

@@ -23,7 +23,7 @@ def night_01():
 @pytest.fixture(scope="session")
 def reduced_night_01(night_01):
     """Its reduction with default settings."""
-    from catseye.reduction.epoch import reduce_epoch
+    from catseye.reduction.epoch.epoch import reduce_epoch
 
     return reduce_epoch(night_01)
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
-from catseye.reduction.live import EpochAnswer, Live, LiveSettings
-from catseye.reduction.live_shots import ShotAnswer
-from catseye.reduction.motion import ground_from
+from catseye.reduction.live.live import EpochAnswer, Live, LiveSettings
+from catseye.reduction.live.shots import ShotAnswer
+from catseye.reduction.site.motion import ground_from
 from catseye.simulator.twin import Twin
 from catseye.simulator.twin_faults import Fault, FaultBoard
 from catseye.simulator.twin_motion import Motion

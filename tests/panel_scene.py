@@ -11,7 +11,7 @@ from catseye.records.panel_layout import PanelLayout, layout_of_site
 from catseye.records.panel_readings import PanelReadings, PanelSurvey, read_panel_readings
 from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
-from catseye.reduction.panel_model import corner_places
+from catseye.reduction.panels.model import corner_places
 from catseye.simulator.panels import SolidPanels, screwed, solid_panels
 from repository import ROOT
 

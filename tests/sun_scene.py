@@ -10,8 +10,8 @@ from catseye.geometry.pointing import Station
 from catseye.geometry.slew import Pace
 from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
-from catseye.reduction.earth_rotation import Place
-from catseye.reduction.guard import Guard
+from catseye.reduction.site.earth_rotation import Place
+from catseye.reduction.steering.guard import Guard
 from repository import ROOT
 
 DEGREE = np.pi / 180

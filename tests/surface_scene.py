@@ -7,8 +7,8 @@ from catseye.geometry.frame import Transform
 from catseye.optics.aperture import cos_incidence
 from catseye.optics.zernike import zernike
 from catseye.records.site_folder import read_site
-from catseye.reduction.actuators import actuators_of
-from catseye.reduction.surface_shape import Aperture, Prisms
+from catseye.reduction.surface.actuators import actuators_of
+from catseye.reduction.surface.shape import Aperture, Prisms
 from repository import ROOT
 
 SITE = read_site(ROOT / "examples" / "sites" / "gbt")

@@ -17,8 +17,8 @@ from catseye.records.panel_layout import layout_of_site
 from catseye.records.panel_readings import read_maps, read_panel_readings, read_survey
 from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
-from catseye.reduction.panel_maps import fitted_map
-from catseye.reduction.panels import reduce_panels
+from catseye.reduction.panels.heights import reduce_panels
+from catseye.reduction.panels.maps import fitted_map
 from catseye.simulator.panels import Crew, screwed, solid_panels, taken
 
 HERE = Path(__file__).parent
@@ -67,7 +67,7 @@ def write_maps(solid, directory: Path, rng: np.random.Generator) -> None:
     directory.mkdir(exist_ok=True)
     layout = solid.layout
     from catseye.geometry.panel_surface import panels_under
-    from catseye.reduction.panel_model import panel_axes
+    from catseye.reduction.panels.model import panel_axes
 
     for p, name in enumerate(layout.panels):
         four = layout.xy[layout.quad[p]]

@@ -18,7 +18,7 @@ from catseye.coordinator.samplers import rows_of
 from catseye.coordinator.server import PUSHED
 from catseye.ranger.addresses import ranger_addresses
 from catseye.records.site_folder import read_site
-from catseye.reduction.live import Live
+from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 from catseye.simulator.world_clock import SystemClock
 from cli.living_scene import PATIENCE, RUN, small_site

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from catseye.reduction.live import Live
+from catseye.reduction.live.live import Live
 from coordinator.link_scene import Linked, planned, run, until
 from coordinator.ziy_scene import Answer, ListLive, Site, weather
 from live_scene import begun

@@ -15,7 +15,7 @@ from catseye.coordinator.journal import Journal
 from catseye.coordinator.journal_entries import AnsweredShot, Run
 from catseye.coordinator.journal_reader import JournalReader
 from catseye.coordinator.ziy import Coordinator
-from catseye.reduction.live import Live
+from catseye.reduction.live.live import Live
 from catseye.service.solver import SolverProcess
 from catseye.service.warm import initialising_commands
 from load_scene import EverySecond, LoadChild, load_site, lost_and_doubled

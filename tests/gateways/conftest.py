@@ -3,7 +3,7 @@ import pytest
 from catseye.gateways.reduction_files import write_reduction
 from catseye.gateways.writers.output import whole_directory
 from catseye.records import read_campaign
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

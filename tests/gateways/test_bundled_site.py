@@ -12,7 +12,7 @@ from catseye.errors import InputError
 from catseye.gateways import example
 from catseye.gateways.example import bundled_site, example_campaign, site_directory
 from catseye.records.site_folder import read_site, site_files
-from catseye.reduction.places import places_of
+from catseye.reduction.site.places import places_of
 from repository import ROOT
 
 SITES = ROOT / "examples" / "sites"

@@ -28,7 +28,7 @@ from catseye.gateways.network_tables import coordinates_csv, observations_csv, p
 from catseye.gateways.network_xml import NAMESPACE, network_xml
 from catseye.records.gama import read_gama
 from catseye.records.network_folder import read_network_folder
-from catseye.reduction.networks import adjusted
+from catseye.reduction.network import adjusted
 from repository import TESTS
 
 NETWORKS = TESTS / "vectors" / "networks"

@@ -15,7 +15,7 @@ from catseye.gateways.reports import report
 from catseye.gateways.summary import passages
 from catseye.gateways.tables import ranges_csv
 from catseye.gateways.writers.objects import json_page
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 VOID = {"meta", "img", "link", "br"}

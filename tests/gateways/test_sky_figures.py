@@ -5,7 +5,7 @@ import numpy as np
 
 from catseye.gateways.sky_figures import _on_map, sky_figure
 from catseye.geometry.pointing import counts
-from catseye.reduction.reroute import route
+from catseye.reduction.steering.reroute import route
 from sun_scene import MORNING, STATION, astropy_sun, boxes, guard
 
 AT_SUN = counts(STATION, STATION.scan_point + 100 * astropy_sun(np.array([MORNING]))[0])

@@ -10,9 +10,18 @@ from catseye.gateways.tracking_figures import miss_figure, search_figure, visibi
 from catseye.geometry.pointing import Station
 from catseye.geometry.time_tag import TimeTag
 from catseye.records.solids import Solids
-from catseye.reduction.spot_fit import Spot
-from catseye.reduction.tracking import AZIMUTH_SLEW, AntennaPath, Drive, Following, fixed, follow, misses, mounted
-from catseye.reduction.visibility import Sight, frames_at, retroreflectors_of, visibility
+from catseye.reduction.steering.spot_fit import Spot
+from catseye.reduction.steering.tracking import (
+    AZIMUTH_SLEW,
+    AntennaPath,
+    Drive,
+    Following,
+    fixed,
+    follow,
+    misses,
+    mounted,
+)
+from catseye.reduction.steering.visibility import Sight, frames_at, retroreflectors_of, visibility
 
 STATION = Station([[112.99, 44.28, 0.0]], [[-1.2, 0, 0]], [[0.0, 0.25, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]])
 

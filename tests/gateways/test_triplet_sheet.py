@@ -19,7 +19,7 @@ from catseye.gateways.triplet_symbols import PLATE as PLATE_SYMBOLS
 from catseye.gateways.writers.objects import json_line, plain
 from catseye.records.reading import read_record
 from catseye.records.triplet_measurement import TripletMeasurement
-from catseye.reduction.triplet import reduce_triplet
+from catseye.reduction.triplet.unit import reduce_triplet
 from triplet_scene import SHEET, document, measurement
 
 # section 3.4, in the order of the memo; T1, T2, S and so on are points

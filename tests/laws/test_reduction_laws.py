@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.constants import SPEED_OF_LIGHT
-from catseye.reduction.epoch import reduce_epoch
-from catseye.reduction.network import build_network
-from catseye.reduction.ranges import follow_electronics
-from catseye.reduction.shots import shot_group
+from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.ranges import follow_electronics
+from catseye.reduction.epoch.shots import shot_group
+from catseye.reduction.epoch.unknowns import build_network
 
 FEW = settings(max_examples=4, deadline=None, derandomize=True)  # a reduction takes a second
 SOME = settings(max_examples=25, deadline=None, derandomize=True)

@@ -13,7 +13,7 @@ from catseye.geometry.keep_out import TOUCH
 from catseye.geometry.pointing import Station, counts
 from catseye.geometry.search_pattern import spiral
 from catseye.geometry.slew import trapezoid
-from catseye.reduction.earth_rotation import Place
+from catseye.reduction.site.earth_rotation import Place
 from sun_scene import (
     DEGREE,
     GREEN_BANK,

@@ -25,8 +25,8 @@ from catseye.ranger.line import format_request
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.status import Status
 from catseye.records.site_folder import read_site
-from catseye.reduction.places import nominal_frame, places_of
-from catseye.reduction.pointing import station_in
+from catseye.reduction.site.places import nominal_frame, places_of
+from catseye.reduction.site.stations import station_in
 from ranger.ranger_scene import Told
 from ranger.scripted_head import ScriptedHead
 from repository import ROOT

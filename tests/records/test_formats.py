@@ -26,7 +26,7 @@ from catseye.records.target import Benchmark, FeedArm, Targets
 from catseye.records.triplet import Triplet
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.records.weather import WeatherSample
-from catseye.reduction.refractometer_night import PathSheet
+from catseye.reduction.air.refractometer_night import PathSheet
 from repository import TESTS
 
 FORMATS = TESTS / "vectors" / "formats"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.campaign import REFERENCE
-from catseye.reduction.network import build_network
+from catseye.reduction.epoch.unknowns import build_network
 
 
 def with_shots(campaign, rows, **columns):

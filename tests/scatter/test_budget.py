@@ -11,9 +11,9 @@ from catseye.records.campaign import REFERENCE, read_campaign
 from catseye.reduction.budget import Assumptions, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import budget_of, scatter_of
-from catseye.reduction.places import places_of
-from catseye.reduction.ranges import follow_electronics, measure_phases
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.site.places import places_of
 from catseye.simulator import Conditions, simulate_night
 
 DRAWS = 100_000  # a u from so many is good to 0.22 %

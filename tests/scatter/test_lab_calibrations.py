@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from catseye.reduction.calibrations import (
+from catseye.reduction.calibrations.length import height_gauge  # fmt: skip
+from catseye.reduction.calibrations.mirror import (  # fmt: skip
     alignment,
     autocollimation,
     both_faces,
     both_faces_pointing,
     detector_focus,
     encoder,
-    height_gauge,
     limits,
     search_results,
-)  # fmt: skip
+)
 from lab_scene import (
     ARC,
     BALL,

@@ -11,8 +11,8 @@ import pytest
 
 from catseye.geometry.frame import Transforms
 from catseye.records.live import TICKS_PER_DAY
-from catseye.reduction.live import LiveSettings
-from catseye.reduction.motion import ground_from
+from catseye.reduction.live.live import LiveSettings
+from catseye.reduction.site.motion import ground_from
 from catseye.simulator.twin_beam import TracedDish
 from live_scene import Night, begun, deviations, lasting, site
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from catseye.records.campaign import read_campaign
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Conditions, simulate_night
 
 QUICK = range(2101, 2107)

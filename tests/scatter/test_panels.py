@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from catseye.reduction.panels import conformity, meetings, reduce_panels
+from catseye.reduction.panels.heights import conformity, meetings, reduce_panels
 from catseye.simulator.panels import Crew, solid_panels, taken
 from panel_scene import patch, read, standing_by_chance, survey, tool
 

@@ -7,8 +7,8 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.estimation.pose import fit_pose
 from catseye.geometry.pointing_series import TERMS, published
 from catseye.records.tilts import Tilts
-from catseye.reduction.pointing_fit import compare_series, fit_pointing
-from catseye.reduction.track_profile import joined_tilt, track_profile
+from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
+from catseye.reduction.pose.track_profile import joined_tilt, track_profile
 
 
 def holds(sample, claimed, count):

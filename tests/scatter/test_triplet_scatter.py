@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.reduction.triplet import reduce_triplet
+from catseye.reduction.triplet.unit import reduce_triplet
 from triplet_scene import U, noisy_unit
 
 LOUD = U | {"phase": 0.002}  # phases outweigh all else: their average over placements is under test

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.reduction.live import LiveSettings
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.live.live import LiveSettings
 from catseye.service.settings import live_settings, settings_object
 
 REAL = st.floats(1e-6, 1e6)

@@ -12,7 +12,7 @@ from catseye.geometry.pointing import Station as Ideal
 from catseye.geometry.pointing import counts as ideal_counts
 from catseye.geometry.pointing import ray as ideal_ray
 from catseye.ranger.initialisation import mount_from_reflector
-from catseye.reduction.pointing import station_of
+from catseye.reduction.site.stations import station_of
 from catseye.simulator.twin_conditions import STILL
 from catseye.simulator.twin_stations import arm_mount, reference_cube
 from simulator.living_scene import only, rms, site, twin

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.site_folder import REFERENCE
-from catseye.reduction.places import places_of
+from catseye.reduction.site.places import places_of
 from catseye.simulator.twin_conditions import STILL
 from catseye.simulator.twin_telescope import low_orders
 from simulator.living_scene import only, rms, site, twin, whole_site

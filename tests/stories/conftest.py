@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.campaign import read_campaign
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Faults, simulate_night
 
 SEED = 4711

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.campaign import REFERENCE
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 
 
 def with_shots(campaign, rows):

@@ -9,9 +9,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.reduction import places, shots
-from catseye.reduction.air import AirField
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch import shots
+from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.site import places
 from catseye.simulator import Faults, Planted, simulate_night
 
 SEED = 4711
@@ -106,7 +107,7 @@ def test_air_taken_as_the_stations_mean_spoils_the_scale(clear, monkeypatch):
         return np.full((*z.shape, len(field.heights)), 1.0 / len(field.heights)), np.zeros(z.shape)
 
     monkeypatch.setattr(AirField, "_shares", averaged)
-    monkeypatch.setattr("catseye.reduction.air.pressure_at", lambda pressure, z_from, z_to: pressure + 0.0 * z_to)
+    monkeypatch.setattr("catseye.reduction.epoch.air.pressure_at", lambda pressure, z_from, z_to: pressure + 0.0 * z_to)
     wrong = reduce_epoch(clear[0])
     assert 50e-6 < moved(clear[1], wrong, "ball") < 500e-6
     assert 50e-6 < moved(clear[1], wrong, "dish") < 500e-6
@@ -131,7 +132,7 @@ def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong
 
 def test_a_zero_wrong_by_0_3_mm_and_held_to_its_sheet_spoils_its_ranger(clear, written, monkeypatch):
     night = simulate_night(SEED, faults=CLEAR, planted=Planted(d0_error_mm={"ZY114": 0.3}))
-    monkeypatch.setattr("catseye.reduction.coordinates.ZEROS", "held")
+    monkeypatch.setattr("catseye.reduction.epoch.coordinates.ZEROS", "held")
     held = reduce_epoch(written(night))
     assert 50e-6 < moved(clear[1], held, "arm") < 500e-6
     assert held.coordinates.variance_factor > clear[1].coordinates.variance_factor + 0.1 or held.rejected

@@ -15,10 +15,10 @@ from catseye.estimation.pose import fit_pose
 from catseye.estimation.rigid_body import motion_columns
 from catseye.records.site_folder import read_site
 from catseye.records.solved_points import SolvedPoints
-from catseye.reduction.live_bodies import bodies_of
-from catseye.reduction.places import nominal_frame
-from catseye.reduction.pointing_offsets import cross_covariance, pointing_offset
-from catseye.reduction.pose import pose_of_group
+from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
+from catseye.reduction.pose.pose import pose_of_group
+from catseye.reduction.site.bodies import bodies_of
+from catseye.reduction.site.places import nominal_frame
 from repository import ROOT
 
 ARM = [f"ZY11{k}" for k in range(3, 9)]

@@ -6,7 +6,7 @@ The two nights share seed, noise and weather, so a difference is free of them: t
 import numpy as np
 import pytest
 
-from catseye.reduction.epoch import reduce_epoch
+from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Planted, simulate_night
 
 SEED = 4711

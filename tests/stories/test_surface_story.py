@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from catseye.optics.zernike import Term
-from catseye.reduction.actuators import corrections
-from catseye.reduction.surface_change import change_between
-from catseye.reduction.surface_shape import ShapeSettings, shape_of
+from catseye.reduction.surface.actuators import corrections
+from catseye.reduction.surface.change import change_between
+from catseye.reduction.surface.shape import ShapeSettings, shape_of
 from surface_scene import APERTURE, COS, NAMES, PLACES, half_path_of, prisms
 
 SETTINGS = ShapeSettings(free=("vertex", "focal-length"), taper_db=13.0, frequencies=(86e9, 115e9))

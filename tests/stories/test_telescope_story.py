@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.optics.zernike import Term, zernike
 from catseye.records.solved_points import SolvedPoints
-from catseye.reduction.epoch import reduce_epoch
-from catseye.reduction.places import nominal_frame
-from catseye.reduction.pointing_offsets import cross_covariance, pointing_offset
-from catseye.reduction.pose import pose_of_group
-from catseye.reduction.surface_change import change_between
-from catseye.reduction.surface_shape import Aperture, Prisms, ShapeSettings
+from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
+from catseye.reduction.pose.pose import pose_of_group
+from catseye.reduction.site.places import nominal_frame
+from catseye.reduction.surface.change import change_between
+from catseye.reduction.surface.shape import Aperture, Prisms, ShapeSettings
 from catseye.simulator import Planted, simulate_night
 
 SEED = 4711

@@ -12,8 +12,8 @@ import pytest
 
 from catseye.estimation.adjustment import adjust
 from catseye.estimation.observations import Coordinates, Distances, Linear
-from catseye.reduction.places import nominal_frame, places_of
-from catseye.reduction.triplet_ties import (
+from catseye.reduction.site.places import nominal_frame, places_of
+from catseye.reduction.triplet.ties import (
     BALL,
     COUNT,
     TripletParameters,
@@ -21,7 +21,7 @@ from catseye.reduction.triplet_ties import (
     triplet_observations,
     triplet_start,
 )
-from catseye.reduction.triplet_use import MountedTriplet, ball_ranges, scan_points_from_balls
+from catseye.reduction.triplet.use import MountedTriplet, ball_ranges, scan_points_from_balls
 
 U_RANGE, U_PER_METRE = 15e-6, 0.2e-6  # m, and of the distance: the usual night's
 U_ZERO, U_GROUND, U_PLACE = 30e-6, 100e-6, 10e-3  # m: zeros of the rangers, ground points, typed positions

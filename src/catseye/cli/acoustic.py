@@ -49,7 +49,7 @@ def acoustic(
     """Temperature of the air along a path from the travel time of sound."""
     from catseye.gateways.acoustic_objects import MARK, acoustic_object, path_temperatures_csv, words
     from catseye.gateways.writers.output import refuse_output, whole_directory, whole_file
-    from catseye.reduction.acoustic_recording import reduce_acoustic
+    from catseye.reduction.air.acoustic_recording import reduce_acoustic
 
     _refuse_outputs(files, sheet, out, write)
     if out is not None:

@@ -10,7 +10,7 @@ from catseye.cli.terminal import say, wrapped
 from catseye.constants import DEGREE
 
 if TYPE_CHECKING:
-    from catseye.reduction.air_routes import Moisture
+    from catseye.reduction.air.routes import Moisture
 
 
 U = {"callback": uncertainty}
@@ -70,7 +70,7 @@ def air(
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
     from catseye.gateways.air.objects import air_object
     from catseye.gateways.writers.objects import json_line
-    from catseye.reduction.air_routes import air_by, station_pressure, surface_of
+    from catseye.reduction.air.routes import air_by, station_pressure, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -126,8 +126,8 @@ def air(
 
 def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple[str, ...]]]) -> "Moisture":
     """The one way in which the humidity was given, with its uncertainty."""
-    from catseye.reduction.air_routes import HYGROMETERS as kinds
-    from catseye.reduction.air_routes import Moisture
+    from catseye.reduction.air.routes import HYGROMETERS as kinds
+    from catseye.reduction.air.routes import Moisture
 
     said = [kind for kind in kinds if given[kind] is not None]
     if len(said) != 1:

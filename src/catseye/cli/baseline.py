@@ -14,8 +14,8 @@ from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.records.baseline import Baseline, Heights, Observations
-    from catseye.reduction.baseline import BaselineCalibration
-    from catseye.reduction.baseline_lengths import BaselineSettings
+    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.lengths import BaselineSettings
 
 UNKNOWN = "unknown in the record where not given"
 LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
@@ -125,7 +125,7 @@ def baseline(
     quiet: Quiet = False,
 ) -> None:
     """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
-    from catseye.reduction.baseline_lengths import BaselineSettings
+    from catseye.reduction.baseline.lengths import BaselineSettings
 
     settings = BaselineSettings(
         air_model=model,
@@ -186,7 +186,7 @@ def _calibrated(
 ) -> "tuple[BaselineCalibration, dict[str, str]]":
     """The calibration, and the SHA-256 of each file that was read."""
     from catseye.records.baseline import digest_of, read_baseline, read_heights, read_observations
-    from catseye.reduction.baseline import calibrate_baseline
+    from catseye.reduction.baseline.instrument import calibrate_baseline
 
     seen: Observations = read_observations(observations)
     inputs = {observations.name: seen.digest}

@@ -10,7 +10,7 @@ from catseye.cli.terminal import say, wrapped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.reduction.calibration import Calibration
+    from catseye.reduction.calibrations.calibration import Calibration
 
 
 KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spares itself

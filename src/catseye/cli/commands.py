@@ -9,10 +9,10 @@ import typer
 
 from catseye import __version__
 from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.settings import Settings
 
 if TYPE_CHECKING:
-    from catseye.reduction.epoch import Reduction
+    from catseye.reduction.epoch.epoch import Reduction
 
 # as in catseye.atmosphere.air, whose import --help spares itself
 MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
@@ -144,7 +144,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
     progress = ProgressLine(quiet)
     try:
         from catseye.records import read_campaign
-        from catseye.reduction.epoch import reduce_epoch
+        from catseye.reduction.epoch.epoch import reduce_epoch
 
         night = read_campaign(campaign)
         reduction = reduce_epoch(night, Settings(air_model=air_model), progress)

@@ -8,7 +8,7 @@ import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.settings import Settings
 
 if TYPE_CHECKING:
     from catseye.records.campaign import Campaign

@@ -7,10 +7,10 @@ import typer
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
 from catseye.constants import DEGREE
-from catseye.reduction.link import Link, Reflector
+from catseye.reduction.optics.link import Link, Reflector
 
 if TYPE_CHECKING:
-    from catseye.reduction.link_budget import LinkBudget
+    from catseye.reduction.optics.link_budget import LinkBudget
 
 
 @app.command(epilog="\b\nExample: catseye link --distance 120 --incidence-deg 20 --measured-volt 4.5")
@@ -48,7 +48,7 @@ def link(
 ) -> None:
     """Link budget: laser's power to expected return and the range's noise."""
     from catseye.gateways.writers.objects import json_line
-    from catseye.reduction.link_budget import link_budget
+    from catseye.reduction.optics.link_budget import link_budget
 
     head = Link(
         power=power_mw * 1e-3,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from catseye.estimation.network import Network
     from catseye.gateways.network_findings import Findings
     from catseye.gateways.network_plan import PlanFindings
-    from catseye.reduction.networks import Adjusted
+    from catseye.reduction.network import Adjusted
 
 DATUMS = "free|fixed"
 METHODS = "huber|l1|biweight|igg3"
@@ -118,7 +118,7 @@ def adjust(
     try:
         from catseye.gateways.network_findings import findings
         from catseye.records.network import read_network
-        from catseye.reduction.networks import adjusted
+        from catseye.reduction.network import adjusted
 
         treated = [
             adjusted(
@@ -282,7 +282,7 @@ def plan(
         from catseye.gateways.network_findings import findings
         from catseye.gateways.network_plan import PlanFindings
         from catseye.records.network import read_network
-        from catseye.reduction.networks import measured_on_paper
+        from catseye.reduction.network import measured_on_paper
 
         read = _read(read_network, network)
         names = None if interest is None else [p.strip() for p in interest.split(",") if p.strip()]

@@ -57,7 +57,7 @@ def panels(
     """Panel corners from the panel setting instrument: heights, turns of screws, a crew's statistics."""
     from catseye.gateways.panels_objects import panels_object, passages
     from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.reduction.panel_job import PanelFiles, panel_work
+    from catseye.reduction.panels.job import PanelFiles, panel_work
 
     files = PanelFiles(readings, instrument, survey, cmm, as_left, survey_left)
     if out is not None:

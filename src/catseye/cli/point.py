@@ -11,7 +11,7 @@ from catseye.cli.terminal import say
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 
-REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.visibility, whose import --help spares itself
+REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.steering.visibility, whose import --help spares itself
 
 
 def time_text(text: str | None) -> str | None:
@@ -142,9 +142,9 @@ def point(
     from catseye.records.monument import MonumentGeometry
     from catseye.records.reading import read_record
     from catseye.records.solids import Solids
-    from catseye.reduction.pointing import point as pointed
-    from catseye.reduction.pointing import station_of
-    from catseye.reduction.sighting import place_of_monument, seen_from, sightings
+    from catseye.reduction.site.stations import point as pointed
+    from catseye.reduction.site.stations import station_of
+    from catseye.reduction.steering.sighting import place_of_monument, seen_from, sightings
 
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")

@@ -13,7 +13,7 @@ from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.pointing_series_objects import Observed
-    from catseye.reduction.pointing_fit import PointingFit, SeriesComparison
+    from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 
 TERMS = "IA,IE,CA,NPAE,AW,AN,HZCZ,HZSZ"  # as in catseye.geometry.pointing_series, whose import --help spares itself
 ZENITH = 89.999  # degrees: nearer, azimuth is not defined
@@ -133,7 +133,7 @@ def _fitted(
     files: list[Path], against: str | None, terms: list[str], u_arcsec: float | None, reject: bool
 ) -> "tuple[PointingFit, Observed, SeriesComparison | None]":
     from catseye.gateways.pointing_series_objects import read_observed, read_series
-    from catseye.reduction.pointing_fit import compare_series, fit_pointing
+    from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
 
     def fitted(observed: "Observed") -> "PointingFit":
         return fit_pointing(
@@ -238,7 +238,7 @@ def track(
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.reading import Folder
     from catseye.records.tilts import read_tilts
-    from catseye.reduction.track_profile import track_profile
+    from catseye.reduction.pose.track_profile import track_profile
 
     if not poses and tilts is None:
         raise typer.BadParameter("needs poses, --tilts or both.", param_hint="'POSE.json'")

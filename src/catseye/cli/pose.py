@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from catseye.records.site_folder import SiteFolder
     from catseye.records.solved_points import SolvedPoints
 
-# as in catseye.reduction.pose and catseye.estimation.pose, whose import --help spares itself
+# as in catseye.reduction.pose.pose and catseye.estimation.pose, whose import --help spares itself
 GROUPS, FRAMES = "dish|feed-arm|alidade|subreflector", "ground|alidade|reflector"
 METHODS, OPTICS = "l1|huber|igg3|biweight", "prime|gregorian"
 CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
@@ -227,9 +227,9 @@ def _found(
     import numpy as np
 
     from catseye.gateways.pose_objects import PoseResult
-    from catseye.reduction.pointing_offsets import cross_covariance, pointing_offset
-    from catseye.reduction.pose import at_posture, pose_of_group
-    from catseye.reduction.track_profile import pose_with_tilt
+    from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
+    from catseye.reduction.pose.pose import at_posture, pose_of_group
+    from catseye.reduction.pose.track_profile import pose_with_tilt
 
     if later.posture is None:
         raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")

@@ -100,8 +100,8 @@ def refractometer(
         refuse_output(out, readings)
     progress = ProgressLine(quiet)
     try:
-        from catseye.reduction.refractometer_calibration import calibrate_path
-        from catseye.reduction.refractometer_night import read_path_readings, read_path_sheet
+        from catseye.reduction.air.refractometer_calibration import calibrate_path
+        from catseye.reduction.air.refractometer_night import read_path_readings, read_path_sheet
 
         changes = {key: value for key, value in given.items() if value is not None}
         progress("calibration", 0, 1)

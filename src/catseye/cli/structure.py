@@ -14,7 +14,7 @@ from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.structure_epochs import ReadEpochs
-    from catseye.reduction.structure_series import Prediction, StructureFit
+    from catseye.reduction.structure.series import Prediction, StructureFit
 
 FRAMES, OWN = "reflector|alidade|ground", "place|each"
 
@@ -109,7 +109,7 @@ def structure(
             _vibration(vibration, points, run, stretch_s, less, out=out, json=json, quiet=quiet, progress=progress)
             return
         given = _read(sources, epochs, journal, run, every_s)
-        from catseye.reduction.structure_series import SeriesModel
+        from catseye.reduction.structure.series import SeriesModel
 
         kind = cast(Literal["place", "each"], own)
         model = SeriesModel(harmonics, temperature, hysteresis, kind, scatter)
@@ -155,9 +155,9 @@ def _structure(
 
     from catseye.constants import DEGREE
     from catseye.gateways.structure_objects import structure_object
-    from catseye.reduction.structure_check import left_out
-    from catseye.reduction.structure_group import group_series
-    from catseye.reduction.structure_series import fit_structure
+    from catseye.reduction.structure.check import left_out
+    from catseye.reduction.structure.group import group_series
+    from catseye.reduction.structure.series import fit_structure
 
     series = group_series(given.epochs, points, group=group, frame=frame, pivot=pivot, correlated=correlated)
     notes = given.notes
@@ -247,8 +247,8 @@ def _vibration(
 ) -> None:  # fmt: skip
     from catseye.gateways.structure_epochs import read_range_series
     from catseye.gateways.structure_objects import vibration_object
-    from catseye.reduction.vibration import difference
-    from catseye.reduction.vibration import vibration as found_in
+    from catseye.reduction.structure.vibration import difference
+    from catseye.reduction.structure.vibration import vibration as found_in
 
     wanted = points if less is None else [*points, less.partition(":")[2]]
     progress("reading ranges", 0, 0)

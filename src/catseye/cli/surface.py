@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from catseye.gateways.surface_inputs import Frame
     from catseye.gateways.surface_report import SurfaceResult
     from catseye.records.site_folder import SiteFolder
-    from catseye.reduction.actuators import Travel
-    from catseye.reduction.surface_shape import Prisms, ShapeSettings
+    from catseye.reduction.surface.actuators import Travel
+    from catseye.reduction.surface.shape import Prisms, ShapeSettings
 
 PARTS = ("vertex", "axis", "focal-length")  # as catseye.estimation.paraboloid, whose import --help spares itself
 TERMS_TOLD = 22  # on a terminal
@@ -115,7 +115,7 @@ def surface(
     quiet: Quiet = False,
 ) -> None:
     """A dish's surface: best paraboloid, half-path errors, Zernike terms, gain, change, elevation, actuators."""
-    from catseye.reduction.surface_shape import ShapeSettings
+    from catseye.reduction.surface.shape import ShapeSettings
 
     if positions is not None and actuators is None:
         raise InputError(f"--positions {positions}: goes with --actuators only")
@@ -213,10 +213,10 @@ def _found(
     from catseye.gateways.surface_report import SurfaceResult
     from catseye.records.actuators import read_positions
     from catseye.records.site_folder import read_site
-    from catseye.reduction.actuators import actuators_of, corrections
-    from catseye.reduction.surface_change import change_between
-    from catseye.reduction.surface_lookup import lookup_of
-    from catseye.reduction.surface_shape import Aperture, shape_of
+    from catseye.reduction.surface.actuators import actuators_of, corrections
+    from catseye.reduction.surface.change import change_between
+    from catseye.reduction.surface.lookup import lookup_of
+    from catseye.reduction.surface.shape import Aperture, shape_of
 
     wanted, positions, travel = actuators
     site = read_site(site_directory(reading.site))

@@ -10,7 +10,7 @@ from catseye.cli.networks import Out
 from catseye.cli.terminal import ProgressLine, say, wrapped
 
 if TYPE_CHECKING:
-    from catseye.reduction.triplet_result import TripletReduction
+    from catseye.reduction.triplet.result import TripletReduction
 
     Units = list[tuple[Path, TripletReduction]]
 
@@ -54,7 +54,7 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.reading import Folder
     from catseye.records.triplet_measurement import TripletMeasurement
-    from catseye.reduction.triplet import reduce_triplet
+    from catseye.reduction.triplet.unit import reduce_triplet
 
     if out is not None:
         refuse_namesakes(files)

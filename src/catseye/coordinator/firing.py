@@ -18,7 +18,7 @@ from catseye.errors import CatseyeError
 from catseye.ranger.initialisation import frame_of
 from catseye.records.live import TICKS_PER_DAY
 from catseye.records.site_folder import REFERENCE, SiteFolder
-from catseye.reduction.motion import frames_of
+from catseye.reduction.site.motion import frames_of
 
 GOOD = frozenset(["used", "reference"])
 OF_THE_LINE = frozenset(["blocked", "clipped", "dead", "dropout", "stuck", "refused"])  # its own fault

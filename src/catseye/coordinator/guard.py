@@ -27,7 +27,7 @@ from catseye.ranger.values import Value
 from catseye.records.interlock import Act, Interlock, Interlocks
 from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site_folder import SiteFolder
-from catseye.reduction.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
+from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
 
 Array = NDArray[np.float64]
 MOVES = frozenset(["STT", "CIL", "CMEAS", "TRK", "SCN", "FHM"])  # CMEAS 1 only

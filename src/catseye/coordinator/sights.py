@@ -10,7 +10,7 @@ from catseye.coordinator.vantage import Retro, Vantage, nominal_posture, reflect
 from catseye.records.live import LivePosture
 from catseye.records.site_folder import SiteFolder
 from catseye.records.solids import Solids
-from catseye.reduction.visibility import RangeLimits, Retroreflectors, Sight, Visibility, frames_at, visibility
+from catseye.reduction.steering.visibility import RangeLimits, Retroreflectors, Sight, Visibility, frames_at, visibility
 
 STEP = 0.5 * DEGREE  # of azimuth and elevation, within which the answer is kept
 KEPT = 64  # answers

@@ -20,8 +20,8 @@ from catseye.geometry.slew import trapezoid
 from catseye.records.keep_out import KeepOut
 from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site_folder import SiteFolder
-from catseye.reduction.earth_rotation import Place, place_of, sun_at
-from catseye.reduction.guard import Guard, guard_of
+from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
+from catseye.reduction.steering.guard import Guard, guard_of
 
 Array = NDArray[np.float64]
 NODES = 5  # instants at which a ranger that the telescope carries is looked at

@@ -8,7 +8,7 @@ import numpy as np
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 
 if TYPE_CHECKING:
-    from catseye.reduction.acoustic_recording import AcousticPath, Trace
+    from catseye.reduction.air.acoustic_recording import AcousticPath, Trace
 
 HEARD = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
 

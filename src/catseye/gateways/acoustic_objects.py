@@ -9,7 +9,7 @@ from catseye.constants import PPM
 from catseye.gateways.writers.written import csv_text
 
 if TYPE_CHECKING:
-    from catseye.reduction.acoustic_recording import AcousticPath
+    from catseye.reduction.air.acoustic_recording import AcousticPath
 
 MARK = "mjd_utc,ranger,target,temperature_c,u_temperature_c"  # the header of path_temperatures.csv
 TIMES = (

@@ -16,7 +16,7 @@ from catseye.gateways.writers.page import card, page, paragraph, picture, sectio
 from catseye.gateways.writers.written import Files, origin, write_files
 
 if TYPE_CHECKING:
-    from catseye.reduction.acoustic_recording import AcousticPath
+    from catseye.reduction.air.acoustic_recording import AcousticPath
 
 FORMAT = "catseye-acoustic-1"
 CAPTIONS = {

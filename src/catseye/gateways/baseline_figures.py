@@ -9,7 +9,7 @@ from catseye.gateways.baseline_tables import shot_residuals
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline.instrument import BaselineCalibration
 
 MARKERS = "osD^vP"
 

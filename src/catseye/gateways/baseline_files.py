@@ -12,10 +12,10 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.baseline import FORMAT, Baseline, baseline_text
-from catseye.reduction.baseline import record_values
+from catseye.reduction.baseline.instrument import record_values
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline.instrument import BaselineCalibration
 
 Progress = Callable[[str, int, int], None]
 MARK = f'format = "{FORMAT}"'

@@ -11,7 +11,7 @@ from catseye.gateways.writers.passage import Passage
 from catseye.records.baseline import FORMAT
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline.instrument import BaselineCalibration
 
 
 class Span(NamedTuple):

@@ -17,7 +17,7 @@ from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline.instrument import BaselineCalibration
 
 CONTENTS = {
     "summary": "Summary",

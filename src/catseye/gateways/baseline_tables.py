@@ -9,7 +9,7 @@ from catseye.gateways.baseline_objects import baseline_object, spans
 from catseye.gateways.writers.written import cell, csv_text
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline import BaselineCalibration
+    from catseye.reduction.baseline.instrument import BaselineCalibration
 
 OBSERVATIONS = (
     "row", "from_pillar", "to_pillar", "set", "setup", "slope_m", "group_refractivity_ppm", "first_velocity_mm",

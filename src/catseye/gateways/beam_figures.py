@@ -17,7 +17,7 @@ from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
 from catseye.records.beam import BeamTrain
 from catseye.records.reading import Folder
-from catseye.reduction.beam import BeamPath, beam_profile, reduce_beam
+from catseye.reduction.optics.beam import BeamPath, beam_profile, reduce_beam
 
 FORMAT = "catseye-beam-1"
 DRAWN = ("gold", "silver", "aluminium", "protected-aluminium", "dielectric")

@@ -9,7 +9,7 @@ from catseye.gateways.certificate_figure import calibration_figure
 from catseye.gateways.certificate_record import record_lines
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
-from catseye.reduction.calibration import Calibration, Decision, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
 
 TITLE = "Certificate of calibration"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours

@@ -3,7 +3,7 @@
 import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration
 
 PANELS = {"residuals": "residual", "spectrum": "amplitude of residuals"}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye import __version__
 from catseye.gateways.writers.objects import plain
-from catseye.reduction.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import PROVENANCE
 
 FORMAT = "catseye-calibration-1"

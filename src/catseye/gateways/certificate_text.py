@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from catseye.gateways.certificate import rounded
-from catseye.reduction.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration
 
 SHOWN = 12  # readings named at most
 

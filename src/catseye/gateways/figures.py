@@ -8,7 +8,7 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
 from catseye.gateways.tables import kind_of
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, nice, svg
-from catseye.reduction.epoch import Reduction
+from catseye.reduction.epoch.epoch import Reduction
 
 COLOURS = {
     "ground ranger": "#1f5a99",

@@ -16,7 +16,7 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, Progress, origin, write_files
 
 if TYPE_CHECKING:
-    from catseye.reduction.networks import Adjusted
+    from catseye.reduction.network import Adjusted
 
 
 def input_hashes(source: Path) -> dict[str, str]:

@@ -14,7 +14,7 @@ from catseye.gateways.network_findings import MEASURES, ROLES, Findings
 from catseye.gateways.writers.objects import plain
 
 if TYPE_CHECKING:
-    from catseye.reduction.networks import Adjusted
+    from catseye.reduction.network import Adjusted
 
 FORMAT = "catseye-adjustment-1"
 PIECE = 5_000  # rows of a piece

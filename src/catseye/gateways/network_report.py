@@ -15,7 +15,7 @@ from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 
 if TYPE_CHECKING:
-    from catseye.reduction.networks import Adjusted
+    from catseye.reduction.network import Adjusted
 
 CONTENTS = {
     "summary": "Summary",

@@ -10,7 +10,7 @@ from catseye.gateways.network_findings import Findings
 from catseye.gateways.writers.passage import Passage
 
 if TYPE_CHECKING:
-    from catseye.reduction.networks import Adjusted
+    from catseye.reduction.network import Adjusted
 
 NAMED = 5  # names in a sentence at most
 WEAK = 5.0  # times the usual uncertainty: such a point is named

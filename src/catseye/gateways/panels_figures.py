@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.panel_crew import members, sessions
-from catseye.reduction.panels import surface_rms
+from catseye.reduction.panels.crew import members, sessions
+from catseye.reduction.panels.heights import surface_rms
 
 if TYPE_CHECKING:
-    from catseye.reduction.panel_job import PanelWork
-    from catseye.reduction.panels import PanelHeights
+    from catseye.reduction.panels.heights import PanelHeights
+    from catseye.reduction.panels.job import PanelWork
 
 OUTSIDE = 1.03  # of the limits, so that edges are not cut
 

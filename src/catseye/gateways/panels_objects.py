@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.gateways.writers.passage import Passage
-from catseye.reduction.panel_crew import members, sessions, standing, zeros
-from catseye.reduction.panel_job import verdicts
-from catseye.reduction.panels import surface_rms
+from catseye.reduction.panels.crew import members, sessions, standing, zeros
+from catseye.reduction.panels.heights import surface_rms
+from catseye.reduction.panels.job import verdicts
 
 if TYPE_CHECKING:
-    from catseye.reduction.panel_crew import Reader, Setting, Standing
-    from catseye.reduction.panel_job import PanelWork
-    from catseye.reduction.panels import Doubt, PanelHeights
+    from catseye.reduction.panels.crew import Reader, Setting, Standing
+    from catseye.reduction.panels.heights import Doubt, PanelHeights
+    from catseye.reduction.panels.job import PanelWork
 
 FORMAT = "catseye-panels-1"
 

@@ -21,11 +21,11 @@ from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.reduction.panel_crew import members, sessions, standing
+from catseye.reduction.panels.crew import members, sessions, standing
 
 if TYPE_CHECKING:
-    from catseye.reduction.panel_crew import Reader
-    from catseye.reduction.panel_job import PanelWork
+    from catseye.reduction.panels.crew import Reader
+    from catseye.reduction.panels.job import PanelWork
 
 Progress = Callable[[str, int, int], None]
 SHOWN = 200  # screws in the report; screws.csv has all

@@ -10,8 +10,8 @@ from catseye.gateways.panels_objects import screws
 from catseye.gateways.writers.written import cell, csv_text
 
 if TYPE_CHECKING:
-    from catseye.reduction.panel_job import PanelWork
-    from catseye.reduction.panels import PanelHeights
+    from catseye.reduction.panels.heights import PanelHeights
+    from catseye.reduction.panels.job import PanelWork
 
 SCREWS = (
     "panel", "corner", "x_m", "y_m", "readings", "height_um", "u_height_um", "relative_um", "u_relative_um",
@@ -85,7 +85,7 @@ def readings_csv(found: "PanelHeights") -> str:
 
 def crew_csv(work: "PanelWork") -> str:
     """Members and sessions, as found and as left: the points of the control chart."""
-    from catseye.reduction.panel_crew import members, sessions
+    from catseye.reduction.panels.crew import members, sessions
 
     rows = []
     for when, found in (("as found", work.found), ("as left", work.left)):

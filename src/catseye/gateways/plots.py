@@ -13,10 +13,10 @@ from catseye.records.keep_out import KeepOut
 from catseye.records.mirror import MirrorGeometry
 from catseye.records.monument import MonumentGeometry
 from catseye.records.reading import read_record
-from catseye.reduction.guard import guard_of
-from catseye.reduction.pointing import station_of
-from catseye.reduction.reroute import route
-from catseye.reduction.sighting import place_of_monument
+from catseye.reduction.site.stations import station_of
+from catseye.reduction.steering.guard import guard_of
+from catseye.reduction.steering.reroute import route
+from catseye.reduction.steering.sighting import place_of_monument
 from catseye.simulator.motor import AxisDesign
 from catseye.simulator.tuning import Filter, design_filter, margins, plant_of, ready_axis, step_metrics
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.time_tag import utc_text
-from catseye.reduction.guard import Verdict
-from catseye.reduction.pointing import Pointings
-from catseye.reduction.sighting import Sighting
-from catseye.reduction.visibility import Visibility
+from catseye.reduction.site.stations import Pointings
+from catseye.reduction.steering.guard import Verdict
+from catseye.reduction.steering.sighting import Sighting
+from catseye.reduction.steering.visibility import Visibility
 
 MARK = "# catseye point"
 HEADINGS = ("x", "y", "z", "range", "N_a", "N_e", "autocoll.", "back retro", "N_a'", "N_e'", "allowed")

@@ -6,8 +6,8 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
-from catseye.reduction.pointing_fit import PointingFit
-from catseye.reduction.track_profile import TrackProfile
+from catseye.reduction.pose.pointing_fit import PointingFit
+from catseye.reduction.pose.track_profile import TrackProfile
 
 TITLES = ("azimuth times cos E", "elevation")
 

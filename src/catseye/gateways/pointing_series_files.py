@@ -26,8 +26,8 @@ from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, 
 from catseye.gateways.writers.written import Files, csv_text, origin, write_files
 from catseye.records.pointing_model import FORMAT as MODEL
 from catseye.records.toml_text import record_toml
-from catseye.reduction.pointing_fit import PointingFit, SeriesComparison
-from catseye.reduction.track_profile import TrackProfile
+from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.track_profile import TrackProfile
 
 OBSERVATIONS = (
     "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",

@@ -15,8 +15,8 @@ from catseye.geometry.pointing_series import PointingSeries, published
 from catseye.records.pointing_model import PointingModel, Term
 from catseye.records.reading import Folder, read_record
 from catseye.records.star_offsets import StarOffsets, read_star_offsets
-from catseye.reduction.pointing_fit import PointingFit, SeriesComparison
-from catseye.reduction.track_profile import TrackProfile
+from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.track_profile import TrackProfile
 
 FORMAT = "catseye-pointing-1"
 TRACK = "catseye-track-profile-1"

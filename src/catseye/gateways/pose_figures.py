@@ -7,7 +7,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.pose_objects import PoseResult
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
-from catseye.reduction.pointing_offsets import PointingOffset
+from catseye.reduction.pose.pointing_offsets import PointingOffset
 
 NAMED = 14  # points up to which each is named
 LENGTH = 0.12  # of the group's size, drawn for the largest residual

@@ -8,9 +8,9 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.pose import COMPONENTS
 from catseye.records.reading import Folder
-from catseye.reduction.pointing_offsets import COMPONENTS as BEAM
-from catseye.reduction.pointing_offsets import PointingOffset
-from catseye.reduction.pose import GroupPose
+from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
+from catseye.reduction.pose.pointing_offsets import PointingOffset
+from catseye.reduction.pose.pose import GroupPose
 
 FORMAT = "catseye-pose-1"
 WEAK_LEVEL = 0.01  # chance below which a group is said not to move as one

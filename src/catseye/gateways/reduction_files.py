@@ -8,8 +8,8 @@ from catseye.gateways.reports import report
 from catseye.gateways.tables import coordinates_csv, ranges_csv, surface_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, write_files
-from catseye.reduction.epoch import Reduction
-from catseye.reduction.ranges import Progress
+from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.ranges import Progress
 
 
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:

@@ -16,12 +16,12 @@ from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.reduction.refractometer import phase_slope
-from catseye.reduction.refractometer_calibration import STATUS
+from catseye.reduction.air.group_index import phase_slope
+from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles import CycleStatus
 
 if TYPE_CHECKING:
-    from catseye.reduction.refractometer_calibration import PathCalibration
+    from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 FORMAT = "catseye-refractometer-1"
 SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_refractivity_ppm", "temperature_c",

@@ -13,9 +13,9 @@ from catseye.gateways.summary import feed_arm_rows, passages, pointing, trust_li
 from catseye.gateways.tables import kind_of
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
-from catseye.reduction.epoch import Reduction
-from catseye.reduction.refractometer import benchmark_refractometers
-from catseye.reduction.surface import UNOBSERVED
+from catseye.reduction.air.group_index import benchmark_refractometers
+from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.surface import UNOBSERVED
 
 CONTENTS = {
     "summary": "Summary",

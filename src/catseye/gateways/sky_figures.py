@@ -17,9 +17,9 @@ from catseye.geometry.pointing import ray
 from catseye.geometry.slew import Slew, trapezoid
 from catseye.geometry.sun import altitude_azimuth
 from catseye.geometry.time_tag import utc_text
-from catseye.reduction.earth_rotation import Place, sun_at
-from catseye.reduction.guard import Guard
-from catseye.reduction.reroute import Route
+from catseye.reduction.site.earth_rotation import Place, sun_at
+from catseye.reduction.steering.guard import Guard
+from catseye.reduction.steering.reroute import Route
 
 EDGE = 100.0  # degrees from the zenith to the rim of the map
 CELLS = 241  # of a panel along each side

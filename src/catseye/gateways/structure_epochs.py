@@ -16,8 +16,8 @@ from catseye.coordinator.journal_reader import JournalReader
 from catseye.errors import InputError
 from catseye.records.columns import columns_of
 from catseye.records.live import TICKS_PER_DAY, LiveWeather
-from catseye.reduction.structure_group import PlacesEpoch
-from catseye.reduction.vibration import RangeSeries
+from catseye.reduction.structure.group import PlacesEpoch
+from catseye.reduction.structure.vibration import RangeSeries
 
 RESULT, POSE = "coordinates.json", "pose.json"
 REQUIRED = ("reduction", "azimuth_deg", "elevation_deg")

@@ -4,9 +4,9 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.structure_check import LeaveOut
-from catseye.reduction.structure_series import StructureFit
-from catseye.reduction.vibration import Vibration
+from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.series import StructureFit
+from catseye.reduction.structure.vibration import Vibration
 
 AXES = ("x", "y", "z")
 BAND = 2.0  # standard uncertainties shown

@@ -14,9 +14,9 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
 from catseye.gateways.writers.written import Files, Progress, cell, csv_text, origin, write_files
-from catseye.reduction.structure_check import LeaveOut
-from catseye.reduction.structure_series import Prediction, StructureFit
-from catseye.reduction.vibration import Vibration
+from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.series import Prediction, StructureFit
+from catseye.reduction.structure.vibration import Vibration
 
 
 def write_structure(

@@ -7,9 +7,9 @@ import numpy as np
 from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
 from catseye.geometry.deformation import COMPONENTS
-from catseye.reduction.structure_check import LeaveOut
-from catseye.reduction.structure_series import Prediction, StructureFit
-from catseye.reduction.vibration import Vibration
+from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.series import Prediction, StructureFit
+from catseye.reduction.structure.vibration import Vibration
 
 FORMAT = "catseye-structure-1"
 PSD = "m2 / Hz"

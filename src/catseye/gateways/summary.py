@@ -8,7 +8,7 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
 from catseye.gateways.tables import kind_of
 from catseye.gateways.writers.passage import Passage
 from catseye.records.campaign import REFERENCE
-from catseye.reduction.epoch import Reduction
+from catseye.reduction.epoch.epoch import Reduction
 
 MEANING = {
     "blocked": "nothing came back",

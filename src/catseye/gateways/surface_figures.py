@@ -7,9 +7,9 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.optics.zernike import number
-from catseye.reduction.actuators import Actuators
-from catseye.reduction.surface_lookup import HYSTERESIS, Lookup
-from catseye.reduction.surface_shape import Aperture, Expansion, ShapeSettings
+from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.lookup import HYSTERESIS, Lookup
+from catseye.reduction.surface.shape import Aperture, Expansion, ShapeSettings
 
 LEVELS = 21
 MOST_NAMED = 60  # prisms whose names fit

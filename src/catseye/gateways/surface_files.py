@@ -23,7 +23,7 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
 from catseye.gateways.writers.written import Files, Progress, origin, write_files
-from catseye.reduction.actuators import rows_of
+from catseye.reduction.surface.actuators import rows_of
 
 
 def surface_object(found: SurfaceResult) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from catseye.records.columns import Columns, columns_of
 from catseye.records.reading import Folder
 from catseye.records.refusal import refusal, shown
 from catseye.records.site_folder import SiteFolder
-from catseye.reduction.surface_shape import Prisms
+from catseye.reduction.surface.shape import Prisms
 
 Frame = Literal["reflector", "ground"]
 AXES = "xyz"

@@ -8,10 +8,10 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import Numbering, number
-from catseye.reduction.actuators import Actuators
-from catseye.reduction.surface_change import Change
-from catseye.reduction.surface_lookup import Lookup
-from catseye.reduction.surface_shape import Expansion, Gain, MeanSquare, Shape
+from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.lookup import Lookup
+from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, Shape
 
 FORMAT = "catseye-surface-1"
 TAKEN = 0.5  # share of a term's square from which a note is due

@@ -20,10 +20,10 @@ from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import number
-from catseye.reduction.actuators import Actuators
-from catseye.reduction.surface_change import Change
-from catseye.reduction.surface_lookup import Lookup
-from catseye.reduction.surface_shape import Expansion, MeanSquare, Shape, ShapeSettings
+from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.lookup import Lookup
+from catseye.reduction.surface.shape import Expansion, MeanSquare, Shape, ShapeSettings
 
 
 @dataclass(frozen=True, eq=False)

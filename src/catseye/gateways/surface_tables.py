@@ -9,9 +9,9 @@ from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
 from catseye.gateways.writers.written import csv_text
 from catseye.optics.zernike import Numbering, number
 from catseye.records.actuators import ActuatorCorrection
-from catseye.reduction.surface_change import Change
-from catseye.reduction.surface_lookup import Lookup
-from catseye.reduction.surface_shape import Expansion, Shape
+from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.lookup import Lookup
+from catseye.reduction.surface.shape import Expansion, Shape
 
 PRISMS = ("point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm", "half_path_mm", "weight")
 ZERNIKE = (

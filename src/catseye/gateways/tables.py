@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.reduction.epoch import Reduction
+from catseye.reduction.epoch.epoch import Reduction
 from catseye.signal.cycles import unwrapped_length
 
 RANGES = [

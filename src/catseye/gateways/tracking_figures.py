@@ -4,9 +4,9 @@ import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.search_pattern import count_size
-from catseye.reduction.spot_fit import Spot
-from catseye.reduction.tracking import Following, Track
-from catseye.reduction.visibility import Sight, Visibility
+from catseye.reduction.steering.spot_fit import Spot
+from catseye.reduction.steering.tracking import Following, Track
+from catseye.reduction.steering.visibility import Sight, Visibility
 
 SIGHTS = {
     Sight.SEEN: (SERIES[2], "seen"),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.triplet_result import TOLERANCE, TripletReduction
+from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
 MICROMETRES = 1e6
 NEAREST, FARTHEST = 1.6, 4.0  # tolerances from L_MPBC to the edge; what is farther off is named there

@@ -16,7 +16,7 @@ from catseye.gateways.triplet_sheet import html_sheet, text_sheet
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE
 from catseye.gateways.writers.written import origin, write_files
-from catseye.reduction.triplet_result import TripletReduction
+from catseye.reduction.triplet.result import TripletReduction
 
 COLUMNS = (
     "file", "triplet", "h_corr_mm", "u_h_corr_mm", "l_mpbc_mm", "u_l_mpbc_mm", "difference_mm", "u_difference_mm",

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.gateways.triplet_symbols import PLACEMENT, PLATE, UNIT, point_places, symbol_values
-from catseye.reduction.triplet_result import TOLERANCE, TripletReduction
+from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
 OWN = ("N_1", "N_2", "N_BC", "margin")  # told under `cycles`
 

@@ -17,8 +17,8 @@ from catseye.gateways.triplet_symbols import (
 )
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
-from catseye.reduction.triplet import NOT_A_TRIANGLE, SLIPPED
-from catseye.reduction.triplet_result import TripletReduction
+from catseye.reduction.triplet.result import TripletReduction
+from catseye.reduction.triplet.unit import NOT_A_TRIANGLE, SLIPPED
 
 TITLE = "Triplet calibration"
 SIDE_BY_SIDE = 3  # placements in one table

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import SPEED_OF_LIGHT
-from catseye.reduction.triplet_geometry import half_wavelengths
-from catseye.reduction.triplet_result import TripletReduction
+from catseye.reduction.triplet.geometry import half_wavelengths
+from catseye.reduction.triplet.result import TripletReduction
 
 Value = Callable[[TripletReduction], Any]
 

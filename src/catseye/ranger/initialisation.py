@@ -19,8 +19,8 @@ from catseye.ranger.line import Request
 from catseye.records.mirror import Mirror
 from catseye.records.site_folder import REFERENCE, SiteFolder
 from catseye.records.target import FeedArmRanger
-from catseye.reduction.places import Place, nominal_frame, places_of
-from catseye.reduction.pointing import offset_of, station_of
+from catseye.reduction.site.places import Place, nominal_frame, places_of
+from catseye.reduction.site.stations import offset_of, station_of
 
 FILTER = ("FKP", "FKI", "FKD", "FIL", "FSI")
 BOOT_ACCELERATION = 2_000  # of a ranger's AxisSettings

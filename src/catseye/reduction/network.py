@@ -1,321 +1,241 @@
-"""The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
+"""The recipe for a network: adjusted plainly, robustly, or without wrong observations; weights estimated."""
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from catseye.constants import MILLIMETRE
-from catseye.errors import InputError
-from catseye.estimation.observations import Distances, Linear, Observations
-from catseye.records.campaign import REFERENCE, Campaign
-from catseye.records.triplet import Triplet
-from catseye.reduction.air import AirField
-from catseye.reduction.head import head_unknowns
-from catseye.reduction.motion import Motion
-from catseye.reduction.places import Place, places_of, unit
-from catseye.reduction.ranges import Electronics, Phases
-from catseye.reduction.settings import Settings
+from catseye.constants import PPM
+from catseye.errors import EstimationError
+from catseye.estimation.adjustment import CONVERGED, Fit
+from catseye.estimation.approximate import approximate
+from catseye.estimation.monte_carlo import Disturbance, Scatter, scatter
+from catseye.estimation.network import Network, NetworkSolution, points_of
+from catseye.estimation.network_adjustment import adjust_network, with_datum
+from catseye.estimation.observations import Distances
+from catseye.estimation.ranging_engine import RangingCovariance
+from catseye.estimation.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
+from catseye.estimation.variance_components import Components, GroupFactors, RowModel, variance_components
 
-FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's scan point ZY101
-AIR = "the air"  # no point can have this name: it has a blank
-APPROXIMATE = "approximate positions"
-THERMOMETERS = "thermometers"
-SOUND = "path temperatures"
-ZEROS = "ranger zeros"
-HEADS = "head effects"
-PATHS = "lasting paths"
+START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 
-
-def path_of(ranger: str, target: str) -> str:
-    """The parameter of what lasts of a line's index, ppm."""
-    return f"path {ranger} {target}"
-
-
-@dataclass
-class Layout:
-    """Where each parameter stands in the vector of the adjustment."""
-
-    names: list[str] = field(default_factory=list)
-    at: dict[str, int] = field(default_factory=dict)
-    start: list[float] = field(default_factory=list)
-    free: list[bool] = field(default_factory=list)
-
-    def add(self, name: str, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None) -> None:
-        """Append the parts of a quantity with their start values; False in `free` holds one."""
-        self.at[name] = len(self.names)
-        self.names.extend(f"{name} {part}".strip() for part in parts)
-        self.start.extend(float(s) for s in start)
-        self.free.extend(free if free is not None else [True] * len(parts))
-
-    def columns(self, name: str, count: int = 3) -> np.ndarray:
-        """Indices of the first parts of a quantity."""
-        return self.at[name] + np.arange(count)
+Progress = Callable[[str, int, int], None]
+Placed = tuple[tuple[str, ...], tuple[str, ...]]  # names of points that were placed, and of those on an assumed side
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
-    """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what."""
+class Adjusted:
+    """A network with its answer and how observations were treated.
 
-    campaign: Campaign
-    settings: Settings
-    phases: Phases
-    electronics: dict[str, Electronics]
-    places: dict[str, Place]
-    layout: Layout
-    field: AirField
-    priors: list[Observations]
-    motion: Motion | None = None
+    solution     of the adjustment, with the treatment below
+    treatment    "plain", "rejected", or the name of a robust method
+    weights      one (m,) a group: share of its claimed weight that each observation was given; 0 where left out
+    rejected     one (m,) bool a group
+    undecided    one (m,) bool a group: contradicted by others, nothing says which is wrong; given next to no weight
+    rejections   what data snooping says of each it left out
+    components   estimated components of variance, where asked
+    notes        what a person should know, one line each
+    """
 
-    @property
-    def rangers(self) -> list[str]:
-        """Those that fired a usable shot."""
-        return [
-            name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
-        ]
-
-    def seen_from(self, ranger: str) -> "Network":
-        """The network whose air knows the lines of one ranger's usable shots, in their order."""
-        if not self.field.lines:
-            return self
-        shots, rows = self.campaign.shots, self.electronics[ranger].shots
-        ends = [frozenset((ranger, shots.target[k])) for k in rows]
-        return replace(self, field=self.field.on_lines(shots.mjd_utc[rows], ends))
+    solution: NetworkSolution
+    treatment: str
+    weights: tuple[np.ndarray, ...]
+    rejected: tuple[np.ndarray, ...]
+    undecided: tuple[np.ndarray, ...]
+    rejections: tuple[Rejection, ...] = ()
+    components: Components | None = None
+    notes: tuple[str, ...] = ()
 
 
-def build_network(
-    campaign: Campaign,
-    phases: Phases,
-    electronics: dict[str, Electronics],
-    settings: Settings,
+def adjusted(
+    network: Network,
     *,
-    motion: Motion | None = None,
-    also: Collection[str] = (),
-) -> Network:
-    """The unknowns and priors of a campaign.
+    datum: str | None = None,
+    reject: bool = False,
+    robust: str | None = None,
+    level: float = 0.05,
+    components: str | None = None,
+    progress: Progress | None = None,
+) -> Adjusted:
+    """A network's coordinates, every observation used as claimed unless asked otherwise.
 
-    motion   where the telescope moves between the shots; its points are then those of the motion's epoch
-    also     rangers and targets that take part as if they had fired or been fired at
+    network      from `records.read_network`
+    datum        as `adjust_network`
+    reject       leave out observations that the w test rejects, found from a robust start
+    robust       or give each the weight of an M-estimate: a key of `robustness.WEIGHTS`
+    level        of all tests together, for `reject`
+    components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
 
-    Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
-    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
-    (thermometers, profile, sounded lines), two tilts of every prism face, and the rest of every glass constant.
+    Raises EstimationError for an unknown method, or where a network without an answer is to be treated.
     """
-    places = places_of(campaign)
-    fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
-    fired |= set(also) & set(places)
-    fired |= {t for triplet in campaign.triplets.values() if fired & set(triplet.targets) for t in triplet.targets}
-    shooting = {name for name, e in electronics.items() if len(e.shots)} | (set(also) & set(campaign.rangers))
-    seen = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
+    if robust is not None and robust not in WEIGHTS:
+        raise EstimationError(f"robust method {robust!r} is not known (expected one of {', '.join(WEIGHTS)})")
+    if components not in (None, "rangers", "groups"):
+        raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
+    network, placed = _placed(with_datum(network, datum))
+    treated = reject or robust is not None or components is not None
+    plain = replace(adjust_network(network, diagnose=not treated), approximate=placed[0], assumed=placed[1])
+    sizes = [len(g.observed) for g in network.groups]
+    nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
+    result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
+    if not treated or not np.isfinite(plain.covariance).all():
+        return result
+    count, engine = 0, _engine(plain)
 
-    layout = Layout()
-    for name, place in sorted(seen.items()):
-        layout.add(name, "xyz", place.start)
-    for name, monument in campaign.monuments.items():
-        u = (monument.u_x_mm, monument.u_y_mm, monument.u_z_mm)
-        where = np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE
-        layout.add(name + FIXED_POINT, "xyz", where, [value > 0.0 for value in u])
-    for name in sorted(shooting):
-        layout.add(f"zero {name}", [""], [0.0])
-        layout.add(f"leakage {name}", ["real", "imaginary"], [0.0, 0.0])
-        for unknown in head_unknowns(campaign, name):
-            layout.add(unknown.name, unknown.parts, np.zeros(len(unknown.parts)))
-    air = AirField.of(campaign, settings)
-    layout.add(AIR, air.names, np.zeros(len(air.names)))
-    for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
-        layout.add(f"normal {group}", ["1", "2"], [0.0, 0.0])
-    for name in sorted(fired):
-        if seen[name].u_constant > 0.0:
-            layout.add(f"glass {name}", [""], [0.0])
-    u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
-    fired_lines = {path_of(n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots}
-    lines = sorted(fired_lines) if u_path > 0.0 else []
-    for line in lines:
-        layout.add(line, [""], [0.0])
-    priors = _priors(campaign, settings, seen, layout, air)
-    if lines:
-        columns = [layout.at[line] for line in lines]
-        priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
-    return Network(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+    def solve(inflation: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+        nonlocal count
+        count += 1
+        if progress is not None:
+            progress("adjusting", count, 0)
+        return adjust_network(network, inflation=inflation, alone=True, diagnose=False, engine=engine).fits
 
-
-def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:
-    """Parameters known beforehand, one by one."""
-    count = np.size(columns)
-    return Linear(
-        name,
-        np.asarray(observed, dtype=float),
-        np.asarray(sigma, dtype=float) ** 2,
-        np.asarray(columns),
-        np.eye(count),
-    )
-
-
-def _priors(
-    campaign: Campaign, settings: Settings, seen: dict[str, Place], layout: Layout, air: AirField
-) -> list[Observations]:
-    count = len(air.stations)
-    at = layout.columns(AIR, len(air.names))
-    priors = [
-        *_survey(campaign, seen, layout),
-        *_heads(campaign, layout),
-        _independent(THERMOMETERS, at[:count], np.zeros(count), air.sigmas[:count]),
-        _independent("air profile", at[count : count + 1], [0.0], air.sigmas[count : count + 1]),
-        *_sound(air, at[count + 1 :]),
-        *_directions(campaign, settings, layout),
-        *_glass(seen, layout),
-    ]
-    typed = [n for n, p in sorted(seen.items()) if p.typed]
-    if typed:
-        columns = np.concatenate([layout.columns(n) for n in typed])
-        where = np.concatenate([seen[n].start for n in typed])
-        u_start = np.repeat([seen[n].u_typed(settings.u_position) for n in typed], 3)
-        priors.append(_independent(APPROXIMATE, columns, where, u_start))
-    for triplet in campaign.triplets.values():
-        if triplet.ball.target in seen:
-            priors.extend(_triplet(triplet, seen, layout, settings))
-    for benchmark in campaign.benchmarks:
-        if benchmark.target in seen and benchmark.ranger in seen:
-            u = _positive(benchmark.u_mm * MILLIMETRE, f"benchmarks.csv: {benchmark.target}, u_mm")
-            length = benchmark.certified_distance_mm * MILLIMETRE
-            priors.append(_length("benchmarks", length, u, layout, benchmark.ranger, benchmark.target))
-    return priors
-
-
-def _sound(air: AirField, columns: np.ndarray) -> list[Observations]:
-    """How much too warm the sound of each line may read: a parameter a line, as its length errs in all rows alike."""
-    if not air.lines:
-        return []
-    return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
-
-
-def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[Observations]:
-    """Fixed points as surveyed (a zero u holds a coordinate, it defines the datum), mirrors above them as measured."""
-    priors: list[Observations] = []
-    columns, observed, sigma = [], [], []
-    for name, monument in campaign.monuments.items():
-        for i, axis in enumerate("xyz"):
-            u = getattr(monument, f"u_{axis}_mm") * MILLIMETRE
-            if u > 0.0:
-                columns.append(layout.at[name + FIXED_POINT] + i)
-                observed.append(getattr(monument, f"{axis}_mm") * MILLIMETRE)
-                sigma.append(u)
-        mirror = campaign.mirror_of(name)
-        fixed = layout.columns(name + FIXED_POINT)
-        u_offset = _positive(mirror.u_offset_mm * MILLIMETRE, f"mirrors/{mirror.zp}.toml: u_offset_mm")
-        priors.append(
-            Linear(
-                "mirror offsets",
-                seen[name].start - np.array(layout.start)[fixed],
-                np.full(3, u_offset**2),
-                np.concatenate([layout.columns(name), fixed]),
-                np.hstack([np.eye(3), -np.eye(3)]),
-            )
+    if robust is not None:
+        found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
+        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
+        solution = _final(network, inflation, placed, alone=True)
+        notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
+        result = replace(
+            result,
+            solution=solution,
+            treatment=robust,
+            weights=found.weights,
+            rejected=found.rejected,
+            undecided=found.undecided,
+            notes=notes,
         )
-    if columns:
-        priors.append(_independent("monuments", columns, observed, sigma))
-    return priors
+    elif reject:
+        start = estimate_robustly(solve, sizes, places=_places(network))
+        chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
+        inflation = [
+            np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
+            for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
+        ]
+        solution = _final(network, inflation, placed, alone=True)
+        result = replace(
+            result,
+            solution=solution,
+            treatment="rejected",
+            weights=tuple(1.0 / np.square(i) for i in inflation),
+            rejected=chosen.rejected,
+            undecided=chosen.undecided,
+            rejections=chosen.rejections,
+            notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
+        )
+    if components is not None:
+        result = _with_components(network, result, components, progress)
+    return result
 
 
-def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
-    """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
-    rangers = [n for n in campaign.rangers if f"zero {n}" in layout.at]
-    mirrors = [campaign.mirror_of(n) for n in rangers]
-    zeros = [layout.at[f"zero {n}"] for n in rangers]
-    u_zero = [_positive(m.u_d0_mm * MILLIMETRE, f"mirrors/{m.zp}.toml: u_d0_mm") for m in mirrors]
-    quadratures = [c for n in rangers for c in layout.columns(f"leakage {n}", 2)]
-    u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
-    return [
-        _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
-        _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
-        *(_head(campaign, n, layout) for n in rangers if head_unknowns(campaign, n)),
-    ]
+def _places(network: Network) -> list[np.ndarray]:
+    """For the search at single points: the target of each range, -1 for other observations."""
+    return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
-def _head(campaign: Campaign, name: str, layout: Layout) -> Linear:
-    """How far the effects of one ranger's head may be off its sheet."""
-    zp = campaign.mirror_of(name).zp
-    columns: list[int] = []
-    u: list[float] = []
-    for unknown in head_unknowns(campaign, name):
-        columns.extend(layout.columns(unknown.name, len(unknown.parts)))
-        u.extend([_positive(unknown.u, f"mirrors/{zp}.toml: {unknown.key}")] * len(unknown.parts))
-    return _independent(HEADS, columns, np.zeros(len(columns)), u)
+def _placed(network: Network) -> tuple[Network, Placed]:
+    """The network with places found once for points that have none, and who these are."""
+    if np.isfinite(network.points.xyz).all():
+        return network, ((), ())
+    begin, nothing = approximate(network), not np.isfinite(network.points.xyz).any()
+    parameters = tuple(replace(p, start=float(v)) for p, v in zip(network.parameters, begin.parameters, strict=True))
+    points = replace(
+        network.points, xyz=begin.xyz, datum=network.points.datum & (np.isfinite(network.points.xyz) | nothing)
+    )
+    return replace(network, points=points, parameters=parameters), (begin.found, begin.assumed)
 
 
-def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[Observations]:
-    """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
-    normals = [name for name in layout.at if name.startswith("normal ")]
-    if not normals:
-        return []
-    triplets = [n.removeprefix("normal ") in campaign.triplets for n in normals]
-    columns = [c for n in normals for c in layout.columns(n, 2)]
-    u = np.repeat(np.where(triplets, settings.u_plate_normal, settings.u_normal), 2)
-    return [_independent("normals", columns, np.zeros(len(columns)), u)]
+def _engine(solution: NetworkSolution) -> str | None:
+    """The engine for many solutions on the way: the ranging one where it served, without falling back to another."""
+    return "ranging" if isinstance(solution.q, RangingCovariance) else None
 
 
-def _glass(seen: dict[str, Place], layout: Layout) -> list[Observations]:
-    """The rests of the glass constants, each common to every shot on its target."""
-    names = [name for name in sorted(seen) if f"glass {name}" in layout.at]
-    if not names:
-        return []
-    columns = [layout.at[f"glass {name}"] for name in names]
-    return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
+def _final(network: Network, inflation: Sequence[np.ndarray], placed: Placed, *, alone: bool) -> NetworkSolution:
+    return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=placed[0], assumed=placed[1])
 
 
-def _positive(u: float, where: str) -> float:
-    if u <= 0.0:
-        raise InputError(f"{where} = 0 (expected above 0: an exact value cannot be weighed against ranges)")
-    return u
+def _with_components(network: Network, result: Adjusted, by: str, progress: Progress | None) -> Adjusted:
+    """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
+    placed = (result.solution.approximate, result.solution.assumed)
+    out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
+    count, engine = 0, _engine(result.solution)
+
+    def scaled(scales: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+        nonlocal count
+        count += 1
+        if progress is not None:
+            progress("estimating components", count, 0)
+        used = scales if out is None else [s * o for s, o in zip(scales, out, strict=True)]
+        return adjust_network(network, inflation=used, diagnose=False, engine=engine).fits
+
+    sizes = tuple(len(g.observed) for g in network.groups)
+    if by == "groups":
+        model: GroupFactors | RowModel = GroupFactors(tuple(g.name for g in network.groups), sizes)
+    else:
+        model = _ranger_model(network, result.solution)
+    found = variance_components(scaled, model)
+    inflation = model.scales(found.values)
+    if out is not None:
+        inflation = [s * o for s, o in zip(inflation, out, strict=True)]
+    solution = _final(network, inflation, placed, alone=False)
+    notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
+    return replace(result, solution=solution, components=found, notes=notes)
 
 
-def _length(name: str, length: float, u: float, layout: Layout, origin: str, target: str) -> Distances:
-    one = np.ones(1)
-    return Distances(
-        name,
-        length * one,
-        u**2 * np.eye(1),
-        layout.columns(origin, 1),
-        layout.columns(target, 1),
-        one,
-        0.0 * one,
-        np.zeros((1, 0), dtype=int),
-        np.zeros((1, 0)),
+def _ranger_model(network: Network, solution: NetworkSolution) -> RowModel:
+    """sigma^2 = a^2 + (b D)^2 of each point that ranges, over all groups of ranges; other groups as claimed."""
+    ranging = [points_of(g)[0] if isinstance(g, Distances) and g.covariance.ndim == 1 else None for g in network.groups]
+    used = [o for o in ranging if o is not None]
+    if not used:
+        raise EstimationError("variance components by rangers: no independent ranges (expected slope distances)")
+    rangers = np.unique(np.concatenate(used))
+    names = [network.points.names[i] for i in rangers]
+    cofactors, columns, fixed = [], [], []
+    for group, origin, fit in zip(network.groups, ranging, solution.fits, strict=True):
+        m = len(group.observed)
+        if origin is None:
+            cofactors.append(np.zeros((m, 0)))
+            columns.append(np.zeros(0, dtype=int))
+            fixed.append(fit.sigma**2)
+            continue
+        k = np.searchsorted(rangers, origin)
+        part = np.zeros((m, 2 * len(rangers)))
+        part[np.arange(m), 2 * k] = 1.0
+        part[np.arange(m), 2 * k + 1] = np.square(group.observed)
+        cofactors.append(part)
+        columns.append(np.arange(2 * len(rangers)))
+        fixed.append(np.zeros(m))
+    return RowModel(
+        names=tuple(f"{what}^2 of {name}" for name in names for what in ("constant", "scale")),
+        sigmas=tuple(f.sigma for f in solution.fits),
+        cofactors=tuple(cofactors),
+        columns=tuple(columns),
+        start=np.tile(np.square(START), len(rangers)),
+        fixed=tuple(fixed),
     )
 
 
-def _triplet(triplet: Triplet, seen: dict[str, Place], layout: Layout, settings: Settings) -> list[Observations]:
-    """What a data sheet says of a unit: ball above the prisms' mid-point, prisms apart by d12 along the axis.
+def measured_on_paper(
+    network: Network,
+    *,
+    runs: int,
+    seed: int,
+    air_ppm: float = 0.0,
+    station_ppm: float = 0.0,
+    refraction: float = 0.0,
+    blunders: float = 0.0,
+    progress: Progress | None = None,
+) -> Scatter:
+    """A planned network measured many times with what goes wrong outside, and adjusted each time; see `scatter`.
 
-    The axis is good to some tenths of a degree, 3 mm across the unit: it only helps where a prism was not ranged.
+    network      with its datum as it will be; its coordinates are taken for the truth
+    runs, seed   how many, of which generator
+    air_ppm      standard deviation of a scale error of all ranges together
+    station_ppm  the same of each ranger
+    refraction   standard deviation of the coefficient of vertical refraction
+    blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
     """
-    left, right, ball = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
-    where = f"triplets/{triplet.triplet}.toml"
-    normal = seen[left].normal
-    assert normal is not None
-    along = np.outer(normal, normal)
-    u_h = _positive(triplet.u_h_corr_mm * MILLIMETRE, f"{where}: u_h_corr_mm")
-    u_lateral = _positive(triplet.u_lateral_mm * MILLIMETRE, f"{where}: u_lateral_mm")
-    u_d12 = _positive(triplet.u_d12_mm * MILLIMETRE, f"{where}: u_d12_mm")
-    eye = np.eye(3)
-    length = triplet.d12_mm * MILLIMETRE
-    axis = unit(seen[right].start - seen[left].start)
-    across = np.linalg.svd(axis[None])[2][1:]
-    return [
-        Linear(
-            "triplet balls",
-            triplet.h_corr_mm * MILLIMETRE * normal,
-            u_h**2 * along + u_lateral**2 * (eye - along),
-            np.concatenate([layout.columns(ball), layout.columns(left), layout.columns(right)]),
-            np.hstack([eye, -0.5 * eye, -0.5 * eye]),
-        ),
-        _length("triplet spacings", length, u_d12, layout, left, right),
-        Linear(
-            "triplet axes",
-            np.zeros(2),
-            (length * settings.u_plate_normal) ** 2 * np.eye(2),
-            np.concatenate([layout.columns(left), layout.columns(right)]),
-            np.hstack([-across, across]),
-        ),
-    ]
+    disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, refraction=refraction, blunders=blunders)
+
+    def solve(drawn: Network) -> NetworkSolution:
+        return adjusted(drawn, reject=blunders > 0.0).solution
+
+    return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)

@@ -15,8 +15,8 @@ from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal_entries import AnsweredShot, Solution
 from catseye.estimation.datum import motions
 from catseye.records.site_folder import SiteFolder
-from catseye.reduction.live_bodies import bodies_of, lasting_names
-from catseye.reduction.motion import GROUND, frames_of, ground_from
+from catseye.reduction.site.bodies import bodies_of, lasting_names
+from catseye.reduction.site.motion import GROUND, frames_of, ground_from
 from catseye.simulator.twin import Twin
 from catseye.simulator.twin_beam import TracedDish
 

@@ -32,7 +32,7 @@ from catseye.records.keep_out import KeepOut
 from catseye.records.reading import read_record
 from catseye.records.site_folder import SiteFolder
 from catseye.records.solids import Solids
-from catseye.reduction.live import Live, LiveSettings
+from catseye.reduction.live.live import Live, LiveSettings
 from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess
 from catseye.service.warm import initialising_commands

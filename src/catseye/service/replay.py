@@ -14,7 +14,7 @@ from catseye.coordinator.journal_reader import JournalReader, StoredRun
 from catseye.coordinator.replay import Replayed, replay
 from catseye.errors import InputError
 from catseye.records.site_folder import SiteFolder, read_site
-from catseye.reduction.live import Live
+from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 
 TOLD = 20  # points that people are told of: those that move most

@@ -6,7 +6,7 @@ from typing import Any
 
 from catseye.coordinator.journal_entries import plain
 from catseye.errors import InputError
-from catseye.reduction.live import LiveSettings
+from catseye.reduction.live.live import LiveSettings
 
 KEY = "live"
 FILTERS = ("random_walk", "constant_velocity")

@@ -17,7 +17,7 @@ from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request
 from catseye.ranger.ranger import Ranger
 from catseye.records.live import LivePosture
 from catseye.records.site_folder import SiteFolder
-from catseye.reduction.places import places_of
+from catseye.reduction.site.places import places_of
 from catseye.simulator.world_clock import Clock
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on

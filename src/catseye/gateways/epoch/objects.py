@@ -12,8 +12,8 @@ from catseye.gateways.writers.output import FORMAT
 
 if TYPE_CHECKING:
     from catseye.records.campaign import Campaign
-    from catseye.reduction.epoch import Reduction
-    from catseye.reduction.refractometer import BenchmarkSeries
+    from catseye.reduction.air.group_index import BenchmarkSeries
+    from catseye.reduction.epoch.epoch import Reduction
 
 CERTIFICATE = ("serial", "measured_on", "valid_until", "by", "report")
 
@@ -49,7 +49,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
 
 def estimated_air(reduction: "Reduction") -> dict[str, Any]:
     """What the ranges, the benchmarks and sound said of the air; units in the keys."""
-    from catseye.reduction.refractometer import benchmark_refractometers
+    from catseye.reduction.air.group_index import benchmark_refractometers
 
     *stations, profile = reduction.coordinates.air.items()
     (name, (value, u)) = profile

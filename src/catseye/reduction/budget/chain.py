@@ -16,8 +16,8 @@ from catseye.geometry.mirror_path import beam_angles, direction_angles, path_cha
 from catseye.optics.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
 from catseye.reduction.budget.scene import Scene, walk_of
-from catseye.reduction.head import mounted, only_prime
-from catseye.reduction.pointing import AXES
+from catseye.reduction.epoch.head import mounted, only_prime
+from catseye.reduction.site.stations import AXES
 
 NODES = 3  # of the quadrature along the path: exact to degree 5 in height
 

@@ -12,11 +12,11 @@ from catseye.records.mirror import Mirror
 from catseye.reduction.budget.chain import drawing, measurement
 from catseye.reduction.budget.inputs import Item, correlation_of, items_of
 from catseye.reduction.budget.scene import Assumptions, Scene, scene_of
-from catseye.reduction.coordinates import Coordinates
-from catseye.reduction.epoch import Reduction, reduce_epoch
-from catseye.reduction.places import Place, places_of
-from catseye.reduction.ranges import Phases, Progress, follow_electronics, measure_phases
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.coordinates import Coordinates
+from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
+from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.site.places import Place, places_of
 from catseye.signal.cycles import Decision, decision, unwrapped_length
 
 CHECKED = 0.05  # redundancy below which the other shots do not say where a target is

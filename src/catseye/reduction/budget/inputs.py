@@ -26,7 +26,7 @@ from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.propagation import STUDENT, Input
 from catseye.optics.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, Scene, head_columns
-from catseye.reduction.head import AXES, head_corrections, head_unknowns
+from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
 from catseye.signal.buffers import inspect_buffers
 from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES
 from catseye.signal.cyclic import cyclic_slope

@@ -8,11 +8,11 @@ from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.records.campaign import REFERENCE, Campaign
 from catseye.records.mirror import Mirror
-from catseye.reduction.air import AirField, PathAir
-from catseye.reduction.head import head_corrections, head_unknowns
-from catseye.reduction.places import Place
-from catseye.reduction.ranges import Phases
-from catseye.reduction.settings import Settings
+from catseye.reduction.epoch.air import AirField, PathAir
+from catseye.reduction.epoch.head import head_corrections, head_unknowns
+from catseye.reduction.epoch.ranges import Phases
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.site.places import Place
 from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
 from catseye.signal.drift import drift_at
 

@@ -4,35 +4,33 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.records.readings import read_readings
-from catseye.reduction.calibration import Calibration
-from catseye.reduction.calibrations import (
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.kind import Kind
+from catseye.reduction.calibrations.length import gauge_blocks, height_gauge, invar_wire
+from catseye.reduction.calibrations.mirror import (
     alignment,
-    amplitude,
     autocollimation,
     both_faces,
     both_faces_pointing,
     detector_focus,
     encoder,
-    gauge_blocks,
+    limits,
+    search_results,
+)
+from catseye.reduction.calibrations.monument import azimuth as monument_azimuth
+from catseye.reduction.calibrations.monument import hydrostatic_level, inclinometer, plate_levels
+from catseye.reduction.calibrations.monument import place as monument_place
+from catseye.reduction.calibrations.ranging import (
+    amplitude,
     glass_constants,
-    height_gauge,
-    hydrostatic_level,
-    inclinometer,
-    invar_wire,
     leakage,
     leakage_lit,
-    limits,
     linearity,
-    monument_azimuth,
-    monument_place,
     oscillator,
-    plate_levels,
     reference_distance,
     repeatability,
     retroreflector,
-    search_results,
 )
-from catseye.reduction.calibrations.kind import Kind
 
 KINDS: dict[str, Kind] = {
     "reference-distance": reference_distance.RECIPE,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.reduction.calibration import Quantity
+from catseye.reduction.calibrations.calibration import Quantity
 from catseye.reduction.calibrations.fit import REJECTED, SUSPECT, USED, Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import quantities
 

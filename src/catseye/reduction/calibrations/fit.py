@@ -14,7 +14,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.adjustment import Solution, adjust
 from catseye.estimation.observations import Linear
 from catseye.estimation.reliability import checked, global_test, single_level, tau_critical, w_critical
-from catseye.reduction.calibration import Decision
+from catseye.reduction.calibrations.calibration import Decision
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 SCATTER_LIMIT = 0.05  # level of the test of the variance factor, two-sided

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from catseye.records.readings import Layout, Readings
-from catseye.reduction.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.fit import Fit
 
 PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "report")

@@ -1,0 +1,1 @@
+"""The air a night was measured in: refractometers, sound, what each path holds."""

@@ -1,0 +1,317 @@
+"""Temperature and wind between loudspeakers and microphones at known places, and the index along a laser's path there.
+
+Each travel time is the mean of the temperature along its path plus what the wind carries, over the derivative of the
+speed by the temperature (`estimation.tomography`). Places, delay, pressure, humidity and the formula's own departure
+are parameters with priors that all paths share. What is not taken off: variances along a path, 0.003 °C for 1 K rms and
+0.007 °C for 1 m/s rms (`atmosphere.sound_path`), and bent rays.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catseye.atmosphere.air import air
+from catseye.atmosphere.model import Limit, check_spreads
+from catseye.atmosphere.sound import THERMOMETRY, model_named, sound, temperatures_c
+from catseye.atmosphere.sound_dispersion import dispersion
+from catseye.errors import EstimationError, ValidityError
+from catseye.estimation.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
+from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
+
+PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
+CLOSE_ENOUGH_C = 1e-6
+NOTHING = "no travel time of {} is that of sound in air; check the delay and the places"
+WINDIEST = 60.0  # m/s that a wind and a temperature other than expected may make together
+LINE = Limit("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
+COMMON = ("delay", "pressure", "humidity", "carbon dioxide", "dispersion", "formula")  # after places of stations
+UNLIKELY = 1e-3  # chance of so large a chi-square, below which the priors are said not to fit
+
+
+@dataclass(frozen=True, eq=False)
+class LineAir:
+    """The air along t straight lines.
+
+    temperature_c          (t,) mean, °C
+    covariance_c2          (t, t)
+    wind                   (t, 3) mean, m/s; nan without a prior of the wind
+    u_wind                 (t, 3)
+    group_refractivity     (t,) n_g - 1
+    u_group_refractivity   (t,) all sources, the formula of the index included
+    resolution             (t,) 0: the sound tells nothing beyond the prior; 1: all
+    """
+
+    temperature_c: np.ndarray
+    covariance_c2: np.ndarray
+    wind: np.ndarray
+    u_wind: np.ndarray
+    group_refractivity: np.ndarray
+    u_group_refractivity: np.ndarray
+    resolution: np.ndarray
+
+    @property
+    def u_temperature_c(self) -> np.ndarray:
+        """(t,) °C."""
+        return np.sqrt(np.diag(self.covariance_c2))
+
+
+@dataclass(frozen=True, eq=False)
+class SoundField:
+    """What an array of paths tells.
+
+    tomogram   the estimate, its observations those used
+    status     a text for each time given: `used`, or why not
+    used       indices of the times used; `suspects` point into these times as given
+    weather    pressure hPa, relative humidity % and carbon dioxide ppm assumed
+    """
+
+    tomogram: Tomogram
+    status: tuple[str, ...]
+    used: np.ndarray
+    weather: tuple[float, float, float]
+
+    @property
+    def fit(self) -> str:
+        """Whether times and priors go together, in words: "fits", or what does not and what to do."""
+        from scipy.special import chdtrc
+
+        chi_square, count = self.tomogram.chi_square, len(self.used)
+        if chdtrc(count, chi_square) >= UNLIKELY:
+            return "fits"
+        return (
+            f"chi-square {chi_square:.0f} of {count} times: field and wind vary more than their priors say, and the "
+            "uncertainties are too small; give larger scales, or leave out the suspects"
+        )
+
+    @property
+    def suspects(self) -> np.ndarray:
+        """Indices, into the times given, of those that the others do not bear out."""
+        return self.used[self.tomogram.suspects]
+
+    def along(
+        self, start: Any, end: Any, *, wavelength_um: float = 0.780, air_model: str = "ciddor_hill1999"
+    ) -> LineAir:
+        """Temperature, wind and group refractivity along straight lines, such as those of lasers.
+
+        start, end      (t, 3) or (3,), m
+        wavelength_um   of the light
+        air_model       a name in `atmosphere.air.MODELS`
+
+        Pressure and humidity are one for all lines, those of the station as the sound has corrected them.
+        """
+        lines = Lines(np.atleast_2d(np.asarray(start, float)), np.atleast_2d(np.asarray(end, float)))
+        LINE.check(np.linalg.norm(lines.end - lines.start, axis=1))
+        means = self.tomogram.scalar_along(lines)
+        at = len(means.parameters) - len(COMMON) + np.array([COMMON.index("pressure"), COMMON.index("humidity")])
+        p, h, co2_ppm = self.weather
+        light = air(means.value, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=co2_ppm)
+        slopes = light.sensitivity
+        direct = np.stack([slopes.pressure_hpa, slopes.humidity_percent], axis=1)  # (t, 2)
+        own = self.tomogram.parameter_covariance()[np.ix_(at, at)]
+        variance = (
+            slopes.temperature_c**2 * np.diag(means.covariance)
+            + 2.0 * slopes.temperature_c * np.sum(direct * means.cross[:, at], axis=1)
+            + np.einsum("ti,ij,tj->t", direct, own, direct)
+            + light.standard_uncertainty**2
+        )
+        wind, u_wind = self._wind(lines)
+        return LineAir(
+            means.value,
+            means.covariance,
+            wind,
+            u_wind,
+            light.group_refractivity + direct @ means.parameters[at],
+            np.sqrt(variance),
+            means.resolution,
+        )
+
+    def _wind(self, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
+        count = len(lines.start)
+        if self.tomogram.vector is None:
+            nothing = np.full((count, 3), np.nan)
+            return nothing, nothing
+        found = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
+        return np.stack([m.value for m in found], axis=1), np.stack([m.u for m in found], axis=1)
+
+
+def sound_field(
+    stations: Any,
+    source: Any,
+    receiver: Any,
+    time: Any,
+    u_time: Any,
+    *,
+    u_position: float,
+    delay: float = 0.0,
+    u_delay: float = 0.0,
+    pressure_hpa: float,
+    u_pressure_hpa: float,
+    humidity_percent: float,
+    u_humidity_percent: float,
+    temperature: Prior,
+    wind: Prior | None,
+    co2_ppm: float = 450.0,
+    u_co2_ppm: float = 20.0,
+    frequency_hz: float = 0.0,
+    model: str = THERMOMETRY,
+) -> SoundField:
+    """Temperature field and wind from travel times between loudspeakers and microphones.
+
+    stations             (n, 3) m, places of loudspeakers and microphones
+    source, receiver     (m,) which station sent, which heard
+    time                 (m,) s, delay included; nan where none was found
+    u_time               one or (m,), s: noise of each
+    u_position           m, of each coordinate of each station: shared by all its paths
+    delay, u_delay       s, of the equipment, common to all
+    pressure_hpa, humidity_percent   of the air, with their uncertainties: common to all
+    temperature          prior of the field, °C
+    wind                 prior of each component of the wind, m/s, expected 0; None for still air
+    co2_ppm, u_co2_ppm   carbon dioxide
+    frequency_hz         of the sound: air's dispersion is taken off, a share of it is uncertain
+    model                a name in `atmosphere.sound.MODELS`
+
+    Source: exact geometry of `atmosphere.sound_path`, [TARANTOLA05] for the estimate; linearised about each path's own
+    temperature and wind, again until nothing changes. Raises ValidityError for weather and shapes, EstimationError
+    where no time is left, or where temperature and wind do not settle.
+    """
+    stations, time = np.asarray(stations, float), np.asarray(time, float)
+    source, receiver, u_time = _ends(stations, source, receiver, time, u_time)
+    check_spreads(
+        u_time=u_time,
+        u_position=u_position,
+        u_delay=u_delay,
+        u_pressure_hpa=u_pressure_hpa,
+        u_humidity_percent=u_humidity_percent,
+        u_co2_ppm=u_co2_ppm,
+    )
+    ray = stations[receiver] - stations[source]
+    LENGTH.check(np.linalg.norm(ray, axis=1))
+    if temperature.u_mean <= 0.0 and not temperature.scales:
+        raise ValidityError("the temperature's prior leaves nothing to find; give u_mean or scales")
+    good = np.isfinite(time) & (time > delay)
+    status = np.where(good, USED, NO_TIME).astype(object)
+    paths = _Paths(stations, source, receiver, time - delay, u_time)
+    values = (pressure_hpa, humidity_percent, co2_ppm, frequency_hz)
+    sigmas = np.concatenate(
+        [
+            np.full(stations.size, u_position),
+            [u_delay, u_pressure_hpa, u_humidity_percent, u_co2_ppm, 1.0, model_named(model).standard_uncertainty],
+        ]
+    )
+    at, blown = np.full(len(time), temperature.mean), np.zeros((len(time), 3))
+    before = np.full(len(time), np.inf)
+    limit = model_named(model).limits["temperature_c"]
+    for turn in range(PASSES):
+        if not np.any(good):
+            raise EstimationError(NOTHING.format(len(time)))
+        kept = paths.only(np.flatnonzero(good))
+        observed, along, design, outside = kept.linearised(at[good], blown[good], values, model, first=turn == 0)
+        if np.any(outside):
+            lost = np.flatnonzero(good)[outside]
+            status[lost], good[lost] = OUTSIDE, False
+            kept = paths.only(np.flatnonzero(good))
+            observed, along, design = observed[~outside], along[~outside], design[~outside]
+        if not np.any(good):
+            raise EstimationError(NOTHING.format(len(time)))
+        noise = np.diag((kept.per_second(along) * kept.u_time) ** 2)
+        along = np.zeros_like(along) if wind is None else along
+        found = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
+        at[good] = found.scalar_along(kept.lines).value
+        if wind is not None:
+            blown[good] = np.stack(
+                [found.vector_along(kept.lines, np.tile(axis, (len(observed), 1))).value for axis in np.eye(3)], axis=1
+            )
+        beyond = good & ~((at >= limit.lower) & (at <= limit.upper))
+        status[beyond], good[beyond] = OUTSIDE, False
+        if not np.any(beyond) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
+            break
+        before = at.copy()
+    else:
+        raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; leave out the wildest times")
+    return SoundField(found, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
+
+
+def _ends(stations: np.ndarray, source: Any, receiver: Any, time: np.ndarray, u_time: Any) -> tuple:
+    """Source, receiver and noise of each time, (m,) each; ValidityError for other shapes and unknown stations."""
+    if stations.ndim != 2 or stations.shape[1] != 3:
+        raise ValidityError(f"stations have the shape {stations.shape} (expected (n, 3), m)")
+    ends = []
+    for name, given in (("source", source), ("receiver", receiver)):
+        index = np.asarray(given)
+        if time.ndim != 1 or index.shape != time.shape:
+            raise ValidityError(f"{name} has the shape {index.shape}, time {time.shape} (expected (m,) both)")
+        if index.dtype.kind not in "iu" or np.any((index < 0) | (index >= len(stations))):
+            raise ValidityError(f"{name} is not all whole numbers from 0 to {len(stations) - 1}, a station each")
+        ends.append(index.astype(int))
+    u_time = np.asarray(u_time, float)
+    if u_time.shape not in ((), time.shape):
+        raise ValidityError(f"u_time has the shape {u_time.shape} (expected one, or {time.shape})")
+    return *ends, np.broadcast_to(u_time, time.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """Paths between stations, with the sound's times on them."""
+
+    stations: np.ndarray
+    source: np.ndarray
+    receiver: np.ndarray
+    time: np.ndarray
+    u_time: np.ndarray
+
+    def only(self, rows: np.ndarray) -> "_Paths":
+        return _Paths(self.stations, self.source[rows], self.receiver[rows], self.time[rows], self.u_time[rows])
+
+    @property
+    def lines(self) -> Lines:
+        return Lines(self.stations[self.source], self.stations[self.receiver])
+
+    @property
+    def speed(self) -> np.ndarray:
+        return np.linalg.norm(self.lines.end - self.lines.start, axis=1) / self.time
+
+    def per_second(self, along: np.ndarray) -> np.ndarray:
+        """°C per second of travel time."""
+        return along * self.speed / self.time
+
+    def linearised(self, at: np.ndarray, blown: np.ndarray, values: tuple, model: str, *, first: bool) -> tuple:
+        """Each time as a mean temperature, (m,) °C; °C per m/s of wind along it, °C per parameter; which are of no air.
+
+        The first time round about the prior's temperature, since a wind not yet known may look like no air.
+        """
+        p, h, co2_ppm, frequency_hz = values
+        lines = self.lines
+        along = np.sum(blown * lines.directions, axis=1)
+        across = np.sum(blown**2, axis=1) - along**2
+        speed = np.hypot(self.speed - along, np.sqrt(np.maximum(across, 0.0)))
+        state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
+        per_speed = 1.0 / state.sensitivity.temperature_c
+        if first:
+            heard = at + (speed - state.speed) * per_speed
+            outside = np.abs(speed - state.speed) > WINDIEST
+        else:
+            heard = np.atleast_1d(temperatures_c(speed, p, h, None, model, co2_ppm, frequency_hz))
+            outside = np.isnan(heard)
+            at = np.where(outside, at, heard)
+            state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
+            per_speed = 1.0 / state.sensitivity.temperature_c
+        late = dispersion(at, p, state.vapour_pressure_hpa, frequency_hz).of_a_pulse()[1]  # its u, relative
+        by_along = per_speed * (self.speed - along) / speed
+        by_length = (by_along / self.time)[:, None] * lines.directions
+        rows = np.arange(len(self.time))
+        places = np.zeros((len(rows), *self.stations.shape))
+        places[rows, self.source] += by_length
+        places[rows, self.receiver] -= by_length
+        common = np.stack(
+            [
+                -by_along * self.speed / self.time,
+                per_speed * state.sensitivity.pressure_hpa,
+                per_speed * state.sensitivity.humidity_percent,
+                per_speed * state.sensitivity.co2_ppm,
+                -per_speed * speed * late,
+                per_speed,
+            ],
+            axis=1,
+        )
+        design = np.concatenate([places.reshape(len(rows), self.stations.size), common], axis=1)
+        return heard + by_along * along, by_along, design, outside

@@ -1,0 +1,376 @@
+"""From recordings of sound, or a table of travel times, to the temperature of the air along a path.
+
+A file is reduced by its sheet; files of one sheet are one path. What a shot could not tell is a status of that shot.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from catseye.atmosphere.sound import THERMOMETRY, sound
+from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
+from catseye.errors import InputError, ValidityError
+from catseye.records.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
+from catseye.records.refusal import refusal
+from catseye.reduction.air.acoustic import USED, PathTemperatures, path_temperatures
+from catseye.signal.delay import DelayPlan, DelayStatus
+from catseye.signal.waveform import sampled
+
+WARMER_C, WINDIER = 15.0, 15.0  # °C and m/s off the prediction that the default window allows for
+LOOP_WINDOW = 5e-3  # s, about the emission
+MICROSECOND = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What the first shot of a channel looks like, for a figure.
+
+    time, samples       s from the file's first sample, and codes or volts about the arrival
+    lag, correlation    s, and the amplitude that a signal there would have
+    arrival             s, NaN where there is none
+    """
+
+    channel: str
+    file: str
+    time: np.ndarray
+    samples: np.ndarray
+    lag: np.ndarray
+    correlation: np.ndarray
+    arrival: float
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """k shots: when, how long the sound took, and what became of each channel.
+
+    mjd                of the emission, UTC
+    time_ab, time_ba   s, clock offset and loop-back taken off; NaN where there is none; time_ba None without one
+    u_time             (2, k) s
+    snr                (2, k) of the correlations, NaN for a table of times
+    texts              what became of each shot: "ab: good; ba: good", or of a table's row ""
+    weather            temperature °C, pressure hPa, humidity %, each (k,)
+    file               of each shot
+    traces             for figures
+    """
+
+    mjd: np.ndarray
+    time_ab: np.ndarray
+    time_ba: np.ndarray | None
+    u_time: np.ndarray
+    snr: np.ndarray
+    texts: tuple[str, ...]
+    weather: tuple[np.ndarray, np.ndarray, np.ndarray]
+    file: tuple[str, ...]
+    traces: tuple[Trace, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class AcousticPath:
+    """One path at k times.
+
+    sheet         of the path
+    sheet_file    its name
+    shots         the travel times
+    found         temperatures, wind and index
+    model         formula of the speed of sound
+    air_model     formula of the index
+    hashes        SHA-256 of each file read
+    """
+
+    sheet: AcousticSheet
+    sheet_file: str
+    shots: Shots
+    found: PathTemperatures
+    model: str
+    air_model: str
+    hashes: dict[str, str]
+
+    @property
+    def used(self) -> np.ndarray:
+        """(k,) bool: has a temperature."""
+        return np.array([status == USED for status in self.found.status])
+
+    def status(self, shot: int) -> str:
+        """What became of one shot, in words."""
+        text, formula = self.shots.texts[shot], self.found.status[shot]
+        return "; ".join(part for part in (text, "" if formula == USED else formula) if part) or USED
+
+
+def reduce_acoustic(
+    files: Sequence[Path],
+    sheet: Path | None = None,
+    *,
+    model: str = THERMOMETRY,
+    air_model: str = "ciddor_hill1999",
+) -> list[AcousticPath]:
+    """Temperatures of the paths that files of sound, or of travel times, measured.
+
+    files       .wav or .csv
+    sheet       of all of them; None: each file's own, its name with .toml
+    model       formula of the speed of sound, a name in `atmosphere.sound.MODELS`
+    air_model   formula of the index, a name in `atmosphere.air.MODELS`
+
+    Raises InputError, one line with file, place, value and what was expected; a bad shot is a status.
+    """
+    groups: dict[Path, tuple[Path, list[Path]]] = {}
+    for file in files:
+        beside = sheet if sheet is not None else file.with_suffix(".toml")
+        if beside.resolve() == file.resolve():
+            raise refusal(file.name, "is given as the recording and as its sheet (expected a sheet .toml)")
+        groups.setdefault(beside.resolve(), (beside, []))[1].append(file)
+    return [_path(beside, members, model, air_model) for beside, members in groups.values()]
+
+
+def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
+    sheet, digest = read_sheet(beside)
+    hashes = {beside.name: digest}
+    parts = []
+    for path in files:
+        read = read_recording(path, sheet)
+        if read.file in hashes:
+            raise refusal(read.file, "is given twice, or two files have that name (expected each once, names apart)")
+        hashes[read.file] = read.digest
+        try:
+            parts.append(_timed(read, sheet) if isinstance(read, TravelTimes) else _heard(read, sheet, beside.name))
+        except ValidityError as problem:
+            raise refusal(read.file, str(problem)) from problem
+    shots = _joined(parts, beside.name)
+    if shots.time_ba is None and sheet.u_wind_m_per_s is None:
+        raise refusal(
+            beside.name, "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)"
+        )
+    try:
+        found = _temperatures(shots, sheet, model, air_model)
+    except ValidityError as problem:
+        raise refusal(beside.name, str(problem)) from problem
+    return AcousticPath(sheet, beside.name, shots, found, model, air_model, hashes)
+
+
+def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Shots:
+    """Travel times of the shots in a recording."""
+    sampling_hz = recording.sampling_hz or sheet.sampling_hz
+    start = sheet.start_of(recording.file)
+    for name, value in (("sampling_hz", sampling_hz), ("signal", sheet.signal)):
+        if value is None:
+            raise refusal(sheet_file, f"{name} is missing (expected a value, as {recording.file} holds samples)")
+    if start is None:
+        raise refusal(sheet_file, f"recordings does not name {recording.file!r} (expected its start_mjd_utc)")
+    assert sampling_hz is not None
+    assert sheet.signal is not None
+    emission = sheet.emission_s + (sheet.interval_s or 0.0) * np.arange(sheet.shots)
+    mjd = start + emission / SECONDS_PER_DAY
+    weather = sheet.weather_at(mjd)
+    flight = sheet.length_m / sound(*weather, model=THERMOMETRY, co2_ppm=sheet.co2_ppm).speed
+    listener = _Listener(recording, sheet, sampling_hz, sampled(sheet.signal.kind, sampling_hz, **sheet.signal.values))
+    sent, u_sent, loop = emission, np.zeros(len(mjd)), None
+    if "loop" in recording.samples:
+        loop = listener.arrivals("loop", emission, LOOP_WINDOW)
+        both = {"ab", "ba"} <= recording.samples.keys()
+        # one loop serves both directions: in the mean its noise does not fall, so it counts twice in squares
+        sent, u_sent = loop.delay, loop.u_delay * (np.sqrt(2.0) if both else 1.0)
+    window = listener.window(flight, weather[0])
+    if sheet.interval_s is not None and sheet.shots > 1 and sheet.interval_s <= 2.0 * window:
+        raise refusal(
+            sheet_file,
+            f"interval_s = {sheet.interval_s:g} is within the window of an arrival, {2e3 * window:.4g} ms wide: one "
+            "arrival would count as several shots (expected a longer interval_s, or a narrower window_ms)",
+        )
+    offset = sheet.clock_offset_us * MICROSECOND
+    delay = sheet.delay_us * MICROSECOND
+    texts = [[] if loop is None else [f"loop: {text}"] for text in (loop.texts if loop else [""] * len(mjd))]
+    times, u_times, snrs = {}, [], []
+    for channel, sign in (("ab", 1.0), ("ba", -1.0)):
+        if channel not in recording.samples:
+            u_times.append(np.zeros(len(mjd)))
+            snrs.append(np.full(len(mjd), np.nan))
+            continue
+        heard = listener.arrivals(channel, emission + flight + delay + sign * offset, window)
+        times[channel] = heard.delay - sent - sign * offset
+        u_times.append(np.sqrt(heard.u_delay**2 + u_sent**2 + (sheet.u_time_us * MICROSECOND) ** 2))
+        snrs.append(heard.snr)
+        for row, text in zip(texts, heard.texts, strict=True):
+            row.append(f"{channel}: {text}")
+    if "ab" not in times:
+        raise refusal(recording.file, "has no channel 'ab' (one direction is measured from ranger to target)")
+    return Shots(
+        mjd, times["ab"], times.get("ba"), np.array(u_times), np.array(snrs), tuple("; ".join(t) for t in texts),
+        weather, (recording.file,) * len(mjd), tuple(listener.traces),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Arrivals:
+    delay: np.ndarray
+    u_delay: np.ndarray
+    snr: np.ndarray
+    texts: list[str]
+
+
+class _Listener:
+    """The known signal sought in the channels of one recording."""
+
+    def __init__(self, recording: Recording, sheet: AcousticSheet, sampling_hz: float, template: np.ndarray) -> None:
+        self.recording, self.sheet, self.sampling_hz, self.template = recording, sheet, sampling_hz, template
+        self.traces: list[Trace] = []
+
+    def window(self, flight: np.ndarray, temperature_c: np.ndarray) -> float:
+        if self.sheet.window_ms is not None:
+            return self.sheet.window_ms * 1e-3
+        share = 0.5 * WARMER_C / (ZERO_CELSIUS_K + temperature_c.min()) + WINDIER * flight.max() / self.sheet.length_m
+        return float(max(share * flight.max(), 2.0 / self.sampling_hz))
+
+    def arrivals(self, channel: str, expected: np.ndarray, window: float) -> _Arrivals:
+        """Arrival of each shot, s from the file's first sample."""
+        samples = self.recording.samples[channel]
+        plan = DelayPlan(
+            self.template, sampling_hz=self.sampling_hz, window=window,
+            weighting="plain" if channel == "loop" else self.sheet.weighting, band_hz=self.sheet.band_hz,
+            noise=self._quiet(samples, expected[0] - window), full_scale=self.recording.full_scale,
+        )  # fmt: skip
+        n, wide = len(samples), min(len(samples), plan.stretch + 2)
+        first, last = expected.min() - window, expected.max() + window + (len(self.template) + 1) / self.sampling_hz
+        if first < 0.0 or last > n / self.sampling_hz:
+            raise refusal(
+                self.recording.file,
+                f"channel {channel!r}, arrivals are sought from {first:.4g} to {last:.4g} s "
+                f"(expected within its {n / self.sampling_hz:.4g} s: look at emission_s, interval_s, shots, window_ms)",
+            )
+        before = (plan.stretch - len(self.template)) // 2
+        begin = np.clip(np.rint(expected * self.sampling_hz).astype(int) - before, 0, n - wide)
+        rows = np.stack([samples[b : b + wide] for b in begin])
+        at = begin / self.sampling_hz
+        found = plan(rows, expected - at)
+        good = found.status <= DelayStatus.ECHO
+        delay = np.where(good, found.delay + at, np.nan)
+        lag, height = plan.correlation(np.nan_to_num(rows[0].astype(float)), float(expected[0] - at[0]))
+        self.traces.append(
+            Trace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
+                  height, float(delay[0]))
+        )  # fmt: skip
+        return _Arrivals(delay, np.where(good, found.u_delay, np.nan), found.snr, list(map(found.text, range(len(at)))))
+
+    def _quiet(self, samples: np.ndarray, until: float) -> np.ndarray | None:
+        """Noise for the whitened weights: after the near loudspeaker has ended, before the first arrival's window."""
+        if self.sheet.weighting != "whitened":
+            return None
+        begin = self.sheet.emission_s + len(self.template) / self.sampling_hz + LOOP_WINDOW
+        return samples[max(0, int(begin * self.sampling_hz)) : max(0, int(until * self.sampling_hz))]
+
+
+def _timed(times: TravelTimes, sheet: AcousticSheet) -> Shots:
+    """The rows of a table of travel times: the sheet's weather where the table has none."""
+    names = ("temperature_c", "pressure_hpa", "humidity_percent")
+    from_sheet = sheet.weather_at(times.mjd)
+    t, p, h = (times.weather.get(name, value) for name, value in zip(names, from_sheet, strict=True))
+    offset, count = sheet.clock_offset_us * MICROSECOND, len(times.mjd)
+    u = np.zeros(count) if times.u_time is None else times.u_time
+    u = np.hypot(u, sheet.u_time_us * MICROSECOND)
+    if not (u > 0.0).all():
+        raise InputError(
+            f"{times.file}: its times have no standard uncertainty (expected u_time_us, a column or in the sheet)"
+        )
+    return Shots(
+        times.mjd,
+        times.time_ab - offset,
+        None if times.time_ba is None else times.time_ba + offset,
+        np.stack([u, u]),
+        np.full((2, count), np.nan),
+        ("",) * count,
+        (t, p, h),
+        (times.file,) * count,
+    )
+
+
+def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
+    """All files of a path, in order of time."""
+    one_way = {part.time_ba is None for part in parts}
+    if len(one_way) > 1:
+        raise refusal(sheet_file, "some files have both directions and some one (expected the same in all of a path)")
+    order = np.argsort(np.concatenate([part.mjd for part in parts]), kind="stable")
+
+    def column(values: Sequence[np.ndarray]) -> np.ndarray:
+        return np.concatenate(values, axis=-1)[..., order]
+
+    temperature, pressure, humidity = (column([part.weather[i] for part in parts]) for i in range(3))
+    texts, files = ([item for part in parts for item in getattr(part, name)] for name in ("texts", "file"))
+    return Shots(
+        column([part.mjd for part in parts]),
+        column([part.time_ab for part in parts]),
+        None if one_way == {True} else column([part.time_ba for part in parts if part.time_ba is not None]),
+        column([part.u_time for part in parts]),
+        column([part.snr for part in parts]),
+        tuple(texts[i] for i in order),
+        (temperature, pressure, humidity),
+        tuple(files[i] for i in order),
+        parts[0].traces,
+    )
+
+
+def frequency_hz(sheet: AcousticSheet) -> float:
+    """Of the sound, for the air's dispersion: the sheet's, else the root mean square of the signal's."""
+    if sheet.frequency_hz is not None:
+        return sheet.frequency_hz
+    if sheet.signal is None:
+        raise ValidityError(
+            "frequency_hz is missing (expected the sound's where there is no [signal]: the air's dispersion is 0.03 C "
+            "in moist air, 0.2 C in dry; 0 for a speed at zero frequency)"
+        )
+    sampling_hz = sheet.sampling_hz or 192e3
+    samples = sampled(sheet.signal.kind, sampling_hz, **sheet.signal.values)
+    return DelayPlan(samples, sampling_hz=sampling_hz, window=1e-3).bandwidth / TWO_PI
+
+
+def _temperatures(shots: Shots, sheet: AcousticSheet, model: str, air_model: str) -> PathTemperatures:
+    one_way = shots.time_ba is None
+    u_offset = sheet.u_clock_offset_us * MICROSECOND
+    u_delay = sheet.u_delay_us * MICROSECOND
+
+    def at(shift: float) -> PathTemperatures:
+        return path_temperatures(
+            shots.time_ab - shift,
+            None if shots.time_ba is None else shots.time_ba + shift,
+            np.nan_to_num(shots.u_time),
+            length=sheet.length_m,
+            u_length=sheet.u_length_mm * 1e-3,
+            delay=sheet.delay_us * MICROSECOND,
+            u_delay=float(np.hypot(u_delay, u_offset)) if one_way else u_delay,
+            pressure_hpa=shots.weather[1],
+            u_pressure_hpa=sheet.u_pressure_hpa,
+            humidity_percent=shots.weather[2],
+            u_humidity_percent=sheet.u_humidity_percent,
+            crosswind=sheet.crosswind_m_per_s,
+            u_crosswind=sheet.u_crosswind_m_per_s,
+            speed_gradient=sheet.speed_gradient_per_s,
+            u_speed_gradient=sheet.u_speed_gradient_per_s,
+            co2_ppm=sheet.co2_ppm,
+            frequency_hz=frequency_hz(sheet),
+            model=model,
+            wavelength_um=sheet.wavelength_um,
+            air_model=air_model,
+            wind=sheet.wind_m_per_s if one_way else None,
+            u_wind=sheet.u_wind_m_per_s if one_way else None,
+        )
+
+    found = at(0.0)
+    return found if one_way or u_offset == 0.0 else _with_clock(found, at(u_offset))
+
+
+def _with_clock(found: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
+    """The clock offset's uncertainty added, common to all: it goes into the wind, hardly into the temperature.
+
+    moved   the same with the clock offset larger by its standard uncertainty
+    """
+    t, w = moved.temperature_c - found.temperature_c, moved.wind - found.wind
+    n = moved.group_refractivity - found.group_refractivity
+    covariance, group = found.covariance_c2 + np.outer(t, t), found.covariance_group + np.outer(n, n)
+    return replace(
+        found,
+        covariance_c2=covariance,
+        u_temperature_c=np.sqrt(np.diag(covariance)),
+        u_wind=np.hypot(found.u_wind, w),
+        covariance_group=group,
+        u_group_refractivity=np.sqrt(np.diag(group)),
+        parts_c={**found.parts_c, "clock": np.abs(t)},
+    )

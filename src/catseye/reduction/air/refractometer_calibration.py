@@ -1,0 +1,324 @@
+"""Calibration of a refractometer path: n_g(t0, h0, p0) with phase(t0, h0, p0) from a night of both, then n_g(t).
+
+Every thermometer's index plus what the phase says of its change is one observation,
+    n_weather + dphi / K = n0 + delta dphi / K + b(t) / K + (what the sensors read too much) + formula + noise,
+K = 4 pi f L / c, dphi the phase since the reference phase, delta the relative error of the length L, b a drift of the
+phase. Offsets of sensors, the formula, delta and b are parameters with priors: they do not average out. Readings whose
+test statistic is beyond 3.5 are left out. The scatter that is found, and how it hangs together in time, makes the
+uncertainty where it is larger than what the sheet claims.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.atmosphere.air import MODELS, group_refractivity
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
+from catseye.reduction.air.refractometer_fit import PathFit
+from catseye.reduction.air.refractometer_night import (
+    LASTING,
+    FollowedPhase,
+    PathReadings,
+    PathWeather,
+    ReadingStatus,
+    follow_phase,
+    path_weather,
+)
+from catseye.signal.cycles import CycleStatus
+
+AGREES = 3.0  # standard uncertainties within which slopes agree
+UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one
+LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it tells nothing
+STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrated")
+
+
+@dataclass(frozen=True)
+class SlopeTest:
+    """How far the weather's index goes, fitted freely, over what the phase and -(4 pi f/c) L say of it.
+
+    ratio       1 when the phase follows the weather; above 1 the path's air changes less than the sensors'
+    u           of the scatter
+    agrees      within three u, the length's own included; None where the index hardly changed
+    """
+
+    ratio: float
+    u: float
+    agrees: bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class PathCalibration:
+    """A calibrated path and the index of its air; rows as in the readings.
+
+    index_0, u_index_0   group refractivity at phase_0 and its standard uncertainty, at the time mjd_0
+    phase_0        rad, of the first calibrated section: the mean of its readings
+    temperature_0_c, pressure_0_hpa, humidity_0_percent   mean weather of that section's readings
+    names, x, covariance   of all parameters (ppm, °C, hPa, %, rad): see `names`
+    budget         cause -> its part of u_index_0
+    refractivity, u_refractivity   (m,) n_g - 1 by the phase; nan where the phase is not followed or not calibrated
+    temperature_c, u_temperature_c (m,) mean along the path that gives this index at the pressure and humidity read
+    residual       (m,) weather minus path, of the mean of the thermometers
+    standardised   (m,) test statistic of the reading
+    status         (m) a word of STATUS
+    slope          test of the theoretical slope
+    thermometer_scatter   found over claimed, 1 at least
+    places         how much further apart the thermometers are than their offsets' u, 1 at least: u counts so much more
+    air_noise      found scatter of the weather's index against the path's beyond what the sheet claims
+    correlation    readings that hang together: factor on the variance of means, 1 for white noise
+    variance_factor, degrees_of_freedom   of the values used
+    absolute       the index by phase and length alone at phase_0
+    path_length, u_path_length   m, that the weather's index asks for; nan where the whole cycles are not sure
+    notes          what a person should know
+    """
+
+    readings: PathReadings
+    weather: PathWeather
+    followed: FollowedPhase
+    index_0: float
+    u_index_0: float
+    phase_0: float
+    mjd_0: float
+    temperature_0_c: float
+    pressure_0_hpa: float
+    humidity_0_percent: float
+    names: tuple[str, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    budget: dict[str, float]
+    refractivity: np.ndarray
+    u_refractivity: np.ndarray
+    temperature_c: np.ndarray
+    u_temperature_c: np.ndarray
+    residual: np.ndarray
+    standardised: np.ndarray
+    status: tuple[str, ...]
+    slope: SlopeTest
+    thermometer_scatter: float
+    places: float
+    air_noise: float
+    correlation: float
+    variance_factor: float
+    degrees_of_freedom: float
+    absolute: AbsoluteIndex
+    path_length: float
+    u_path_length: float
+    notes: tuple[str, ...]
+
+    def of(self, name: str) -> tuple[float, float]:
+        """A parameter and its standard uncertainty."""
+        i = self.names.index(name)
+        return float(self.x[i]), float(np.sqrt(self.covariance[i, i]))
+
+
+def calibrate_path(readings: PathReadings) -> PathCalibration:
+    """The index at a reference phase, its uncertainty, and from it the index of every phase of the night.
+
+    readings   as `read_path_readings` gives them
+
+    Raises EstimationError where no section has five readings with weather.
+
+    Source: [PARKER04] sections 1.6, 1.6.2, eqs. 1.35, 1.36 with the sign of 5.18; least squares with priors,
+    [FOERSTNER16] chapter 4; tests, [BAARDA68]. Tested against scatter: u holds with strays, drift and offsets.
+    """
+    weather = path_weather(readings)
+    followed = follow_phase(readings, weather)
+    fit = PathFit(readings, weather, followed)
+    fit.run()
+    return _told(fit)
+
+
+def _told(fit: PathFit) -> PathCalibration:
+    """The answer in SI, from the fit in ppm."""
+    readings, followed, sheet = fit.readings, fit.followed, fit.readings.sheet
+    mean, w_reading, _ = fit.tests()
+    keep = fit.reading_in & fit.value_in.any(axis=1)
+    first = followed.section[fit.rows] == fit.calibrated[0]  # the section that phase_0 and index_0 belong to
+    keep = keep & first if (keep & first).any() else first
+    when = float(readings.mjd_utc[fit.rows[keep]].mean())
+    row = int(fit.rows[keep][np.argmin(np.abs(readings.mjd_utc[fit.rows[keep]] - when))])
+    at = fit.at(np.array([row]))[0]
+    at[: len(fit.calibrated)], at[fit.names.index("length")] = 0.0, 0.0
+    at[0] = 1.0
+    phase_0 = float(fit.phase_0[0])
+    index_0 = fit.mean + float(at @ fit.x) * PPM
+    u_0 = float(np.sqrt(at @ fit.covariance @ at)) * PPM
+    every = np.arange(len(readings))
+    refractivity, u, gradient = _indices(fit, every)
+    temperature, u_temperature = _temperatures(fit, refractivity, gradient)
+    residual, standardised = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
+    residual[fit.rows], standardised[fit.rows] = mean * PPM, w_reading
+    absolute = absolute_group_index(
+        phase_0,
+        path_length=sheet.path_length_m,
+        u_path_length=sheet.u_path_length_mm * MILLIMETRE,
+        expected_index=1.0 + index_0,
+        u_expected_index=u_0,
+        u_phase=float(np.median(readings.u_phase)),
+        modulation_hz=sheet.modulation_hz,
+    )
+    length, u_length = np.nan, np.nan
+    if absolute.status == CycleStatus.SURE:
+        half = 0.5 * SPEED_OF_LIGHT / sheet.modulation_hz
+        length = float((absolute.cycles - np.mod(phase_0, TWO_PI) / TWO_PI) * half / (1.0 + index_0))
+        u_length = length * u_0
+    d, g = fit.weights()
+    pvv = float(np.sum(d * fit.v**2) - np.sum(g * np.sum(d * fit.v, axis=1) ** 2))
+    used = int(np.sum(fit.value_in & fit.reading_in[:, None]))
+    freedom = used - float(np.trace(fit.covariance @ fit.data) * fit.correlation) if used else 0.0
+    slope = _slope(fit)
+    return PathCalibration(
+        readings=readings,
+        weather=fit.weather,
+        followed=followed,
+        index_0=index_0,
+        u_index_0=u_0,
+        phase_0=phase_0,
+        mjd_0=when,
+        temperature_0_c=float(np.nanmean(readings.temperature_c[fit.rows[keep]])),
+        pressure_0_hpa=float(readings.pressure_hpa[fit.rows[keep]].mean()),
+        humidity_0_percent=float(readings.humidity_percent[fit.rows[keep]].mean()),
+        names=fit.names,
+        x=fit.x,
+        covariance=fit.covariance,
+        budget=_budget(fit, at),
+        refractivity=refractivity,
+        u_refractivity=u,
+        temperature_c=temperature,
+        u_temperature_c=u_temperature,
+        residual=residual,
+        standardised=standardised,
+        status=_statuses(fit),
+        slope=slope,
+        thermometer_scatter=fit.scatter,
+        places=fit.places,
+        air_noise=fit.air * PPM,
+        correlation=fit.correlation,
+        variance_factor=pvv / freedom if freedom > 0.0 else float("nan"),
+        degrees_of_freedom=freedom,
+        absolute=absolute,
+        path_length=length,
+        u_path_length=u_length,
+        notes=_notes(fit, slope, absolute, index_0, u_0),
+    )
+
+
+def _indices(fit: PathFit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Group refractivity (m,) by the phase, its u, and its derivatives (m, q), ppm, by the parameters."""
+    at = fit.at(rows)
+    change = at[:, fit.names.index("length")]
+    value = fit.mean + (at @ fit.x - change) * PPM
+    noise = fit.readings.u_phase[rows] * fit.per_radian
+    u = np.sqrt(np.einsum("mq,qr,mr->m", at, fit.covariance, at) + noise**2) * PPM
+    good = fit.good[rows]
+    return np.where(good, value, np.nan), np.where(good, u, np.nan), at
+
+
+def _temperatures(fit: PathFit, refractivity: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean temperature (m,) that gives the index at the pressure and humidity read, and its u; °C.
+
+    n_model(t, p, h as read) = n_path - formula + dn/dp offset + dn/dh offset. A barometer that reads too high moved the
+    calibration by as much as it moves this inversion: the two cancel, and the covariance of the parameters says so.
+    """
+    r, sheet = fit.readings, fit.readings.sheet
+    rows = np.flatnonzero(np.isfinite(refractivity) & r.has_weather)
+    limits = MODELS[sheet.air_model].limits["temperature_c"]
+    light = {"wavelength_um": sheet.wavelength_um, "co2_ppm": sheet.co2_ppm, "model": sheet.air_model}
+    weather = r.pressure_hpa[rows], r.humidity_percent[rows]
+    slopes = fit.weather.slopes[rows]
+    warm = np.nanmean(r.temperature_c[rows], axis=1)
+    first = len(fit.calibrated) + len(r.thermometers)
+    sensors = np.stack([slopes[:, 1] / PPM, slopes[:, 2] / PPM, -np.ones(len(rows))], axis=1)
+    wanted = refractivity[rows] + sensors @ fit.x[first : first + 3] * PPM
+    inside = np.ones(len(rows), dtype=bool)
+    for _ in range(4):  # Newton: a step of 10 °C leaves 0.4, then 5e-4, then nothing
+        warm = warm + (wanted - group_refractivity(warm, *weather, **light)) / slopes[:, 0]
+        inside &= (warm >= limits.lower) & (warm <= limits.upper)
+        warm = np.clip(warm, limits.lower, limits.upper)  # where the model ends: no number, see `inside`
+    by = gradient[rows].copy()
+    by[:, first : first + 3] += sensors
+    noise = (r.u_phase[rows] * fit.per_radian) ** 2
+    noise = noise + (slopes[:, 1] / PPM * sheet.noise_pressure_hpa) ** 2
+    noise = noise + (slopes[:, 2] / PPM * sheet.noise_humidity_percent) ** 2
+    u = np.sqrt(np.einsum("mq,qr,mr->m", by, fit.covariance, by) + noise) * PPM / np.abs(slopes[:, 0])
+    found = np.full((2, len(r)), np.nan)
+    found[:, rows] = np.where(inside, [warm, u], np.nan)
+    return found[0], found[1]
+
+
+def _statuses(fit: PathFit) -> tuple[str, ...]:
+    words = np.full(len(fit.readings), "uncalibrated", dtype=object)
+    words[fit.good] = "no weather"
+    words[fit.rows] = np.where(fit.reading_in & fit.value_in.any(axis=1), "good", "weather off")
+    words[fit.followed.status == ReadingStatus.STRAY] = "stray"
+    words[fit.followed.status == ReadingStatus.LEFT_OUT] = "left out"
+    return tuple(str(word) for word in words)
+
+
+def _budget(fit: PathFit, at: np.ndarray) -> dict[str, float]:
+    """What each independent cause gives of the uncertainty of at'x, index: scatter, and each prior."""
+    by = fit.covariance @ at
+    k = len(fit.readings.thermometers)
+    first = len(fit.calibrated)
+    causes = {
+        "scatter of the readings": np.zeros(0, dtype=int),
+        "thermometers": np.arange(first, first + k),
+        "barometer": np.array([first + k]),
+        "hygrometer": np.array([first + k + 1]),
+        "formula": np.array([first + k + 2]),
+        "path length": np.array([first + k + 3]),
+        "drift": np.arange(first + k + 4, len(fit.names)),
+    }
+    parts = {"scatter of the readings": float(np.sqrt(by @ fit.data @ by)) * PPM}
+    for cause, columns in causes.items():
+        if len(columns):
+            parts[cause] = float(np.sqrt(by[columns] @ fit.prior[np.ix_(columns, columns)] @ by[columns])) * PPM
+    return parts
+
+
+def _slope(known: PathFit) -> SlopeTest:
+    """Of a fit that knows nothing of the length; noise of the phase flattens it, which is put right."""
+    fit = PathFit(known.readings, known.weather, known.followed)
+    at = fit.names.index("length")
+    fit.prior[at, at] = (fit.prior[at, at] ** -0.5 + UNKNOWN_SLOPE) ** -2
+    fit.run()
+    d, g = fit.weights()
+    alone = d.sum(axis=1) - g * d.sum(axis=1) ** 2
+    variance = fit.covariance[at, at]
+    share = float(np.sum(alone * fit.u_phase**2) / fit.correlation * variance)
+    u = float(np.sqrt(variance))
+    if u >= LEAST_SLOPE or share > 0.5:
+        return SlopeTest(float("nan"), u, None)
+    ratio, u = float((1.0 - fit.x[at]) / (1.0 - share)), u / (1.0 - share)
+    u_length = fit.readings.sheet.u_path_length_mm * MILLIMETRE / fit.readings.sheet.path_length_m
+    return SlopeTest(ratio, u, bool(abs(ratio - 1.0) <= AGREES * np.hypot(u, u_length)))
+
+
+def _notes(fit: PathFit, slope: SlopeTest, absolute: AbsoluteIndex, index_0: float, u_0: float) -> tuple[str, ...]:
+    followed, readings, notes = fit.followed, fit.readings, list(fit.followed.bridged)
+    for number, s in enumerate(followed.sections[1:], start=2):
+        where = f"section {number} from {readings.where[s.first]}"
+        if s.reason == "jump":
+            notes.append(f"{where}: a jump of {s.text}")
+        else:
+            notes.append(f"{where}: {s.text}; its whole cycles are not tied to those before")
+    for number in range(len(followed.sections)):
+        if number not in fit.calibrated:
+            notes.append(f"section {number + 1} has fewer than {LASTING} readings with weather: not calibrated")
+    if slope.agrees is False:
+        notes.append(
+            f"phase and weather disagree: the weather's index changes {slope.ratio:.3f} ± {slope.u:.3f} times as much "
+            "as the phase says; above 1 the path's air changes less than the sensors'"
+        )
+    k, first = len(readings.thermometers), len(fit.calibrated)
+    for i, name in enumerate(readings.thermometers if k > 1 else ()):
+        off, known = float(fit.x[first + i]), float(readings.u_temperature_c[i])
+        if abs(off) > AGREES * known > 0.0:
+            notes.append(
+                f"{name} reads {off:+.2f} °C beside the others, {abs(off) / known:.0f} of its u: offset or place"
+            )
+    if absolute.status == CycleStatus.SURE:
+        apart, u = float(absolute.group_index) - 1.0 - index_0, float(np.hypot(absolute.u, u_0))
+        if abs(apart) > AGREES * u:
+            notes.append(f"path length and weather disagree by {apart / PPM:+.2f} ppm, {abs(apart) / u:.1f} of its u")
+    return tuple(notes)

@@ -1,0 +1,260 @@
+"""An EDM baseline: shots and weather to pillars, and to the zero, scale and cyclic terms of the instrument.
+
+Signs: observed = (1 + scale) D + zero + cyclic. What an instrument shows too much is above zero; the correction that
+the standard adds to readings is -zero.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from catseye.constants import MILLIMETRE, PPM
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.baseline import CEILING, Solution
+from catseye.estimation.baseline_iso17123 import FullTest
+from catseye.estimation.baseline_model import Known
+from catseye.records.baseline import Baseline, Heights, Observations, numbers_of
+from catseye.records.refusal import shown
+from catseye.reduction.baseline.job import BaselineJob, Progress
+from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
+from catseye.reduction.baseline.statistical_tests import FOLLOWS, Suspect, decisions_of
+from catseye.reduction.calibrations.calibration import Decision
+
+
+@dataclass(frozen=True, eq=False)
+class BaselineCalibration:
+    """All that a baseline told.
+
+    observations   as read
+    settings       assumptions
+    names          of the pillars, by their numbers
+    heights        (n,) m, or None
+    reference_height   m, or None
+    lengths        of all shots
+    keep           (m,) the shots used
+    solution       of those
+    test           the full test procedure with the sets' means, or why not
+    all_shots      the same with each shot as a distance of its own: its s is comparable with others' sheets
+    against        the known baseline, or None
+    decisions      tests
+    suspects       shots and sets that the tests reject
+    rejected       (m,) why a shot was left out, "" for the others
+    cyclic         names of the cyclic terms; empty where left out
+    weather        share of the weather's changes that the light followed, and its u: 1 expected
+    notes          what a person should know
+    """
+
+    observations: Observations
+    settings: BaselineSettings
+    names: tuple[str, ...]
+    heights: np.ndarray | None
+    reference_height: float | None
+    lengths: Lengths
+    keep: np.ndarray
+    solution: Solution
+    test: FullTest | str
+    all_shots: FullTest | None
+    against: Baseline | None
+    decisions: tuple[Decision, ...]
+    suspects: tuple[Suspect, ...]
+    rejected: tuple[str, ...]
+    cyclic: tuple[str, ...]
+    weather: tuple[float, float]
+    notes: tuple[str, ...]
+
+    @property
+    def order(self) -> np.ndarray:
+        """(n,) numbers of the pillars along the line."""
+        return np.argsort(self.solution.x, kind="stable")
+
+
+def calibrate_baseline(
+    seen: Observations,
+    heights: Heights | None = None,
+    against: Baseline | None = None,
+    *,
+    settings: BaselineSettings | None = None,
+    progress: Progress | None = None,
+) -> BaselineCalibration:
+    """Pillars and instrument from one table of shots.
+
+    seen       shots
+    heights    of the pillars; None takes them for level
+    against    known pillars; None finds them, the scale being as good as the instrument's frequency
+    settings   assumptions
+    progress   told of the steps
+
+    Raises InputError for tables that do not join, EstimationError where the shots do not determine the answer.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+        return _calibrated(seen, heights, against, settings or BaselineSettings(), progress)
+
+
+def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Progress | None) -> BaselineCalibration:
+    notes: list[str] = []
+    seen_names = _ordered(seen, heights, against)
+    seen = _renumbered(seen, seen_names)
+    height, u_height, reference = _heights(seen, heights, against, settings, notes)
+    lengths = reduce_lengths(seen, height, u_height, reference or 0.0, settings)
+    if against is None and settings.u_scale_ppm > 0.0:
+        by_scale = lengths.stretch**2 * lengths.distance * settings.u_scale_ppm * PPM
+        columns = np.concatenate([lengths.systematic, by_scale[:, None]], axis=1)
+        lengths = replace(lengths, systematic=columns, effects=(*lengths.effects, "scale of the instrument"))
+    known = None if against is None else _known(against)
+    job = BaselineJob(seen, lengths, settings, known, notes)
+    keep, rejected, suspects, solution = job.cleaned(progress)
+    solution, cyclic = job.with_cyclic(keep, solution)
+    _refuse_gross(solution, job, keep)
+    test, claimed, all_shots = job.full_tests(solution)
+    weather = job.weather(keep, solution, cyclic)
+    decisions = decisions_of(
+        solution,
+        test,
+        settings,
+        claimed=claimed,
+        agreement=None if against is None else job.agreement(solution, cyclic, keep),
+        weather=weather,
+        against=against,
+        suspects=suspects,
+    )
+    notes += _notes(seen, solution, settings, against)
+    if any(d.name == FOLLOWS and d.passed is False for d in decisions) and not settings.corrected:
+        share = np.mean((lengths.first / seen.slope)[keep]) / PPM
+        notes.append(
+            f"the light did not follow the weather: if the lengths were corrected in the field, all are wrong by "
+            f"{share:+.1f} ppm in the mean, and no u here contains that; compare with --corrected"
+        )
+    return BaselineCalibration(
+        seen,
+        settings,
+        seen.names,
+        height if heights is not None else None,
+        reference,
+        lengths,
+        keep,
+        solution,
+        test,
+        all_shots,
+        against,
+        decisions,
+        suspects,
+        rejected,
+        cyclic,
+        weather,
+        tuple(notes),
+    )
+
+
+def _refuse_gross(solution: Solution, job: BaselineJob, keep: np.ndarray) -> None:
+    """A scatter at the ceiling of what is estimated is no noise; the row is the worst before anything was adjusted."""
+    noise = solution.noise
+    if np.isfinite(solution.u_noise).any() and np.any(np.array([noise.shot, noise.set, noise.air]) > 0.999 * CEILING):
+        seen, x, y = job.seen, job.x, job.y
+        straight = np.hypot(x[seen.end] - x[seen.start], y[seen.end] - y[seen.start])
+        worst = int(np.argmax(np.where(keep, np.abs(job.lengths.distance - straight), -1.0)))
+        raise EstimationError(
+            f"{seen.file}: shots contradict each other by more than any noise of a distance meter (0.1 m, 1000 ppm); "
+            f"look for a wrong pillar or digit, at {seen.where[worst]} first"
+        )
+
+
+def _ordered(seen: Observations, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
+    if against is not None:
+        numbers_of(against, seen.names, seen.file)
+        return against.pillars
+    if heights is None:
+        return seen.names
+    for name in seen.names:
+        if name not in heights.height:
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
+    return tuple(name for name in heights.height if name in seen.names)
+
+
+def _renumbered(seen: Observations, names: tuple[str, ...]) -> Observations:
+    from copy import copy
+
+    number = np.array([names.index(n) for n in seen.names])
+    found = copy(seen)
+    found.names, found.start, found.end = names, number[seen.start], number[seen.end]
+    return found
+
+
+def _heights(seen, heights: Heights | None, against: Baseline | None, settings: BaselineSettings, notes: list[str]):
+    """Heights and their u by the pillars' numbers, and the reference height (None: unknown)."""
+    n = len(seen.names)
+    if heights is None:
+        if settings.reference_height is not None:
+            raise InputError("--reference-height-m needs --heights: without heights there is none to refer to")
+        notes.append("no heights of pillars: they are taken for level, which makes lengths on a slope too long")
+        return np.zeros(n), np.zeros(n), None
+    touched = {seen.names[i] for i in (*seen.start, *seen.end)}
+    for name in touched:
+        if name not in heights.height:
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
+    reference = settings.reference_height
+    if against is not None:
+        if reference is not None and reference != against.reference_height_m:
+            raise InputError(
+                f"--reference-height-m {reference:g} is not the known baseline's "
+                f"({against.reference_height_m}); leave it out"
+            )
+        reference = against.reference_height_m
+        if reference is None:
+            notes.append("the known baseline has no heights: distances are compared at the first pillar's height")
+    first = next(h for name, h in heights.height.items() if name in touched)
+    height = np.array([heights.height.get(name, first) for name in seen.names])
+    u = np.array([heights.u.get(name, 0.0) for name in seen.names])
+    return height, u, first if reference is None else reference
+
+
+def _known(against: Baseline) -> Known:
+    n = len(against.pillars)
+    number = {name: i for i, name in enumerate(against.pillars)}
+    rows = [number[entry[2:]] + (n if entry[0] == "y" else 0) for entry in against.known]
+    return Known(np.array(against.x_m), np.array(against.y_m), np.array(rows), against.covariance)
+
+
+def _notes(seen, solution: Solution, settings: BaselineSettings, against: Baseline | None) -> list[str]:
+    notes = []
+    if against is None:
+        notes.append(
+            "the scale is not determined without a known baseline: the pillars carry the instrument's, "
+            f"{settings.u_scale_ppm:g} ppm (1σ)"
+        )
+        if not np.isfinite(seen.direction).any():
+            notes.append("no horizontal directions: the pillars are taken to stand in a straight line")
+    if settings.unit_length is None:
+        notes.append("no cyclic terms: the instrument's unit length is not given (--unit-length-m)")
+    if not np.isfinite(solution.u_noise[1:]).any():
+        notes.append("too few redundant sets to estimate the noise: the maker's claim stands for it")
+    elif solution.noise.air * float(np.max(solution.used.distance)) ** 2 > 4.0 * (solution.noise.set + 1e-12):
+        notes.append(
+            f"sets scatter in proportion to distance, {solution.noise.air**0.5 / PPM:.1f} ppm: the air, or how its "
+            "temperature was read, more than pointing and centring"
+        )
+    return notes
+
+
+def record_values(found: BaselineCalibration) -> dict[str, Any]:
+    """What BASELINE.toml keeps of a calibration, pillars in their order along the line."""
+    s, order = found.solution, found.order
+    rows, covariance = s.places
+    n = len(s.x)
+    wanted = [int(np.flatnonzero(rows == r)[0]) for axis in (0, n) for r in order + axis if r in rows]
+    labels = [f"{'x' if rows[k] < n else 'y'} {found.names[rows[k] % n]}" for k in wanted]
+    zero, u_zero = s.of("zero")
+    test = found.test if isinstance(found.test, FullTest) else None
+    return {
+        "reference_height_m": found.reference_height,
+        "pillars": tuple(found.names[i] for i in order),
+        "x_m": tuple(s.x[order].tolist()),
+        "y_m": tuple(s.y[order].tolist()),
+        "known": tuple(labels),
+        "covariance_mm2": tuple(map(tuple, (covariance[np.ix_(wanted, wanted)] / MILLIMETRE**2).tolist())),
+        "s_mm": test.s / MILLIMETRE if test is not None else None,
+        "degrees_of_freedom": test.degrees_of_freedom if test is not None else None,
+        "zero_mm": zero / MILLIMETRE,
+        "u_zero_mm": u_zero / MILLIMETRE,
+    }

@@ -1,0 +1,206 @@
+"""The adjustments of one baseline: with and without suspects, cyclic terms, the weather, against known pillars."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
+from catseye.errors import EstimationError
+from catseye.estimation.baseline import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
+from catseye.estimation.baseline_iso17123 import FullTest, full_test
+from catseye.estimation.baseline_model import Claim, Extra, Known, Sights
+from catseye.reduction.baseline.lengths import BaselineSettings
+from catseye.reduction.baseline.statistical_tests import suspects_of
+
+Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in all
+
+
+class BaselineJob:
+    """The adjustments of one calibration, which differ in what they leave out or add."""
+
+    def __init__(self, seen, lengths, settings: BaselineSettings, known: Known | None, notes: list[str]):
+        self.seen, self.lengths, self.settings, self.known, self.notes = seen, lengths, settings, known, notes
+        count = len(seen.names)
+        u_direction = np.hypot(seen.u_rounding, settings.u_direction_arcsec * ARCSECOND)
+        self.sights = Sights(
+            seen.start,
+            seen.end,
+            seen.set,
+            seen.setup,
+            lengths.distance,
+            lengths.stretch,
+            lengths.systematic,
+            lengths.effects,
+            seen.direction,
+            u_direction,
+        )
+        if known is None:
+            try:
+                self.x = places_in_line(seen.start, seen.end, lengths.distance, count)
+            except EstimationError as problem:
+                raise EstimationError(named(str(problem), seen.names)) from problem
+            self.y = np.zeros(count)
+        else:
+            self.x, self.y = known.x, known.y
+
+    def solved(self, keep, *, extra: Extra | None = None, noise: Claim | None = None) -> Solution:
+        part = None if extra is None else Extra(extra.names, extra.columns[keep])
+        try:
+            return adjust_baseline(
+                self.sights.only(keep),
+                self.x,
+                self.y,
+                known=self.known,
+                scale=self.known is not None,
+                extra=part,
+                u_centring=self.settings.u_centring_mm * MILLIMETRE,
+                noise=noise,
+                claim=self._specified(keep),
+            )
+        except EstimationError as problem:
+            raise EstimationError(named(str(problem), self.seen.names)) from problem
+
+    def _specified(self, keep) -> Claim:
+        """The maker's claim as variances; repeats from their own scatter, or a tenth of the claim."""
+        sights = self.sights.only(keep)
+        a = (self.settings.specified_mm * MILLIMETRE) ** 2
+        repeats = len(sights) - len(sights.shots)
+        shot = float(np.sum(sights.within**2)) / repeats if repeats else 0.0
+        return Claim(max(shot, 0.01 * a), a, (self.settings.specified_ppm * PPM) ** 2)
+
+    def claimed(self, distance: np.ndarray) -> np.ndarray:
+        """Standard deviation that the maker claims, linear in the distance, m."""
+        return self.settings.specified_mm * MILLIMETRE + self.settings.specified_ppm * PPM * distance
+
+    def agreement(self, solution: Solution, cyclic: tuple[str, ...], keep) -> Solution:
+        """Sets against the known pillars, a set's variance being what the maker claims; without directions."""
+        used = solution.used
+        shot = max(solution.noise.shot, 1e-16)
+        sets = np.maximum(self.claimed(used.mean(used.distance)) ** 2 - shot / used.shots, 1e-16)
+        blind = replace(self.sights, direction=np.full(len(self.sights), np.nan))
+        terms = self.cyclic_terms(cyclic)
+        return adjust_baseline(
+            blind.only(keep),
+            self.x,
+            self.y,
+            known=self.known,
+            scale=True,
+            extra=None if terms is None else Extra(terms.names, terms.columns[keep]),
+            noise=Claim(shot, sets, 0.0),
+        )
+
+    def cleaned(self, progress: Progress | None):
+        """Shots used, why others are not, what is suspect, and the solution; one rejection a step."""
+        keep = np.ones(len(self.seen), bool)
+        rejected = [""] * len(self.seen)
+        most = max(1, len(self.seen) // 10)
+        for step in range(len(self.seen)):
+            if progress is not None:
+                progress("adjusting", step, 0)
+            solution = self.solved(keep)
+            suspects = suspects_of(solution, np.flatnonzero(keep), self.settings.level)
+            if not (self.settings.reject and suspects):
+                break
+            worst = suspects[0]
+            if worst.twins:
+                one, other = (", ".join(str(r + 1) for r in part) for part in (worst.rows, worst.twins))
+                self.notes.append(
+                    f"row {one} and row {other} contradict each other and nothing tells which is wrong: none is left "
+                    "out; measure them again"
+                )
+                break
+            if np.sum(~keep) + len(worst.rows) > most:
+                self.notes.append(
+                    f"no more than {most} of {len(keep)} shots are left out; the other suspects stay: look at them"
+                )
+                break
+            for row in worst.rows:
+                keep[row] = False
+                rejected[row] = f"{worst.kind} rejected: w = {worst.w:+.1f}, p = {worst.p:.2g}"
+        return keep, tuple(rejected), suspects, solution
+
+    def cyclic_terms(self, names: tuple[str, ...]) -> Extra | None:
+        """cos and sin of the length shown, in unit lengths; what coefficient 1 m adds."""
+        if not names or self.settings.unit_length is None:
+            return None
+        phase = TWO_PI * self.seen.slope / self.settings.unit_length
+        columns = [self.lengths.stretch * f((k + 1) * phase) for k in range(len(names) // 2) for f in (np.cos, np.sin)]
+        return Extra(names, np.stack(columns, axis=1))
+
+    def with_cyclic(self, keep, solution: Solution) -> tuple[Solution, tuple[str, ...]]:
+        if self.settings.unit_length is None:
+            return solution, ()
+        names = tuple(f"cyclic {f} {k + 1}" for k in range(self.settings.orders) for f in ("cosine", "sine"))
+        terms = self.cyclic_terms(names)
+        assert terms is not None
+        if solution.freedom_sets < len(names) + 2:
+            self.notes.append(
+                f"cyclic terms left out: {solution.freedom_sets} redundant sets for {len(names)} further unknowns"
+            )
+            return solution, ()
+        part = Extra(names, terms.columns[keep])
+        try:
+            apart = separation(solution.used, solution, part, self.known, self.known is not None)
+        except EstimationError:
+            apart = 0.0
+        if apart < SEPARABLE:
+            self.notes.append(
+                f"cyclic terms left out: lengths in units of {self.settings.unit_length:g} m do not tell them from the "
+                f"zero and the pillars (separation {apart:.1g}, needed {SEPARABLE:g})"
+            )
+            return solution, ()
+        return self.solved(keep, extra=terms), names
+
+    def full_tests(self, solution: Solution) -> tuple[FullTest | str, FullTest | None, FullTest | None]:
+        """The standard's procedure along the line, what a pillar off it adds taken away first: of the sets' means with
+        equal weights, with the maker's as weights, and of all shots."""
+        used, y = solution.used, solution.y
+        touched = np.unique(np.concatenate([used.start, used.end]))
+        order = [int(i) for i in np.argsort(solution.x, kind="stable") if i in touched]
+        number = np.full(len(y), -1)
+        number[touched] = np.arange(len(touched))
+
+        def of(distance, start, end, sigma=None):
+            line = np.sqrt(distance**2 - (y[end] - y[start]) ** 2)
+            found = full_test(number[start], number[end], line, number[order], sigma)
+            places = np.full(len(y), np.nan)
+            places[touched] = found.x
+            return replace(found, x=places)
+
+        steep = used.distance - (used.stretch - 1.0) * solution.of("zero")[0]  # its part along the slope
+        start, end, mean = used.start[used.first], used.end[used.first], used.mean(steep)
+        try:
+            every = of(steep, used.start, used.end)
+            return of(mean, start, end), of(mean, start, end, self.claimed(mean)), every
+        except EstimationError as problem:
+            return str(problem), None, None
+
+    def weather(self, keep, solution: Solution, cyclic: tuple[str, ...]) -> tuple[float, float]:
+        """Which share of the correction's changes the light followed: 1 - b, where b of them is left in the distances.
+
+        The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.
+        """
+        index = self.lengths.index
+        column = -(self.lengths.stretch**2) * self.lengths.distance * (index - index[keep].mean())
+        terms = self.cyclic_terms(cyclic)
+        names = (*(terms.names if terms is not None else ()), "weather")
+        columns = column[:, None] if terms is None else np.concatenate([terms.columns, column[:, None]], axis=1)
+        if solution.freedom_sets < 6 or np.ptp(index[keep]) < 0.2 * PPM:
+            return float("nan"), float("nan")
+        try:
+            found = self.solved(keep, extra=Extra(names, columns))
+        except EstimationError:
+            return float("nan"), float("nan")
+        b, u = found.of("weather")
+        return 1.0 - b, u
+
+
+def named(text: str, names: tuple[str, ...]) -> str:
+    """Numbers of pillars in a message become their names."""
+    import re
+
+    def name(m: re.Match[str]) -> str:
+        return f"pillar {names[int(m[1])]}" if m[1] else f"{m[2]} of {names[int(m[3])]}"
+
+    return re.sub(r"pillar number (\d+)|\b([xy]) (\d+)\b", name, text)  # once: names may look like numbers

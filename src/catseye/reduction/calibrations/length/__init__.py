@@ -1,0 +1,1 @@
+"""Lengths in the laboratory: gauge blocks, height gauge, invar wire."""

@@ -1,0 +1,241 @@
+"""Gauge blocks and spacers: an instrument against wrung blocks, and spacers by an instrument.
+
+    reads = zero + (1 + scale) L,   L = (sum of the blocks + films) (1 + expansion (t - 20 °C))
+
+A block that stands in several stacks brings its certificate's uncertainty into all of them, as one effect.
+"""
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from catseye.constants import PPM
+from catseye.geometry.catenary import expanded
+from catseye.records.readings import TEXT, Layout, Readings, Sheet, Words
+from catseye.records.record import Record, Uncertainty, Within, broken_rule
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
+
+BLOCKS, SPACERS = "gauge-blocks", "spacers"
+LENGTH, TEMPERATURE = Within(0.1, 10_000), Within(-40, 60)
+Coefficient = Annotated[float, Within(-5, 50)]
+
+
+class Block(Record):
+    """A gauge block: its name in the table, its certified length at 20 °C and standard uncertainty."""
+
+    name: Words
+    length_mm: Annotated[float, LENGTH]
+    u_mm: Uncertainty
+
+
+class LengthSheet(Sheet):
+    """What both kinds say.
+
+    expansion_ppm_per_c, u_...   of blocks or spacers: 11.5 for steel
+    temperature_c, u_temperature_c   of them, the thermometer's offset common; a column where it changed
+    u_reading_mm                 scatter of a reading, if known
+    """
+
+    expansion_ppm_per_c: Coefficient
+    u_expansion_ppm_per_c: Annotated[float, Within(0, 50)]
+    temperature_c: Annotated[float, TEMPERATURE] | None = None
+    u_temperature_c: Annotated[float, Within(0, 20)]
+    u_reading_mm: Uncertainty | None = None
+
+
+class BlocksSheet(LengthSheet):
+    """Sheet of an instrument's calibration against gauge blocks.
+
+    block            certificates, one table a block
+    film_um, u_film_um   thickness of each film where two blocks are wrung together
+    estimate_scale   seek the instrument's scale beside its zero
+    """
+
+    block: Annotated[tuple[Block, ...], Field(strict=False, min_length=1)]
+    film_um: Annotated[float, Within(-1, 10)] = 0.0
+    u_film_um: Annotated[float, Within(0, 10)] = 0.0
+    estimate_scale: bool = True
+
+    @model_validator(mode="after")
+    def _names_each_block_once(self) -> "BlocksSheet":
+        names = [block.name for block in self.block]
+        for name in names:
+            if names.count(name) > 1:
+                raise broken_rule(f"block name = {name!r} stands twice (expected each block once)")
+        return self
+
+
+class SpacersSheet(LengthSheet):
+    """Sheet of spacers measured by a calibrated instrument: true = (reads - zero) / (1 + scale).
+
+    zero_mm, u_zero_mm, scale_ppm, u_scale_ppm   of the instrument, from its own calibration
+    """
+
+    zero_mm: Annotated[float, Within(-100, 100)] = 0.0
+    u_zero_mm: Annotated[float, Within(0, 10)]
+    scale_ppm: Annotated[float, Within(-1000, 1000)] = 0.0
+    u_scale_ppm: Annotated[float, Within(0, 1000)]
+
+
+OPTIONAL = {"temperature_c": TEMPERATURE}
+READS = Within(-10_000, 10_000)
+BLOCKS_LAYOUT = Layout(BLOCKS, BlocksSheet, required={"blocks": TEXT, "reads_mm": READS}, optional=OPTIONAL)
+SPACERS_LAYOUT = Layout(SPACERS, SpacersSheet, required={"spacer": TEXT, "reads_mm": READS}, optional=OPTIONAL)
+
+
+def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibration:
+    """Zero and scale of an instrument from what it reads on stacks of gauge blocks.
+
+    readings   columns blocks ("100+25+1.005", names of the sheet's blocks) and reads_mm; sheet BlocksSheet
+    reject     leave out what the tests reject
+
+    Source: [ISO98] for what a block's length means; wrung lengths add.
+    """
+    sheet, m = readings.sheet, len(readings)
+    used = _stacks(readings)
+    films = np.maximum(used.sum(axis=1) - 1.0, 0.0)
+    cold = used @ np.array([block.length_mm for block in sheet.block]) + films * sheet.film_um * 1e-3
+    temperature = readings.get("temperature_c")
+    grown = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
+    length = cold * grown
+    fit = fit_readings(
+        readings.get("reads_mm") - length,
+        np.column_stack([np.ones(m), length * PPM][: 1 + sheet.estimate_scale]),
+        _scatter(sheet, m),
+        names=["zero", "scale"][: 1 + sheet.estimate_scale],
+        effects=[  # of reads - L: what makes a stack longer makes it smaller
+            *(
+                Effect(f"block {block.name}, mm", -used[:, k] * grown, block.u_mm)
+                for k, block in enumerate(sheet.block)
+            ),
+            Effect("film, µm", -films * grown * 1e-3, sheet.u_film_um),
+            *_warmth(sheet, -cold, temperature),
+        ],
+        active=readings.active,
+        reject=reject,
+        level=sheet.level,
+    )
+    on, line = fit.active, np.argsort(length)
+    keys = [
+        ("zero_mm", "mm", "what it reads on a length of zero"),
+        ("scale_ppm", "ppm", "by which it reads too long"),
+    ][: len(fit.x)]
+    return Calibration(
+        kind=BLOCKS,
+        title=f"{sheet.instrument} against gauge blocks",
+        quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
+        covariance=fit.covariance,
+        curve={
+            "readings": (length[on], 1e3 * (fit.predicted + fit.residual)[on]),
+            "left out": (length[~on], 1e3 * (fit.predicted + fit.residual)[~on]),
+            "fit": (length[line], 1e3 * fit.predicted[line]),
+        },
+        axes=("length of the stack (mm)", "reads minus length (µm)"),
+        method="What the instrument reads on stacks of gauge blocks, less the stacks' lengths at their temperature, is "
+        "a zero and a scale. Each block's certificate is one parameter with a prior, whatever stacks it stands in; "
+        "so are the films, the thermometer and the expansion.",
+        record={key: float(value) for (key, *_), value in zip(keys, fit.x, strict=True)},
+        **_common(readings, fit, length),
+    )
+
+
+def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
+    """Lengths of spacers at 20 °C, with the covariance that the instrument and the thermometer give them in common.
+
+    readings   columns spacer (its name) and reads_mm; sheet SpacersSheet
+    reject     leave out what the tests reject
+    """
+    sheet, m = readings.sheet, len(readings)
+    names = list(dict.fromkeys(readings.words["spacer"]))
+    if "" in names:
+        raise readings.refuse(readings.words["spacer"].index(""), "spacer is empty (expected its name)")
+    design = np.array([[float(name == spacer) for name in names] for spacer in readings.words["spacer"]])
+    temperature = readings.get("temperature_c")
+    grown = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
+    true = (readings.get("reads_mm") - sheet.zero_mm) / (1.0 + sheet.scale_ppm * PPM)
+    observed = true / grown
+    fit = fit_readings(
+        observed,
+        design,
+        _scatter(sheet, m),
+        names=names,
+        effects=[
+            Effect("zero of the instrument, mm", -np.ones(m), sheet.u_zero_mm),
+            Effect("scale of the instrument, ppm", -observed * PPM, sheet.u_scale_ppm),
+            *_warmth(sheet, observed, temperature),
+        ],
+        active=readings.active,
+        reject=reject,
+        level=sheet.level,
+    )
+    keys = [(f"{name}_mm", "mm", f"length of {name} at 20 °C") for name in names]
+    return Calibration(
+        kind=SPACERS,
+        title=f"Spacers {', '.join(names)}" if len(names) < 5 else f"{len(names)} spacers",
+        quantities=quantities(keys, fit.x, fit.covariance, fit=fit),
+        covariance=fit.covariance,
+        curve=residuals_by_number(fit, 1e-3),  # lengths differ: residuals alone share an axis
+        axes=("reading", "residual (µm)"),
+        method="Readings corrected for the instrument's zero and scale are taken to 20 °C and averaged for each. "
+        "Zero, scale, thermometer and expansion are parameters with priors that all spacers share.",
+        record={key: float(value) for (key, *_), value in zip(keys, fit.x, strict=True)},
+        **_common(readings, fit, observed),
+    )
+
+
+def _stacks(readings: Readings) -> np.ndarray:
+    """(m, blocks) how often each block stands in each stack: 0 or 1."""
+    known = {block.name: k for k, block in enumerate(readings.sheet.block)}
+    used = np.zeros((len(readings), len(known)))
+    for row, stack in enumerate(readings.words["blocks"]):
+        for name in (part.strip() for part in stack.split("+")):
+            if name not in known:
+                raise readings.refuse(row, f"blocks = {stack!r}: {name!r} has no [[block]] in {readings.sheet_file}")
+            used[row, known[name]] += 1.0
+            if used[row, known[name]] > 1.0:
+                raise readings.refuse(row, f"blocks = {stack!r}: {name!r} stands twice (expected each block once)")
+    return used
+
+
+def _scatter(sheet: LengthSheet, m: int) -> Scatter:
+    if sheet.u_reading_mm is not None:
+        return Scatter(sheet.u_reading_mm**2 * np.eye(m))
+    return Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+
+
+def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
+    """Thermometer and expansion; `length` is what a factor of 1 + expansion (t - 20) multiplies, with its sign.
+
+    A thermometer that reads u too high, or an expansion taken too large: the true length is smaller than computed, the
+    observed value that holds it (with the sign of `length`) moves accordingly; only the size matters to a prior.
+    """
+    return [
+        Effect("offset of the thermometer, °C", length * sheet.expansion_ppm_per_c * PPM, sheet.u_temperature_c),
+        Effect("expansion, ppm/°C", length * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
+    ]
+
+
+def _common(readings: Readings, fit: Fit, length: np.ndarray) -> dict[str, Any]:
+    """What both kinds tell alike."""
+    word = next(iter(readings.words))
+    rows = tuple(
+        (readings.words[word][k], float(readings.get("reads_mm")[k]), float(length[k]),
+         float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
+        for k, state in enumerate(fit.state(readings.left_out))
+    )  # fmt: skip
+    return {
+        "provenance": provenance(readings),
+        "columns": (word, "reads_mm", "length_mm", "residual_um", fit.test, "state"),
+        "rows": rows,
+        "decisions": fit.decisions(),
+        "variance_factor": fit.variance_factor,
+        "degrees_of_freedom": round(fit.degrees_of_freedom),
+        "notes": scatter_notes(fit, "µm", 1e-3),
+    }
+
+
+BLOCKS_RECIPE = Kind("zero and scale of an instrument against gauge blocks", BLOCKS_LAYOUT, calibrate_against_blocks)
+SPACERS_RECIPE = Kind("lengths of spacers by a calibrated instrument", SPACERS_LAYOUT, calibrate_spacers)

@@ -1,0 +1,1 @@
+"""A steered mirror: angles, encoders, stops, alignment, focus."""

@@ -1,0 +1,192 @@
+"""Axis offset and mirror offset from distances in the direct and the prime pointing.
+
+    to the face, from afar, at autocollimation     L - s - e sin Phi     (prime: L - s + e sin Phi)
+    to the back retroreflector, from afar          L - b - e sin Phi     (prime: L - b + e sin Phi)
+    to a target, by the ranger itself              L + zero - (2 s cos(Phi/2) + e sin Phi) - ...   (prime: - e)
+
+L is the distance from the scan point, e the elevation axis off the azimuth axis, s the face off the elevation axis, b
+the retroreflector's. Half the difference of both pointings is e sin Phi whatever L is. s shows in no difference, as
+both pointings turn the same face to the same side (the notes, section 2.4, say twice the mirror's offset: see the top
+of `geometry.mirror_path`); it takes known distances.
+"""
+
+from typing import Annotated, Any
+
+import numpy as np
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.geometry.mirror_path import path_change
+from catseye.records.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.record import Uncertainty, Within
+from catseye.records.refusal import refusal
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
+from catseye.reduction.calibrations.fit import Scatter
+from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number, scatter_notes
+
+KIND = "both-faces"
+DISTANCE = Within(0.1, 10_000)
+FACE, BACK, TARGET = "face", "back", "target"
+POINTINGS = ("direct", "prime")
+AGREES = 1e-9  # m
+
+
+class BothFacesSheet(Sheet):
+    """Sheet of distances in both pointings.
+
+    u_distance_mm         scatter of a distance, if known
+    u_known_distance_mm   of each line's known distance, as long as there is a column known_distance_m
+    u_zero_mm             of the ranger's zero, which its ranges to targets share; with known distances
+    """
+
+    u_distance_mm: Uncertainty | None = None
+    u_known_distance_mm: Uncertainty | None = None
+    u_zero_mm: Annotated[float, Within(0, 100)] | None = None
+
+
+LAYOUT = Layout(
+    KIND,
+    BothFacesSheet,
+    required={"line": TEXT, "to": TEXT, "pointing": TEXT, "phi_deg": Within(1, 179), "distance_m": DISTANCE},
+    optional={"known_distance_m": DISTANCE},
+)
+
+
+def calibrate_both_faces(readings: Readings, reject: bool = False) -> Calibration:
+    """Axis offset, and where distances are known mirror offset, from distances in both pointings.
+
+    readings   columns line (a word for each line of sight), to ("face", "back", "target"), pointing ("direct",
+               "prime"), phi_deg (the line's angle from the azimuth axis), distance_m, perhaps known_distance_m (from
+               the scan point, one for each line); sheet BothFacesSheet
+    reject     leave out what the tests reject
+
+    Raises EstimationError where no line was measured in both pointings.
+
+    Source: [PARKER04] section 2.4 (after eq. 2.26), corrected: see the top of this file.
+    """
+    words = _checked(readings)
+    lines = _lines(readings, words)
+    keys = list(dict.fromkeys(lines))
+    which = np.array([keys.index(line) for line in lines])
+    known = "known_distance_m" in readings.numbers
+    measured, phi = readings.get("distance_m"), readings.get("phi_deg") * DEGREE
+    to = {name: np.array([word == name for word in words["to"]]) for name in (FACE, BACK, TARGET)}
+    prime = np.array([word == "prime" for word in words["pointing"]])
+    parameters = _parameters(readings, keys, which, to)
+
+    def predict(values: np.ndarray) -> np.ndarray:
+        e, s, b, zero = values[:4] * MILLIMETRE
+        length = values[4:][which]
+        toward = e * np.where(prime, -1.0, 1.0) * np.sin(phi)
+        answer = length - np.where(to[BACK], b, s) - toward
+        t = to[TARGET]
+        if t.any():
+            change, _ = path_change(0.0, phi[t], length[t], [e, s, 0.0, 0.0], prime=prime[t])
+            answer[t] = length[t] + zero + change
+        return answer
+
+    eye = np.eye(len(readings))
+    scatter = Scatter(np.zeros_like(eye), {"scatter of one distance": eye}, size=float(measured.max()))
+    if readings.sheet.u_distance_mm is not None:
+        scatter = Scatter((readings.sheet.u_distance_mm * MILLIMETRE) ** 2 * eye)
+    found = fit_curved(
+        measured, predict, parameters, scatter, active=readings.active, reject=reject, level=readings.sheet.level
+    )
+    return _told(readings, found, words, known)
+
+
+def _checked(readings: Readings) -> dict[str, tuple[str, ...]]:
+    """The columns of words, each of them one of those expected."""
+    expected = {"to": (FACE, BACK, TARGET), "pointing": POINTINGS}
+    for name, allowed in expected.items():
+        for row, word in enumerate(readings.words[name]):
+            if word not in allowed:
+                raise readings.refuse(row, f"{name} = {word!r} is unknown (expected {', '.join(map(repr, allowed))})")
+    return {name: readings.words[name] for name in ("line", *expected)}
+
+
+def _lines(readings: Readings, words: dict[str, tuple[str, ...]]) -> list[str]:
+    """A name for what each reading's unknown length is: of the line, or of the line to one of its ends."""
+    if "known_distance_m" not in readings.numbers:
+        return [f"{line} ({to})" for line, to in zip(words["line"], words["to"], strict=True)]
+    if readings.sheet.u_known_distance_mm is None:
+        raise refusal(readings.sheet_file, "u_known_distance_mm is missing (expected with the column known_distance_m)")
+    if readings.sheet.u_zero_mm is None and TARGET in words["to"]:
+        raise refusal(readings.sheet_file, "u_zero_mm is missing (expected, as targets at known distances are ranged)")
+    first: dict[str, float] = {}
+    for row, (line, value) in enumerate(zip(words["line"], readings.get("known_distance_m"), strict=True)):
+        if abs(first.setdefault(line, float(value)) - value) > AGREES:
+            raise readings.refuse(
+                row,
+                f"known_distance_m = {value} of line {line!r} was {first[line]} before (expected one for each line)",
+            )
+    return list(words["line"])
+
+
+def _parameters(readings: Readings, keys: list[str], which: np.ndarray, to: dict[str, np.ndarray]) -> list[Parameter]:
+    sheet = readings.sheet
+    known = "known_distance_m" in readings.numbers
+    seen = readings.get("known_distance_m" if known else "distance_m")
+    u = sheet.u_known_distance_mm * MILLIMETRE if known else np.inf
+    return [
+        Parameter("axis offset", 0.0, 1e-2),
+        Parameter("mirror offset", 0.0, 1e-2, np.inf if known and (to[FACE] | to[TARGET]).any() else 0.0),
+        Parameter("back retroreflector", 0.0, 1e-2, np.inf if known and to[BACK].any() else 0.0),
+        Parameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if known and to[TARGET].any() else 0.0),
+        *(Parameter(f"line {key}", float(seen[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
+    ]
+
+
+def _told(readings: Readings, found: CurvedFit, words: dict[str, tuple[str, ...]], known: bool) -> Calibration:
+    sheet, fit = readings.sheet, found.fit
+    wanted = [
+        ("axis offset", "axis_offset_mm", "mm", "elevation axis off the azimuth axis, along the beam's azimuth", 1.0)
+    ]
+    notes = []
+    if np.isinf(found.parameters[1].u):
+        wanted.append(("mirror offset", "mirror_offset_mm", "mm", "face off the elevation axis, along its normal", 1.0))
+    else:
+        notes.append(
+            "the mirror offset moves both pointings alike: no distance is known here from the scan point, so it cannot "
+            "be told; it and u of the record come from elsewhere"
+        )
+    if np.isinf(found.parameters[2].u):
+        notes.append(
+            f"the back retroreflector stands {found.value('back retroreflector'):.4f} mm before the scan point"
+        )
+    given, covariance = found.quantities(wanted)
+    record: dict[str, Any] = {q.key: q.value for q in given}
+    record["u_axis_mm"] = max(q.u for q in given)
+    notes.append(
+        f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in given)}: keep "
+        "the larger of it and the record's"
+    )
+    if known and np.any([word == TARGET for word in words["to"]]):
+        notes.append(f"the ranger's zero came out as {found.value('zero'):+.4f} mm (u {found.u('zero'):.4f} mm)")
+    rows = tuple(
+        (words["line"][k], words["to"][k], words["pointing"][k], float(readings.get("phi_deg")[k]),
+         float(readings.get("distance_m")[k]), float(1e6 * fit.residual[k]), float(fit.statistic[k]), state)
+        for k, state in enumerate(fit.state(readings.left_out))
+    )  # fmt: skip
+    return Calibration(
+        kind=KIND,
+        title=f"Axis and mirror offset of {sheet.instrument}",
+        provenance=provenance(readings),
+        quantities=given,
+        covariance=covariance,
+        columns=("line", "to", "pointing", "phi_deg", "distance_m", "residual_um", fit.test, "state"),
+        rows=rows,
+        decisions=fit.decisions(),
+        variance_factor=fit.variance_factor,
+        degrees_of_freedom=round(fit.degrees_of_freedom),
+        notes=(*notes, *scatter_notes(fit, "µm", 1e-6)),
+        curve=residuals_by_number(fit, 1e-6),  # distances differ by metres: residuals alone share an axis
+        axes=("reading", "residual (µm)"),
+        method="Distances to the mirror's face, to the retroreflector in its back, or by the ranger to a target are "
+        "taken in the direct and in the prime pointing. What an axis offset and a mirror offset do to each is "
+        "computed; lengths that nobody knows are found with them.",
+        record=record,
+    )
+
+
+RECIPE = Kind("axis and mirror offset from distances in direct and prime pointing", LAYOUT, calibrate_both_faces)

@@ -1,0 +1,336 @@
+"""A campaign's search results against the laboratory: all 13 numbers of a station, adjusted together.
+
+Each target of known coordinates was found at some counts. The monument's and the mirror's records give the station's
+parameters with their standard uncertainties; these are priors, and the counts decide as much as they can. What they
+cannot tell apart stays as the laboratory had it, and is named: alpha and beta turn nearly the same way, na0 turns with
+alpha1 about an upright axis, the fixed point moves with dx, dy, dz.
+
+In units of the priors the covariance falls from 1 to C; the eigenvalues of 1 - C say how much of each combination the
+counts decided: 1 all, 0 nothing. The change from the laboratory's values is normal with the covariance 1 - C where
+both are right; that is tested as a whole (chi-square) and for each parameter.
+"""
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, field_serializer
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.estimation.reliability import global_test, single_level, w_critical
+from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN
+from catseye.geometry.imperfect import Imperfections, imperfect_counts
+from catseye.geometry.pointing import PARAMETERS, Station
+from catseye.records.mirror import MirrorGeometry
+from catseye.records.monument import MonumentGeometry
+from catseye.records.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.record import Within
+from catseye.records.refusal import refusal
+from catseye.reduction.calibrations.calibration import Calibration, Decision
+from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
+from catseye.reduction.calibrations.fit import Scatter
+from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number
+from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
+from catseye.reduction.site.stations import imperfections_of, station_covariance, station_of
+
+KIND = "search-results"
+COUNTS, PLACE = Within(-1_000_000, 1_000_000), Within(-10_000, 10_000)
+UNCERTAIN = Within(0, 1000, above=True)
+P = len(PARAMETERS)
+STEPS = (*[1e-4] * 3, *[1e-6] * 3, *[1e-4] * 3, *[1e-6] * 2, *[0.1] * 2)  # m, rad, m, rad, counts
+IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
+    **{k: (f"{k}_mm", "mm", MILLIMETRE, "monument") for k in ("x", "y", "z")},
+    **{k: (f"{k}_rad", "rad", 1.0, "monument") for k in ("alpha1", "alpha2", "alpha3")},
+    **{k: (f"{k}_mm", "mm", MILLIMETRE, "mirror") for k in ("dx", "dy", "dz")},
+    **{k: (f"{k}_rad", "rad", 1.0, "mirror") for k in ("beta1", "beta2")},
+    **{k: (k, "counts", 1.0, "mirror") for k in ("na0", "ne0")},
+}
+NEEDED = ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad", "u_beta_rad", "u_zero_counts")
+TOLD = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
+NOTHING = 1e-6  # of the largest singular value: a combination that no count depends on
+INFORMED = 1e-3  # share below which a change is rounding
+SHOWN = 0.3  # of a unit combination: parameters named in it
+
+
+class SearchSheet(Sheet):
+    """Sheet of a campaign's search results.
+
+    u_counts         of each count: the resolution of the search; the columns u_azimuth_counts and u_elevation_counts
+                     say it for each target instead
+    u_target_mm      of each coordinate of each target; a target seen more than once keeps its error
+    [monument], [mirror]   the station's records as tables, with the u_... keys of angles and zeros
+    """
+
+    u_counts: Annotated[float, UNCERTAIN] | None = None
+    u_target_mm: Annotated[float, Within(0, 1000)]
+    monument: Annotated[MonumentGeometry, Field()]
+    mirror: Annotated[MirrorGeometry, Field()]
+
+    @field_serializer("monument", "mirror")
+    def _as_given(self, record: MonumentGeometry | MirrorGeometry) -> dict[str, Any]:
+        return record.model_dump(exclude_unset=True)
+
+
+LAYOUT = Layout(
+    KIND,
+    SearchSheet,
+    required={
+        "target": TEXT,
+        "x_m": PLACE,
+        "y_m": PLACE,
+        "z_m": PLACE,
+        "azimuth_counts": COUNTS,
+        "elevation_counts": COUNTS,
+    },
+    optional={"pointing": TEXT, "u_azimuth_counts": UNCERTAIN, "u_elevation_counts": UNCERTAIN},
+)
+
+
+def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibration:
+    """A station's parameters from targets found in the field, compared with the laboratory's.
+
+    readings   columns target (its name), x_m, y_m, z_m (ground frame), azimuth_counts, elevation_counts, perhaps
+               pointing ("direct" if missing, "prime"), u_azimuth_counts, u_elevation_counts; sheet SearchSheet
+    reject     leave out what the tests reject, both counts of a target together
+
+    Raises InputError for records without the standard uncertainties that weigh them, EstimationError where the targets
+    decide nothing.
+
+    Source: [PARKER04] section 2.2 (transformations 1 to 6); [FOERSTNER16] chapter 4 (priors, tests).
+    """
+    sheet, m = readings.sheet, len(readings)
+    covariance, lacking = station_covariance(sheet.monument, sheet.mirror)
+    for key in NEEDED:
+        if key in lacking:
+            record = "monument" if "alpha" in key else "mirror"
+            raise refusal(
+                readings.sheet_file, f"{record}.{key} is missing (expected: it weighs the laboratory's value)"
+            )
+    names = list(dict.fromkeys(readings.words["target"]))
+    which = np.array([names.index(word) for word in readings.words["target"]])
+    place = np.column_stack([readings.get(f"{axis}_m") for axis in "xyz"])
+    prime = _prime(readings)
+    imperfections = imperfections_of(sheet.mirror) or Imperfections(
+        np.zeros(4), np.zeros(3), np.zeros((2, 0)), np.zeros((2, 0))
+    )
+    observed = np.column_stack([readings.get("azimuth_counts"), readings.get("elevation_counts")])
+    turns = np.zeros((m, 2))
+    start = station_of(sheet.monument, sheet.mirror).parameters
+    u = np.sqrt(np.diag(covariance))
+    parameters = [Parameter(*each) for each in zip(PARAMETERS, start, STEPS, u, strict=True)]
+    parameters += [
+        Parameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE) for name in names for axis in "xyz"
+    ]
+
+    def predict(values: np.ndarray) -> np.ndarray:
+        station = Station.of_parameters(values[:P])
+        return (
+            imperfect_counts(station, imperfections, place + values[P:].reshape(-1, 3)[which], prime=prime) + turns
+        ).ravel()
+
+    first = predict(np.array([p.start for p in parameters])).reshape(m, 2)
+    if not np.isfinite(first).all():
+        row = int(np.argmin(np.isfinite(first).all(axis=1)))
+        raise readings.refuse(
+            row, "x_m, y_m, z_m cannot be pointed at from this station (expected a target off its axis)"
+        )
+    turns[:, 0] = COUNTS_PER_TURN * np.round((observed[:, 0] - first[:, 0]) / COUNTS_PER_TURN)
+    _refuse_far(readings, observed - first - turns)
+    found = fit_curved(
+        observed.ravel(),
+        predict,
+        parameters,
+        Scatter(np.diag(_u_counts(readings).ravel() ** 2)),
+        active=np.repeat(readings.active, 2),
+        together=np.repeat(np.arange(m), 2),
+        reject=reject,
+        level=sheet.level,
+    )
+    return _told(readings, found, predict)
+
+
+def _u_counts(readings: Readings) -> np.ndarray:
+    """(m, 2) of azimuth and elevation: the columns', else the sheet's."""
+    columns = []
+    for name in ("u_azimuth_counts", "u_elevation_counts"):
+        if name in readings.numbers:
+            columns.append(readings.get(name))
+        elif readings.sheet.u_counts is None:
+            raise refusal(readings.sheet_file, f"u_counts is missing (expected here, or a column {name})")
+        else:
+            columns.append(np.full(len(readings), readings.sheet.u_counts))
+    return np.column_stack(columns)
+
+
+def _prime(readings: Readings) -> np.ndarray:
+    words = readings.words.get("pointing", ("direct",) * len(readings))
+    for row, word in enumerate(words):
+        if word not in POINTINGS:
+            raise readings.refuse(row, f"pointing = {word!r} is unknown (expected 'direct', 'prime')")
+    return np.array([word == "prime" for word in words])
+
+
+def _refuse_far(readings: Readings, off: np.ndarray) -> None:
+    """Counts a quarter turn from where the records point are another target, pointing or station."""
+    far = np.any(np.abs(off) > 0.5 * HALF_TURN, axis=1) & readings.active
+    if far.any():
+        row = int(np.argmax(far))
+        raise readings.refuse(
+            row,
+            f"azimuth_counts, elevation_counts lie {off[row, 0]:+.0f}, {off[row, 1]:+.0f} from where the records point "
+            "(expected less than a quarter turn: another pointing, target or station?)",
+        )
+
+
+class _Compared:
+    """What the counts decided, in units of the priors of the parameters that are not held."""
+
+    def __init__(self, found: CurvedFit) -> None:
+        prior = np.array([p.u for p in found.parameters[:P]])
+        self.free = np.flatnonzero(prior > 0.0)
+        u = prior[self.free]
+        start = np.array([p.start for p in found.parameters])[self.free]
+        self.change = (found.values[self.free] - start) / u
+        self.left = found.covariance[np.ix_(self.free, self.free)] / np.outer(u, u)
+        values, vectors = np.linalg.eigh(np.eye(len(u)) - self.left)
+        self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
+        self.decided = int(np.count_nonzero(self.share > TOLD))
+
+    def whole(self, level: float) -> Decision:
+        """Whether laboratory and field agree in all that the counts say something of."""
+        told = self.share > INFORMED
+        along = self.vectors[:, told].T @ self.change
+        statistic, degrees = float(np.sum(along**2 / self.share[told])), int(told.sum())
+        test = global_test(statistic, degrees, 2.0 * level)  # one side: agreeing too well is no fault
+        passed = bool(statistic <= test.upper * degrees)
+        text = (
+            "laboratory and field agree"
+            if passed
+            else "the field contradicts the laboratory: look at the single changes"
+        )
+        return Decision(
+            f"laboratory against field: chi-square, {degrees} combinations",
+            statistic,
+            test.upper * degrees,
+            passed,
+            text,
+        )
+
+    def single(self, level: float) -> list[Decision]:
+        """Each parameter's change over its own standard uncertainty."""
+        limit = w_critical(single_level(level, len(self.free)))
+        told = []
+        for k, j in enumerate(self.free):
+            share, name = 1.0 - self.left[k, k], PARAMETERS[j]
+            if share <= INFORMED:
+                told.append(
+                    Decision(
+                        f"{name}: change over its u", float("nan"), float("nan"), None, "the counts say nothing of it"
+                    )
+                )
+                continue
+            ratio = float(self.change[k] / np.sqrt(share))
+            left = np.sqrt(self.left[k, k])
+            text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {left:.2f} is left"
+            told.append(Decision(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
+        return told
+
+    def combination(self, k: int) -> str:
+        """A combination by its leading parameters, in units of their priors."""
+        vector = self.vectors[:, k] * np.sign(self.vectors[np.argmax(np.abs(self.vectors[:, k])), k])
+        order = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SHOWN]
+        return " ".join(f"{vector[i]:+.2f} {PARAMETERS[self.free[i]]}" for i in order)
+
+
+def _inseparable(found: CurvedFit, predict: Any) -> tuple[int, list[str]]:
+    """Rank of the counts in the free parameters, and the parameters that no number of counts would tell."""
+    free = [k for k, p in enumerate(found.parameters[:P]) if p.u > 0.0]
+    columns = []
+    for k in free:
+        aside = np.zeros(len(found.values))
+        aside[k] = found.parameters[k].step
+        columns.append((predict(found.values + aside) - predict(found.values - aside))[found.fit.active])
+    scaled = np.column_stack(columns)
+    scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
+    _, size, turned = np.linalg.svd(scaled)
+    rank = int(np.count_nonzero(size > NOTHING * size[0]))
+    part = np.sum(turned[rank:] ** 2, axis=0)
+    return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > NOTHING]
+
+
+def _told(readings: Readings, found: CurvedFit, predict: Any) -> Calibration:
+    sheet, fit = readings.sheet, found.fit
+    compared = _Compared(found)
+    if not len(compared.free) or compared.share[0] <= INFORMED:
+        raise EstimationError(
+            "the counts decide nothing of the station: u_counts is far above what its records leave open"
+        )
+    free = [PARAMETERS[k] for k in compared.free]
+    meaning = "lab and field together"
+    given, covariance = found.quantities([(name, *IN_FILES[name][:2], meaning, IN_FILES[name][2]) for name in free])
+    rank, loose = _inseparable(found, predict)
+    notes = [
+        f"the counts decide {compared.decided} of {len(free)} combinations; strongest: "
+        + "; ".join(compared.combination(k) for k in range(min(compared.decided, 5))),
+        f"without the laboratory they would hold {rank} of {len(free)}"
+        + (f"; these cannot be told apart by any counts: {', '.join(loose)}" if loose else ""),
+    ]
+    held = [name for k, name in enumerate(PARAMETERS) if k not in compared.free]
+    if held:
+        notes.append(f"held as the records have them, without a u: {', '.join(held)}")
+    residual = fit.residual.reshape(-1, 2)
+    words = readings.words.get("pointing", ("direct",) * len(readings))
+    rows = tuple(
+        (readings.words["target"][k], words[k], float(readings.get("azimuth_counts")[k]),
+         float(readings.get("elevation_counts")[k]), float(residual[k, 0]), float(residual[k, 1]),
+         statistic, state)
+        for k, (statistic, state) in enumerate(row_ends(fit, readings.left_out, 2))
+    )  # fmt: skip
+    return Calibration(
+        kind=KIND,
+        title=f"{sheet.instrument} on {sheet.monument.monument}: laboratory against field",
+        provenance=provenance(readings),
+        quantities=given,
+        covariance=covariance,
+        columns=("target", "pointing", "azimuth_counts", "elevation_counts", "residual_azimuth_counts",
+                 "residual_elevation_counts", fit.test, "state"),
+        rows=rows,
+        decisions=(compared.whole(sheet.level), *compared.single(sheet.level), *fit.decisions()),
+        variance_factor=fit.variance_factor,
+        degrees_of_freedom=round(fit.degrees_of_freedom),
+        notes=tuple(notes),
+        curve=residuals_by_number(fit, 1.0),
+        axes=("count: azimuth, elevation of each target", "residual (counts)"),
+        method="The station's 13 parameters, with the records' standard uncertainties as priors, and the targets' "
+        "coordinates with theirs, are adjusted to the counts at which the targets were found. Tilts, offsets and "
+        "encoder waves of the mirror's record are counted exactly.",
+        record=_records(found, free),
+    )  # fmt: skip
+
+
+def _records(found: CurvedFit, free: list[str]) -> dict[str, Any]:
+    """Keys of the monument's and of the mirror's record."""
+    told: dict[str, dict[str, Any]] = {"monument": {}, "mirror": {}}
+    for name in free:
+        key, _, size, record = IN_FILES[name]
+        told[record][key] = found.value(name) / size
+        if record == "monument":
+            told[record][f"u_{key}"] = found.u(name) / size
+    if "alpha1" in free:
+        told["monument"]["azimuth_deg"] = float(np.mod(180.0 - found.value("alpha1") / DEGREE, 360.0))
+    for key, members, size in (
+        ("u_offset_mm", ("dx", "dy", "dz"), MILLIMETRE),
+        ("u_beta_rad", ("beta1", "beta2"), 1.0),
+        ("u_zero_counts", ("na0", "ne0"), 1.0),
+    ):
+        u = max(found.u(name) for name in members) / size
+        if u > 0.0:  # none where the record has none
+            told["mirror"][key] = u
+    return told
+
+
+RECIPE = Kind(
+    "a station's angles and zeros from targets found in the field, against the laboratory",
+    LAYOUT,
+    calibrate_search_results,
+)

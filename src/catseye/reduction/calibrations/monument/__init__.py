@@ -1,0 +1,1 @@
+"""A monument: azimuth, levels, place."""

@@ -1,0 +1,373 @@
+"""Dual-axis inclinometer: scales, zeros, axis misalignments, cubic term and temperature from a tilt table or a pier.
+
+`azimuth_deg` is how far the case is turned on the table, clockwise seen from above: axis x stands at the angle
+a + misalignment of x from the table's x, axis y at a - 90° + misalignment of y (x right, y forward: counter-clockwise
+of x), clockwise. The tilt of a direction is how far it rises above the horizon. With the table tilted by (p, q), what
+was applied plus its own tilt, both up along the table's x and y,
+
+    t_k   = p cos(c_k) - q sin(c_k)          the tilt along axis k, at the angle c_k clockwise of the table's x
+    volts = zero_k + b_k (T - 20 °C) + s_k (t_k + cubic_k t_k³)
+
+A tilt table with known tilts tells all of it. On a pier whose own tilt is unknown turning the case tells zeros, the
+tilt of the pier and how square the axes are; the scale of both axes and the turn of both together are the sheet's.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from catseye.constants import ARCSECOND, DEGREE
+from catseye.errors import EstimationError, ValidityError
+from catseye.records.readings import Layout, Readings, Sheet
+from catseye.records.record import Within
+from catseye.records.refusal import refusal
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.monument.frame_sheet import UAngle
+
+KIND = "inclinometer"
+WARMTH = 20.0  # °C to which the zeros belong
+ROUNDS, ENOUGH = 20, 1e-10  # relative change of the parameters at which the search ends
+SQUARE = 0.5 * np.pi
+Scale = Annotated[float, Within(-1e5, 1e5)]
+
+
+class InclinometerSheet(Sheet):
+    """Sheet of an inclinometer.
+
+    cubic                        the readings bend by a cubic term in each axis
+    temperature_coefficient      the zeros move with the column temperature_c
+    table_tilt                   the table or pier has a tilt of its own that is sought; the case must be turned then
+    scale_x_volt_per_rad, scale_y_volt_per_rad, u_scale_percent   known beforehand: needed on a pier
+    u_case_arcsec                turn of the case's mark against axis x: where no tilt was applied in a known direction
+    u_tilt_arcsec                of each applied tilt by itself
+    u_tilt_percent               of the table's scale, all tilts together
+    u_volt                       of one reading of an axis, if known
+    """
+
+    cubic: bool = False
+    temperature_coefficient: bool = False
+    table_tilt: bool = False
+    scale_x_volt_per_rad: Scale | None = None
+    scale_y_volt_per_rad: Scale | None = None
+    u_scale_percent: Annotated[float, Within(0, 50, above=True)] | None = None
+    u_case_arcsec: UAngle | None = None
+    u_tilt_arcsec: UAngle = 0.0
+    u_tilt_percent: Annotated[float, Within(0, 50)] = 0.0
+    u_volt: Annotated[float, Within(0, 10, above=True)] | None = None
+
+
+VOLT, TILT = Within(-100, 100), Within(-36_000, 36_000)
+LAYOUT = Layout(
+    KIND,
+    InclinometerSheet,
+    required={"x_volt": VOLT, "y_volt": VOLT},
+    optional={
+        "tilt_x_arcsec": TILT,
+        "tilt_y_arcsec": TILT,
+        "azimuth_deg": Within(-720, 720),
+        "temperature_c": Within(-40, 60),
+    },
+)
+
+
+@dataclass(frozen=True)
+class Inclinometer:
+    """Constants of both axes, x then y: (2,) each.
+
+    zero          V, at 20 °C
+    scale         V/rad
+    misaligned    rad, clockwise seen from above, of the axis from where the case has it
+    cubic         1/rad²
+    warmth        V/°C
+    """
+
+    zero: np.ndarray
+    scale: np.ndarray
+    misaligned: np.ndarray
+    cubic: np.ndarray
+    warmth: np.ndarray
+
+    def volts(self, tilts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = WARMTH) -> np.ndarray:
+        """Readings (..., 2), V.
+
+        tilts           (..., 2), rad, of the table's x and y above the horizon
+        azimuth         (...), rad, of the case on the table, clockwise
+        temperature_c   (...)
+        """
+        p, q = np.moveaxis(np.asarray(tilts, dtype=float), -1, 0)[..., None]
+        angle = np.asarray(azimuth, dtype=float)[..., None] + np.array([0.0, -SQUARE]) + self.misaligned
+        along = p * np.cos(angle) - q * np.sin(angle)
+        warm = (np.asarray(temperature_c, dtype=float) - WARMTH)[..., None]
+        return self.zero + self.warmth * warm + self.scale * (along + self.cubic * along**3)
+
+    def tilts(self, volts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = WARMTH) -> np.ndarray:
+        """Tilts (..., 2), rad, of the table's x and y above the horizon: the inverse of `volts`.
+
+        volts           (..., 2), V
+        azimuth         (...), rad, of the case on the table, clockwise
+        temperature_c   (...)
+
+        Raises ValidityError where the cubic term turns the curve round before the reading is reached.
+        """
+        warm = (np.asarray(temperature_c, dtype=float) - WARMTH)[..., None]
+        sought = (np.asarray(volts, dtype=float) - self.zero - self.warmth * warm) / self.scale
+        along = sought.copy()
+        for _ in range(50):
+            step = (along + self.cubic * along**3 - sought) / (1.0 + 3.0 * self.cubic * along**2)
+            along = along - step
+            if not np.any(np.abs(step) > 1e-15):
+                break
+        if not np.all(np.abs(step) <= 1e-12) or np.any(1.0 + 3.0 * self.cubic * along**2 <= 0.0):
+            raise ValidityError("volts lie beyond where the cubic term bends the readings back: no tilt has them")
+        angle = np.asarray(azimuth, dtype=float)[..., None] + np.array([0.0, -SQUARE]) + self.misaligned
+        rows = np.stack([np.cos(angle), -np.sin(angle)], axis=-1)
+        return np.linalg.solve(rows, along[..., None])[..., 0]
+
+
+def calibrate_inclinometer(readings: Readings, reject: bool = False) -> Calibration:
+    """Scales, zeros, misalignments and, where asked, cubic terms, temperature coefficients and the table's own tilt.
+
+    readings   columns x_volt, y_volt; tilt_x_arcsec, tilt_y_arcsec, azimuth_deg, temperature_c; InclinometerSheet
+    reject     leave out what the tests reject, both axes of a reading together
+
+    Raises InputError for a sheet that lacks a value, EstimationError where the readings do not tell every parameter.
+
+    Source: [PARKER04] chapter 7 names the model (its reference 145); least squares, [FOERSTNER16] chapter 4.
+    """
+    table = _Table(readings)
+    at, active = table.start(), readings.active
+    for turn in range(ROUNDS):
+        design, effects, predicted = table.linear(at)
+        fit = fit_readings(
+            table.observed - predicted + design @ at,
+            design,
+            table.scatter(at),
+            names=table.names,
+            effects=effects,
+            active=np.tile(active, 2),
+            together=np.tile(np.arange(len(readings)), 2),
+            reject=reject and turn > 2,
+            level=readings.sheet.level,
+        )
+        moved = np.abs(fit.x - at) / np.maximum(np.abs(fit.x), table.sizes)
+        at, active = fit.x, fit.active[: len(readings)]
+        if turn > 2 and moved.max() < ENOUGH:
+            return _told(table, fit)
+    raise EstimationError(
+        f"the inclinometer's model did not settle in {ROUNDS} rounds; is the pier level, or the scale's sign wrong?"
+    )
+
+
+class _Table:
+    """Readings of both axes, x above y, and the parameters that they are to tell.
+
+    Parameters in order: zero, scale, misalignment of x, y; then cubic x, y; warmth x, y; tilt of the table x, y, as
+    asked for. On a pier scales and the turn of the case have priors: they are parameters with an observation of
+    themselves, below the readings' own rows through effects on x.
+    """
+
+    def __init__(self, readings: Readings) -> None:
+        sheet = readings.sheet
+        self.readings, self.sheet, self.m = readings, sheet, len(readings)
+        given = [name in readings.numbers for name in ("tilt_x_arcsec", "tilt_y_arcsec")]
+        if given[0] != given[1]:
+            raise refusal(readings.file, "line 1, expected both columns tilt_x_arcsec and tilt_y_arcsec, or none")
+        self.pier = not given[0]
+        if self.pier and not sheet.table_tilt:
+            raise refusal(readings.sheet_file, "table_tilt is not true, and no tilt was applied (expected table_tilt = "
+                                               "true on a pier)")  # fmt: skip
+        if self.pier:
+            for key in ("scale_x_volt_per_rad", "scale_y_volt_per_rad", "u_scale_percent", "u_case_arcsec"):
+                if getattr(sheet, key) is None:
+                    raise refusal(readings.sheet_file, f"{key} is missing (needed on a pier, where no tilt is applied)")
+            if sheet.cubic:
+                raise refusal(readings.sheet_file, "cubic = true, but one tilt shows no bend (expected a tilt table)")
+        if sheet.table_tilt and "azimuth_deg" not in readings.numbers:
+            raise refusal(readings.file, "line 1, column 'azimuth_deg' is missing (turning the case tells table_tilt)")
+        tilts = [readings.get(f"tilt_{k}_arcsec") * ARCSECOND if given[0] else np.zeros(self.m) for k in "xy"]
+        self.applied = np.column_stack(tilts)
+        turned = "azimuth_deg" in readings.numbers
+        self.azimuth = readings.get("azimuth_deg") * DEGREE if turned else np.zeros(self.m)
+        self.warm = readings.get("temperature_c") if sheet.temperature_coefficient else np.full(self.m, WARMTH)
+        self.observed = np.concatenate([readings.get("x_volt"), readings.get("y_volt")])
+        self.names, sizes = [], []
+        parts = [("zero", "V", 1e-3, True), ("scale", "V/rad", 1e-3, not self.pier)]
+        parts += [("misalignment", "rad", 1e-6, not self.pier), ("cubic term", "1/rad²", 1e-3, sheet.cubic)]
+        parts += [("temperature coefficient", "V/°C", 1e-6, sheet.temperature_coefficient)]
+        parts += [("tilt of the table", "rad", 1e-8, sheet.table_tilt)]
+        self.free = np.repeat([sought for *_, sought in parts], 2)
+        for name, _, size, sought in parts:
+            if sought:
+                self.names += [f"{name} of {axis}" for axis in "xy"]
+                sizes += [size, size]
+        if self.pier:  # how square the axes are is all that turning tells of the misalignments
+            self.free[5] = True
+            self.names.insert(2, "misalignment of y")
+            sizes.insert(2, 1e-6)
+        self.sizes = np.array(sizes)
+
+    def full(self, at: np.ndarray) -> np.ndarray:
+        """All twelve constants, those not sought as the sheet has them."""
+        whole = np.zeros(12)
+        if self.pier:
+            whole[2:4] = self.sheet.scale_x_volt_per_rad, self.sheet.scale_y_volt_per_rad
+        whole[self.free] = at
+        return whole
+
+    def predicted(self, whole: np.ndarray, scale: float = 0.0) -> np.ndarray:
+        """(2 m,) V; applied tilts larger by the share `scale`."""
+        model = _model(whole)
+        return model.volts(self.applied * (1.0 + scale) + whole[10:], self.azimuth, self.warm).T.ravel()
+
+    def start(self) -> np.ndarray:
+        """Zeros from the means, scales and misalignments from a plane through the readings: the model but for bends."""
+        whole = np.zeros(12)
+        if self.pier:
+            return self._pier_start()
+        c, s = np.cos(self.azimuth), np.sin(self.azimuth)
+        p, q = self.applied.T
+        case = np.column_stack([p * c - q * s, p * s + q * c])  # the tilt along the case's x and y
+        design = np.column_stack([np.ones(self.m), case])
+        on = self.readings.active
+        if np.linalg.matrix_rank(design[on]) < 3:
+            raise EstimationError("the applied tilts lie in one direction of the case: tilt it along both axes")
+        for k in range(2):
+            values = self.observed[k * self.m : (k + 1) * self.m]
+            zero, by_x, by_y = np.linalg.lstsq(design[on], values[on], rcond=None)[0]
+            main, other = (by_x, -by_y) if k == 0 else (by_y, by_x)
+            whole[k], whole[2 + k] = zero, np.copysign(np.hypot(main, other), main)
+            whole[4 + k] = np.arctan(other / main)
+        return whole[self.free]
+
+    def _pier_start(self) -> np.ndarray:
+        whole = self.full(np.zeros(int(self.free.sum())))
+        on = self.readings.active
+        x = self.observed[: self.m][on]
+        design = np.column_stack([np.ones(on.sum()), np.cos(self.azimuth[on]), -np.sin(self.azimuth[on])])
+        if np.linalg.matrix_rank(design) < 3:
+            raise EstimationError("the case stands in too few azimuths on the pier: turn it to three or more")
+        whole[0], p, q = np.linalg.lstsq(design, x, rcond=None)[0]
+        whole[1] = np.mean(self.observed[self.m :][on])
+        whole[10:] = np.array([p, q]) / whole[2]
+        return whole[self.free]
+
+    def linear(self, at: np.ndarray) -> tuple[np.ndarray, list[Effect], np.ndarray]:
+        """Design (2 m, p) and effects about the parameters, by central differences; and what is predicted there."""
+        whole = self.full(at)
+
+        def slope(k: int) -> np.ndarray:
+            # Linear or smooth in each: steps of 1e-6 of the range leave 1e-10 of the slope.
+            step = np.array([1.0, 1.0, 1.0, 1.0, 1e-4, 1e-4, 1.0, 1.0, 1e-3, 1e-3, 1e-5, 1e-5])[k]
+            ends = [self.predicted(whole + sign * step * np.eye(12)[k]) for sign in (1.0, -1.0)]
+            return (ends[0] - ends[1]) / (2.0 * step)
+
+        design = np.column_stack([slope(int(k)) for k in np.flatnonzero(self.free)])
+        effects = []
+        if self.sheet.u_tilt_percent and not self.pier:
+            by_scale = (self.predicted(whole, 1e-3) - self.predicted(whole, -1e-3)) / 2e-3
+            effects.append(Effect("scale of the table, %", 0.01 * by_scale, self.sheet.u_tilt_percent))
+        if self.pier:
+            for k, axis in enumerate("xy"):
+                share = 0.01 * whole[2 + k] * slope(2 + k)
+                effects.append(Effect(f"scale of {axis}, %", share, self.sheet.u_scale_percent))
+            both = slope(4) + slope(5)
+            effects.append(Effect("turn of the case, arcsec", ARCSECOND * both, self.sheet.u_case_arcsec))
+        return design, effects, self.predicted(whole)
+
+    def scatter(self, at: np.ndarray) -> Scatter:
+        """Of the readings, with that of the applied tilts: they turn up in both axes of a reading together."""
+        whole, m, sheet = self.full(at), self.m, self.sheet
+        claimed = np.zeros((2 * m, 2 * m))
+        if sheet.u_tilt_arcsec and not self.pier:
+            angle = self.azimuth[:, None] + np.array([0.0, -SQUARE]) + whole[4:6]
+            rows = np.stack([np.cos(angle), -np.sin(angle)], axis=-1) * whole[2:4, None]  # (m, axis, tilt) V/rad
+            pairs = np.einsum("mat,mbt->abm", rows, rows) * (sheet.u_tilt_arcsec * ARCSECOND) ** 2
+            claimed = np.block([[np.diag(pairs[a, b]) for b in range(2)] for a in range(2)])
+        if sheet.u_volt is not None:
+            return Scatter(claimed + sheet.u_volt**2 * np.eye(2 * m))
+        return Scatter(claimed, {"scatter of one reading": np.eye(2 * m)}, size=float(np.abs(self.observed).max()))
+
+
+def _model(whole: np.ndarray) -> Inclinometer:
+    return Inclinometer(whole[0:2], whole[2:4], whole[4:6], whole[6:8], whole[8:10])
+
+
+MEANINGS = (
+    ("zero_{}_volt", "V", "reading of axis {} when level, at 20 °C", 1.0),
+    ("scale_{}_volt_per_rad", "V/rad", "slope of axis {}, above zero where its + end up reads more", 1.0),
+    ("misalignment_{}_arcsec", "arcsec", "axis {} clockwise of where the case has it", ARCSECOND),
+    ("cubic_{}_per_rad2", "1/rad²", "bend of axis {}: volts = scale (t + cubic t³)", 1.0),
+    ("warmth_{}_volt_per_c", "V/°C", "zero of axis {} for each degree", 1.0),
+    ("table_tilt_{}_arcsec", "arcsec", "own tilt of table or pier, its {} axis up", ARCSECOND),
+)
+
+
+def _told(table: _Table, fit: Fit) -> Calibration:
+    readings, sheet, m = table.readings, table.sheet, table.m
+    all_keys = [
+        (key.format(axis), unit, meaning.format(axis), size) for key, unit, meaning, size in MEANINGS for axis in "xy"
+    ]
+    chosen = [all_keys[k] for k in np.flatnonzero(table.free)]
+    turn = np.diag([1.0 / size for *_, size in chosen])
+    values, covariance = turn @ fit.x, turn @ fit.covariance @ turn.T
+    found = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
+    states = fit.state(readings.left_out * 2)
+    seen = [name for name in LAYOUT.optional if name in readings.numbers]
+    rows = tuple(
+        (
+            *(float(readings.numbers[name][k]) for name in seen),
+            float(table.observed[k]),
+            float(table.observed[m + k]),
+            float(fit.residual[k] * 1e3),
+            float(fit.residual[m + k] * 1e3),
+            float(fit.statistic[k]),
+            float(fit.statistic[m + k]),
+            states[k] if states[k] != "used" else states[m + k],
+        )
+        for k in range(m)
+    )
+    on = fit.active
+    number = np.tile(np.arange(1, m + 1), 2)
+    return Calibration(
+        kind=KIND,
+        title=f"Inclinometer {sheet.instrument} on a {'pier' if table.pier else 'tilt table'}",
+        provenance=provenance(readings),
+        quantities=found,
+        covariance=covariance,
+        columns=(*seen, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
+                 "state"),
+        rows=rows,
+        decisions=fit.decisions(),
+        variance_factor=fit.variance_factor,
+        degrees_of_freedom=round(fit.degrees_of_freedom),
+        notes=(*_notes(table), *scatter_notes(fit, "mV", 1e-3)),
+        curve={
+            "readings": (number[on], fit.residual[on] * 1e3),
+            "left out": (number[~on], fit.residual[~on] * 1e3),
+            "fit": (np.arange(1, m + 1), np.zeros(m)),
+        },
+        axes=("reading, both axes", "residual (mV)"),
+        method="Readings of both axes are adjusted to the tilts: zero and scale of each axis, their misalignments and, "
+        "where asked, cubic terms, temperature coefficients and the table's own tilt. Tilts and scale of the table, "
+        "and on a pier the scales and the turn of the case, are parameters with priors.",
+        record={q.key: q.value for q in found} | {f"u_{q.key}": q.u for q in found},
+    )  # fmt: skip
+
+
+def _notes(table: _Table) -> tuple[str, ...]:
+    if not table.pier:
+        return () if table.sheet.table_tilt else (
+            "the table's own tilt was not sought: it is part of the zeros",
+        )  # fmt: skip
+    return (
+        f"scales are those of the sheet, u {table.sheet.u_scale_percent:g} %: one tilt of the pier tells none",
+        "misalignment_y is that against axis x: turning on a pier shows how square the axes are, no more",
+    )
+
+
+RECIPE = Kind("scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier", LAYOUT,
+              calibrate_inclinometer)  # fmt: skip

@@ -1,0 +1,186 @@
+"""Constants of prisms and balls from their measured dimensions: where the range ends inside the glass.
+
+    prism   h_rp = h / n,   Pc = -(n - 1/n) h        ball   Pc = -(n (R1 + R2) - R1)
+
+n is the group index of the glass over that of the air. Dimensions are those at 20 °C.
+"""
+
+from typing import Annotated
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.geometry.catenary import expanded
+from catseye.optics import cats_eye, prism
+from catseye.records.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.record import Uncertainty, Within
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
+
+PRISM, BALL = "prism-constant", "ball-constant"
+PARTS = ("r1", "r2")
+TEMPERATURE = Within(-40, 60)
+
+
+class GlassSheet(Sheet):
+    """Sheet of a target's dimensions.
+
+    index_ratio, u_index_ratio   group index of the glass over that of the air: 1.527077 for old BK 7 at 0.780 µm
+    expansion_ppm_per_c, u_expansion_ppm_per_c   of the glass: 7.1 for BK 7
+    temperature_c, u_temperature_c   of the glass; a column where it changed
+    u_gauge_mm                   of the gauge, an offset that all readings share
+    u_reading_mm                 scatter of a reading, if known
+    """
+
+    index_ratio: Annotated[float, Within(1.3, 2.5)]
+    u_index_ratio: Annotated[float, Within(0, 0.1)]
+    expansion_ppm_per_c: Annotated[float, Within(0, 50)]
+    u_expansion_ppm_per_c: Annotated[float, Within(0, 50)] = 0.0
+    temperature_c: Annotated[float, TEMPERATURE] | None = None
+    u_temperature_c: Annotated[float, Within(0, 20)]
+    u_gauge_mm: Annotated[float, Within(0, 10)]
+    u_reading_mm: Uncertainty | None = None
+
+
+PRISM_LAYOUT = Layout(
+    PRISM, GlassSheet, required={"height_mm": Within(5, 500)}, optional={"temperature_c": TEMPERATURE}
+)
+BALL_LAYOUT = Layout(
+    BALL,
+    GlassSheet,
+    required={"part": TEXT, "radius_mm": Within(5, 1000)},
+    optional={"temperature_c": TEMPERATURE},
+)
+
+
+def calibrate_prism(readings: Readings, reject: bool = False) -> Calibration:
+    """Height, reference depth and range constant of a cube-corner prism.
+
+    readings   column height_mm, entry face to corner; sheet GlassSheet
+    reject     leave out what the tests reject
+
+    Source: [GOLDMAN00] eqs. 3.9 and 3.10.
+    """
+    fit, _ = _dimensions(readings, readings.get("height_mm"), np.ones((len(readings), 1)), ["height"], reject)
+    n, h = readings.sheet.index_ratio, fit.x[0]
+    values = np.array([h, float(prism.reference_depth(h, n)), float(prism.range_constant(h, n))])
+    by_size = np.array([1.0, 1.0 / n, -(n - 1.0 / n)])
+    by_index = np.array([0.0, -h / n**2, -(1.0 + 1.0 / n**2) * h])
+    keys = [
+        ("height_mm", "mm", "of the prism at 20 °C, entry face to corner"),
+        ("hrp_mm", "mm", "reference point below the entry face"),
+        ("pc_mm", "mm", "range constant at normal incidence, added to the measured length"),
+    ]
+    return _told(
+        readings, fit, PRISM, "Prism", keys, values=values, by_size=by_size[:, None], by_index=by_index,
+        record={"height_mm": values[0], "u_height_mm": float(np.sqrt(fit.covariance[0, 0])), "hrp_mm": values[1],
+                "pc_mm": values[2]},
+    )  # fmt: skip
+
+
+def calibrate_ball(readings: Readings, reject: bool = False) -> Calibration:
+    """Radii and range constant of a cat's-eye made of a small ball and a large shell about one centre.
+
+    readings   columns part ("r1" small ball, "r2" silvered shell) and radius_mm; sheet GlassSheet
+    reject     leave out what the tests reject
+
+    Source: [GOLDMAN00] eq. 3.14.
+    """
+    design = np.zeros((len(readings), 2))
+    for row, part in enumerate(readings.words["part"]):
+        if part not in PARTS:
+            raise readings.refuse(row, f"part = {part!r} is not known (expected 'r1', small ball, or 'r2', shell)")
+        design[row, PARTS.index(part)] = 1.0
+    fit, _ = _dimensions(readings, readings.get("radius_mm"), design, ["radius r1", "radius r2"], reject)
+    n, (r1, r2) = readings.sheet.index_ratio, fit.x
+    values = np.array([r1, r2, float(cats_eye.range_constant(r1, r2, n))])
+    by_size = np.array([[1.0, 0.0], [0.0, 1.0], [-(n - 1.0), -n]])
+    by_index = np.array([0.0, 0.0, -(r1 + r2)])
+    keys = [
+        ("r1_mm", "mm", "radius of the small ball at 20 °C"),
+        ("r2_mm", "mm", "radius of the silvered shell at 20 °C"),
+        ("pc_b_mm", "mm", "range constant, added to the measured length"),
+    ]
+    return _told(
+        readings, fit, BALL, "Ball", keys, values=values, by_size=by_size, by_index=by_index,
+        record={"r1_mm": r1, "r2_mm": r2, "u_r_mm": float(np.sqrt(fit.covariance.diagonal().max())),
+                "pc_b_mm": values[2]},
+    )  # fmt: skip
+
+
+def _dimensions(
+    readings: Readings, seen: np.ndarray, design: np.ndarray, names: list[str], reject: bool
+) -> tuple[Fit, np.ndarray]:
+    """Sizes at 20 °C, mm, from readings at their temperature."""
+    sheet, m = readings.sheet, len(readings)
+    temperature = readings.get("temperature_c")
+    expansion = sheet.expansion_ppm_per_c * PPM
+    observed = seen / expanded(1.0, temperature, expansion)
+    scatter = Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+    if sheet.u_reading_mm is not None:
+        scatter = Scatter(sheet.u_reading_mm**2 * np.eye(m))
+    fit = fit_readings(
+        observed,
+        design,
+        scatter,
+        names=names,
+        effects=[
+            Effect("offset of the gauge, mm", np.ones(m), sheet.u_gauge_mm),
+            Effect("offset of the thermometer, °C", observed * expansion, sheet.u_temperature_c),
+            Effect("expansion, ppm/°C", observed * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
+        ],
+        active=readings.active,
+        reject=reject,
+        level=sheet.level,
+    )
+    return fit, observed
+
+
+def _told(
+    readings: Readings,
+    fit: Fit,
+    kind: str,
+    what: str,
+    keys: list[tuple[str, str, str]],
+    *,
+    values: np.ndarray,
+    by_size: np.ndarray,
+    by_index: np.ndarray,
+    record: dict[str, float],
+) -> Calibration:
+    sheet = readings.sheet
+    covariance = by_size @ fit.covariance @ by_size.T + sheet.u_index_ratio**2 * np.outer(by_index, by_index)
+    covariance = 0.5 * (covariance + covariance.T)
+    rows = tuple(
+        (*(words[k] for words in readings.words.values()), float(fit.predicted[k] + fit.residual[k]),
+         float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
+        for k, state in enumerate(fit.state(readings.left_out))
+    )  # fmt: skip
+    return Calibration(
+        kind=kind,
+        title=f"{what} constants of {sheet.instrument}",
+        provenance=provenance(readings),
+        quantities=quantities(keys, values, covariance, fit=fit, turn=by_size),
+        covariance=covariance,
+        columns=(*readings.words, "size_at_20_c_mm", "residual_um", fit.test, "state"),
+        rows=rows,
+        decisions=fit.decisions(),
+        variance_factor=fit.variance_factor,
+        degrees_of_freedom=round(fit.degrees_of_freedom),
+        notes=(
+            f"the index ratio {sheet.index_ratio} alone contributes "
+            f"{1e3 * sheet.u_index_ratio * abs(by_index[-1]):.2g} µm to the range constant",
+            *scatter_notes(fit, "µm", 1e-3),
+        ),
+        curve=residuals_by_number(fit, 1e-3),
+        axes=("reading", "residual (µm)"),
+        method="Readings of the glass are taken to 20 °C and averaged with the offsets of gauge and thermometer and "
+        "the expansion as parameters with priors. The constants follow from the dimensions and the ratio of the group "
+        "indices of glass and air.",
+        record={key: float(value) for key, value in record.items()},
+    )
+
+
+PRISM_RECIPE = Kind("constants of a glass prism from its measured height", PRISM_LAYOUT, calibrate_prism)
+BALL_RECIPE = Kind("constants of a ball cat's-eye from its measured radii", BALL_LAYOUT, calibrate_ball)

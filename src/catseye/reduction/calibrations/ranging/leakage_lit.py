@@ -1,0 +1,203 @@
+"""Leakage with light: a retroreflector moved along a rail, whose phasors lie on a circle about the leakage.
+
+Where the positions are known (column distance_m) each phasor is leakage + (g + h (D - mean)) exp(-2 pi i D / half):
+linear in three complex numbers, and a return that fades along the rail does no harm. Where they are not, the phasors
+are taken to lie on a circle, which needs a constant amplitude.
+"""
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+
+from catseye.constants import SPEED_OF_LIGHT, TWO_PI
+from catseye.records.readings import Layout, Readings, Sheet
+from catseye.records.record import Within
+from catseye.records.refusal import refusal
+from catseye.reduction.calibrations.calibration import Calibration, Decision
+from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
+from catseye.signal.leakage import circle_leakage
+
+KIND = "leakage-lit"
+SCATTER = "scatter of one quadrature"
+ROUNDS = 20
+SHORTEST_ARC = 0.5 * np.pi  # rad; a shorter one does not tell the centre from the radius in the face of small biases
+
+
+class LitLeakageSheet(Sheet):
+    """Sheet of a calibration of the leakage with a moving retroreflector.
+
+    u_volt           of each quadrature of one phasor, if known
+    modulation_hz    frequency of the modulation
+    group_index      of the air; needed for the column distance_m
+    u_session_volt   by which the leakage differs from session to session, each quadrature
+    """
+
+    u_volt: Annotated[float, Within(0, 1, above=True)] | None = None
+    modulation_hz: Annotated[float, Within(1e7, 1e11)] = 1500e6
+    group_index: Annotated[float, Within(1, 1.001)] | None = None
+    u_session_volt: Annotated[float, Within(0, 1)]
+
+
+LAYOUT = Layout(KIND, LitLeakageSheet, required={}, optional={"distance_m": Within(0.05, 10_000), **COLUMNS})
+
+
+def calibrate_lit_leakage(readings: Readings, reject: bool = False) -> Calibration:
+    """The leakage as the point about which a moving retroreflector's phasors turn.
+
+    readings   columns real_volt, imaginary_volt (or amplitude_volt, phase_rad), perhaps distance_m; LitLeakageSheet
+    reject     leave out what the tests reject
+
+    Raises EstimationError where the phasors cover too little of the circle.
+
+    Source: [PARKER04] sec. 5.2.1 names the effect; derived in the module.
+    """
+    z = phasors(readings)
+    fit, m = (_along(readings, z, reject), len(z)) if "distance_m" in readings.numbers else (None, len(z))
+    if fit is not None:
+        return _told(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
+    fit = _circle(readings, z, reject)
+    return _told(readings, fit, z, fit.statistic, known=False)
+
+
+def _along(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
+    """Known positions: real and imaginary parts are linear in leakage, light and its fading."""
+    sheet, distance = readings.sheet, readings.get("distance_m")
+    if sheet.group_index is None:
+        raise refusal(readings.sheet_file, "group_index is missing (needed for the column distance_m)")
+    half = 0.5 * SPEED_OF_LIGHT / (sheet.group_index * sheet.modulation_hz)
+    turn = np.exp(-1j * TWO_PI * distance / half)
+    columns = [np.ones_like(turn), turn]
+    names = ["leakage", "light"]
+    if len(z) >= 8:
+        columns.append(turn * (distance - distance.mean()))
+        names.append("fading")
+    # (a + ib)(x + iy): the real part is a x - b y, the imaginary part b x + a y.
+    design = (
+        np.concatenate([np.stack([c.real, -c.imag], axis=1) for c in columns], axis=1),
+        np.concatenate([np.stack([c.imag, c.real], axis=1) for c in columns], axis=1),
+    )
+    m = len(z)
+    return fit_readings(
+        np.concatenate([z.real, z.imag]),
+        np.concatenate(design),
+        _scatter(readings, 2),
+        names=[f"{part} part of the {name}" for name in names for part in ("real", "imaginary")],
+        active=np.tile(readings.active, 2),
+        together=np.tile(np.arange(m), 2),
+        reject=reject,
+        level=sheet.level,
+    )
+
+
+def _circle(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
+    """Unknown positions: distances from a circle, linearised where the fit settles."""
+    on = readings.active
+    found = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
+    point = np.array([found.phasor.real, found.phasor.imag, float(np.mean(np.abs(z[on] - found.phasor)))])
+    scatter = _scatter(readings, 1)
+    for _ in range(ROUNDS):
+        arm = z - complex(point[0], point[1])
+        away = np.abs(arm)
+        design = np.stack([arm.real / away, arm.imag / away, np.ones(len(z))], axis=1)
+        fit = fit_readings(
+            away - point[2],
+            design,
+            scatter,
+            names=["real part of the leakage", "imaginary part of the leakage", "amplitude of the light"],
+            active=on,
+            reject=reject,
+            level=readings.sheet.level,
+        )
+        point = point + fit.x
+        on = fit.active
+        if np.max(np.abs(fit.x)) < 1e-12 * point[2]:
+            break
+    return replace(fit, x=point)
+
+
+def _scatter(readings: Readings, quadratures: int) -> Scatter:
+    m = len(readings)
+    if readings.has("u_volt"):
+        return Scatter(np.diag(np.tile(readings.get("u_volt"), quadratures) ** 2))
+    return Scatter(np.zeros((quadratures * m,) * 2), {SCATTER: np.eye(quadratures * m)})
+
+
+def _arc(arm: np.ndarray) -> float:
+    """Angle of the circle that phasors cover, rad: a turn less the largest gap."""
+    angle = np.sort(np.mod(np.angle(arm), TWO_PI))
+    gaps = np.diff(np.append(angle, angle[0] + TWO_PI))
+    return float(TWO_PI - gaps.max())
+
+
+def _told(readings: Readings, fit: Fit, z: np.ndarray, statistic: np.ndarray, *, known: bool) -> Calibration:
+    sheet, m = readings.sheet, len(z)
+    leakage = complex(fit.x[0], fit.x[1])
+    centre = fit.covariance[:2, :2]
+    found, polar = polar_quantities(leakage, centre, fit)
+    u_centre = float(np.sqrt(0.5 * np.trace(centre)))
+    to_come = float(np.hypot(u_centre, sheet.u_session_volt))
+    states = fit.state(readings.left_out * (2 if known else 1))
+    states = tuple(b if b == "suspect" else a for a, b in zip(states[:m], states[-m:], strict=True))
+    residual = np.hypot(fit.residual[:m], fit.residual[m:]) if known else fit.residual
+    on = fit.active[:m]
+    arc = _arc((z - leakage)[on])
+    radius = float(np.median(np.abs(z - leakage)[on]))
+    ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
+    rows = tuple(
+        (
+            readings.where[k],
+            float(z[k].real / MILLIVOLT),
+            float(z[k].imag / MILLIVOLT),
+            float(residual[k] / MILLIVOLT),
+            float(statistic[k]),
+            states[k],
+        )
+        for k in range(m)
+    )
+    covered = Decision(
+        "arc of the circle, rad",
+        arc,
+        SHORTEST_ARC,
+        arc >= SHORTEST_ARC,
+        f"the phasors cover {np.degrees(arc):.0f}° of the circle"
+        + ("" if known else ", and its amplitude is taken to be constant"),
+    )
+    return Calibration(
+        kind=KIND,
+        title=f"Leakage of {sheet.instrument}, from a moving retroreflector",
+        provenance=provenance(readings),
+        quantities=found,
+        covariance=polar,
+        columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
+        rows=rows,
+        decisions=(covered, *fit.decisions()),
+        variance_factor=fit.variance_factor,
+        degrees_of_freedom=round(fit.degrees_of_freedom),
+        notes=(
+            f"the light has {radius / MILLIVOLT:.4g} mV, the leakage {abs(leakage) / radius:.2%} of it",
+            f"u_leakage_volt of the record is {to_come / MILLIVOLT:.3g} mV: of the centre {u_centre / MILLIVOLT:.3g} mV"
+            f", and u_session_volt = {sheet.u_session_volt:g} of the sheet",
+            *scatter_notes(fit, "mV", MILLIVOLT, 2),
+        ),
+        curve={
+            "readings": (z[on].real / MILLIVOLT, z[on].imag / MILLIVOLT),
+            "left out": (z[~on].real / MILLIVOLT, z[~on].imag / MILLIVOLT),
+            "fit": (ring.real / MILLIVOLT, ring.imag / MILLIVOLT),
+        },
+        axes=("real part (mV)", "imaginary part (mV)"),
+        method="A retroreflector moves along a rail; the phasor of its light turns by a cycle for each half "
+        "wavelength, the leakage stays. The point about which the phasors turn is the leakage: "
+        + (
+            "with the known distances it is a linear adjustment that allows for fading."
+            if known
+            else "the centre of the circle that fits them best."
+        ),
+        record=leakage_record(found, to_come),
+        equal_axes=True,
+    )
+
+
+RECIPE = Kind("leakage from a retroreflector moved along a rail", LAYOUT, calibrate_lit_leakage)

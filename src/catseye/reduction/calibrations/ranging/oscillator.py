@@ -1,0 +1,134 @@
+"""The oscillator test: phases of the internal cube at equal intervals to kinds of noise, spurs and what averaging buys.
+
+The readings are the phases of single cycles (SEQ) or of buffers of the reference cube, one after the other.
+"""
+
+from typing import Annotated
+
+import numpy as np
+
+from catseye.constants import TWO_PI
+from catseye.records.readings import Layout, Readings, Sheet
+from catseye.records.record import Within
+from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
+from catseye.reduction.calibrations.kind import Kind, provenance
+from catseye.signal.allan import allan_deviation
+from catseye.signal.noise import FEWEST, NoiseSpectrum, noise_spectrum
+
+KIND = "oscillator"
+SHOWN = 5  # spurs listed
+MRAD2 = 1e6  # mrad^2 in a rad^2
+
+
+class OscillatorSheet(Sheet):
+    """Sheet of an oscillator test.
+
+    interval_s        from reading to reading: 0.001 for single cycles at an IF of 1 kHz
+    half_wavelength_mm   of the modulation, turns phases into ranges
+    cycles_per_range  readings that one range averages
+    false_alarm       probability of calling noise a spur, over the whole spectrum
+    """
+
+    interval_s: Annotated[float, Within(1e-6, 1e5)]
+    half_wavelength_mm: Annotated[float, Within(1, 1e6)] = 99.93
+    cycles_per_range: Annotated[int, Within(1, 65_536)] = 128
+    false_alarm: Annotated[float, Within(0, 0.5, above=True)] = 0.001
+
+
+LAYOUT = Layout(KIND, OscillatorSheet, required={"phase_rad": Within(-1e6, 1e6)})
+
+
+def measure_oscillator(readings: Readings, reject: bool = False) -> Calibration:
+    """White, flicker and random-walk noise of the phase, its spurs, and the noise of one range that they make.
+
+    readings   column phase_rad at equal intervals; sheet OscillatorSheet
+    reject     has no effect: a series with holes has no spectrum
+
+    Raises InputError where readings are left out or are too few.
+
+    Source: [PARKER04] chapter 8, "oscillator phase noise vs cycles"; [WHITTLE53], [RILEY08].
+    """
+    sheet, m = readings.sheet, len(readings)
+    for row, reason in enumerate(readings.left_out):
+        if reason:
+            raise readings.refuse(row, "is left out, but readings at equal intervals cannot spare one (cut the series)")
+    if m < FEWEST:
+        raise readings.refuse(m - 1, f"is the last of {m} readings (expected at least {FEWEST})")
+    phase = np.unwrap(readings.get("phase_rad"))
+    found = noise_spectrum(phase, sheet.interval_s, false_alarm=sheet.false_alarm)
+    allan = allan_deviation(phase)
+    quantity, covariance = _quantities(found, sheet)
+    interval = allan.interval()
+    rows = tuple(
+        (int(size), float(size * sheet.interval_s), float(d), float(low), float(high), kind,
+         float(d * sheet.half_wavelength_mm * 1e3 / TWO_PI))
+        for size, d, (low, high), kind in zip(allan.size, allan.deviation, interval, allan.kind, strict=True)
+    )  # fmt: skip
+    time = allan.size * sheet.interval_s
+    white = found.white / np.sqrt(allan.size)
+    shown, line = allan.deviation > 0.0, np.full(len(time), found.white > 0.0)  # what has a logarithm
+    return Calibration(
+        kind=KIND,
+        title=f"Oscillator test of {sheet.instrument}",
+        provenance=provenance(readings),
+        quantities=quantity,
+        covariance=covariance,
+        columns=("averaged", "averaged_s", "allan_deviation_rad", "low_95_rad", "high_95_rad", "kind", "range_um"),
+        rows=rows,
+        decisions=(
+            Decision(
+                "spurs: lines in the spectrum",
+                float(len(found.spurs)),
+                0.0,
+                not found.spurs,
+                "no line stands out of the noise" if not found.spurs else _lines(found),
+            ),
+        ),
+        degrees_of_freedom=m - 1,
+        notes=(
+            *(
+                f"spur at {s.frequency_hz:.4g} Hz (u {s.u_frequency_hz:.2g}): amplitude {s.amplitude:.3g} rad "
+                f"(u {s.u_amplitude:.2g}), false alarm {s.false_alarm:.1g}"
+                for s in found.spurs[:SHOWN]
+            ),
+            "spurs above half the sampling rate show folded below it",
+            f"a drift of {found.drift:+.3g} rad/s was taken out before the spectrum; the Allan deviation has it",
+        ),
+        curve={
+            "readings": (np.log10(time[shown]), np.log10(allan.deviation[shown])),
+            "fit": (np.log10(time[line]), np.log10(white[line])),
+        },
+        axes=("averaging time (log10 of s)", "Allan deviation (log10 of rad)"),
+        method="The spectrum of the unwrapped phases, a straight line taken out, is fitted with white, flicker and "
+        "random-walk noise by the likelihood of its ordinates, spurs taken out one by one. Beside it the overlapping "
+        "Allan deviation of averages, with 95 % limits; the line in the figure is what white noise alone would do.",
+        record={q.key: q.value for q in quantity},
+    )
+
+
+def _quantities(found: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[Quantity, ...], np.ndarray]:
+    """Coefficients (mrad^2) and the white part of a range's noise, with covariance."""
+    per_range = (sheet.half_wavelength_mm * 1e3 / TWO_PI) / np.sqrt(sheet.cycles_per_range)
+    slope = np.zeros((4, 3))
+    slope[:3] = MRAD2 * np.eye(3)
+    slope[3, 0] = 0.5 * per_range / found.white if found.white > 0.0 else 0.0
+    covariance = slope @ found.covariance @ slope.T
+    values = (*(MRAD2 * found.squares), found.white * per_range)
+    keys = (
+        ("white_mrad2", "mrad²", "variance of a reading, white"),
+        ("flicker_mrad2", "mrad²", "h of the density h/f"),
+        ("walk_mrad2", "mrad²", "variance of a step of the walk, reading to reading"),
+        ("white_range_um", "µm", f"white noise of a range of {sheet.cycles_per_range} readings"),
+    )
+    told = tuple(
+        Quantity(key, float(v), float(np.sqrt(max(c, 0.0))), unit, meaning)
+        for (key, unit, meaning), v, c in zip(keys, values, np.diag(covariance), strict=True)
+    )
+    return told, covariance
+
+
+def _lines(found: NoiseSpectrum) -> str:
+    return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in found.spurs[:SHOWN])
+
+
+RECIPE = Kind("phase noise of the oscillator against averaging, with spurs", LAYOUT, measure_oscillator)

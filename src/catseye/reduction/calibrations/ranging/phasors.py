@@ -1,0 +1,63 @@
+"""Tables of phasors: as real and imaginary part, or as amplitude and phase."""
+
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import TWO_PI
+from catseye.records.readings import Readings
+from catseye.records.record import Within
+from catseye.records.refusal import refusal
+from catseye.reduction.calibrations.calibration import Quantity
+from catseye.reduction.calibrations.fit import Fit
+from catseye.reduction.calibrations.kind import quantities
+from catseye.signal.cycles import fraction
+from catseye.signal.leakage import polar_covariance
+
+VOLT, PART = Within(0, 20), Within(-20, 20)
+CARTESIAN, POLAR = ("real_volt", "imaginary_volt"), ("amplitude_volt", "phase_rad")
+COLUMNS = {
+    "real_volt": PART,
+    "imaginary_volt": PART,
+    "amplitude_volt": VOLT,
+    "phase_rad": Within(-2 * TWO_PI, 2 * TWO_PI),
+    "u_volt": Within(0, 1, above=True),
+}
+MILLIVOLT = 1e-3  # V
+
+
+def phasors(readings: Readings) -> np.ndarray:
+    """(m,) V, complex; InputError unless exactly one pair of columns is there."""
+    pairs = [pair for pair in (CARTESIAN, POLAR) if all(name in readings.numbers for name in pair)]
+    given = [name for name in (*CARTESIAN, *POLAR) if name in readings.numbers]
+    if len(pairs) != 1 or len(given) != 2:
+        raise refusal(
+            readings.file,
+            f"line 1, {', '.join(given) or 'no column of a phasor'} (expected {','.join(CARTESIAN)} or "
+            f"{','.join(POLAR)})",
+        )
+    first, second = (readings.get(name) for name in pairs[0])
+    return first + 1j * second if pairs[0] == CARTESIAN else first * np.exp(1j * second)
+
+
+def polar_quantities(phasor: complex, covariance: np.ndarray, fit: Fit) -> tuple[tuple[Quantity, ...], np.ndarray]:
+    """A leakage as amplitude and phase with their covariance, from its real and imaginary part."""
+    polar = polar_covariance(phasor, covariance)
+    keys = [
+        ("leakage_amplitude_volt", "V", "of the phasor that leaks into every shot"),
+        ("leakage_phase_rad", "rad", "of it, in the phase frame of the converter"),
+    ]
+    values = np.array([abs(phasor), float(fraction(np.angle(phasor), 0.0))])
+    turn = np.zeros((2, len(fit.x)))
+    along = phasor / abs(phasor)
+    turn[:, :2] = [[along.real, along.imag], [-along.imag / abs(phasor), along.real / abs(phasor)]]
+    return quantities(keys, values, polar, fit=fit, turn=turn), polar
+
+
+def leakage_record(found: tuple[Quantity, ...], u_volt: float) -> dict[str, Any]:
+    """What goes into the ranger's record: one uncertainty of each quadrature."""
+    return {
+        "leakage_amplitude_volt": found[0].value,
+        "leakage_phase_rad": found[1].value,
+        "u_leakage_volt": u_volt,
+    }

@@ -1,0 +1,116 @@
+"""Repeatability: how ranges of one target scatter within a set and from set to set."""
+
+from typing import Annotated
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.estimation.repeatability import Repeatability
+from catseye.estimation.repeatability import repeatability as analysed
+from catseye.records.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.record import Within
+from catseye.reduction.calibrations.calibration import Calibration, Decision
+from catseye.reduction.calibrations.kind import Kind, provenance, quantities
+
+KIND = "repeatability"
+MICROMETRE = 1e-3 * MILLIMETRE
+
+
+class RepeatabilitySheet(Sheet):
+    """Sheet of a repeatability test.
+
+    test_level   of the F test that the sets agree
+    """
+
+    test_level: Annotated[float, Within(0, 0.5, above=True)] = 0.05
+
+
+LAYOUT = Layout(KIND, RepeatabilitySheet, required={"set": TEXT, "range_m": Within(-1e5, 1e5)})
+
+
+def measure_repeatability(readings: Readings, reject: bool = False) -> Calibration:
+    """Standard deviations of a range within and between sets, and whether the sets differ.
+
+    readings   columns set (a day, a pointing, an operator) and range_m, all of one target; sheet RepeatabilitySheet
+    reject     has no effect: wrong readings are left out by a reason in left_out
+
+    Raises ValidityError where the readings do not tell the two scatters apart.
+
+    Source: [ISO19] section 7.4; u of a standard deviation s of v degrees of freedom is s/sqrt(2 v).
+    """
+    from scipy.special import stdtrit
+
+    on = np.flatnonzero(readings.active)
+    value = readings.get("range_m") / MICROMETRE
+    sets = readings.words["set"]
+    for row, name in enumerate(sets):
+        if not name:
+            raise readings.refuse(row, "set is empty (expected a word for it)")
+    found = analysed(value[on], [sets[k] for k in on], level=readings.sheet.test_level)
+    means = dict.fromkeys(sets, float("nan"))  # of a set that is left out as a whole nothing is known
+    means |= {name: float(np.mean([value[k] for k in on if sets[k] == name])) for name in {sets[k] for k in on}}
+    rows = tuple(
+        (sets[k], float(value[k] * MICROMETRE), float(value[k] - means[sets[k]]), float(means[sets[k]] - found.mean),
+         f"left out: {readings.left_out[k]}" if readings.left_out[k] else "used")
+        for k in range(len(readings))
+    )  # fmt: skip
+    keys = [
+        ("repeatability_um", "µm", "standard deviation of a range within its set"),
+        ("between_um", "µm", "standard deviation from set to set beyond that"),
+        ("intermediate_um", "µm", "standard deviation of a range at another time"),
+    ]
+    values, covariance = _deviations(found)
+    number = np.arange(1, len(readings) + 1)
+    return Calibration(
+        kind=KIND,
+        title=f"Repeatability of {readings.sheet.instrument}",
+        provenance=provenance(readings),
+        quantities=quantities(keys, values, covariance),
+        covariance=covariance,
+        columns=("set", "range_m", "within_um", "set_um", "state"),
+        rows=rows,
+        decisions=(
+            Decision(
+                "sets agree: F",
+                found.f,
+                found.f_limit,
+                not found.sets_differ,
+                "the sets differ by more than their readings scatter" if found.sets_differ else "no set stands apart",
+            ),
+        ),
+        degrees_of_freedom=found.degrees_within,
+        notes=(
+            f"mean {found.mean * MICROMETRE:.6f} m, u {found.u_mean:.2g} µm by the scatter alone, of "
+            f"{found.degrees_between} degrees of freedom: {stdtrit(found.degrees_between, 0.975):.2f} u for 95 %",
+        ),
+        curve={
+            "readings": (number[on], value[on] - found.mean),
+            "fit": (number, np.array([means[name] for name in sets]) - found.mean),
+        },
+        axes=("reading", "range less the mean (µm); line: its set"),
+        method="One-way analysis of variance: the scatter of readings about the mean of their set, and of the sets' "
+        "means beyond what that explains.",
+        record={key: float(v) for (key, *_), v in zip(keys, values, strict=True)},
+    )
+
+
+def _deviations(found: Repeatability) -> tuple[np.ndarray, np.ndarray]:
+    """Within, between and intermediate standard deviation, and their covariance to first order.
+
+    The mean squares are independent, each of variance 2 s^4 / v; between^2 is their difference over the size of a set.
+    """
+    within, between = found.within**2, found.between**2
+    size = found.usual  # readings a set that count
+    squares = np.array([within, found.f * within])
+    variance = np.diag(2.0 * squares**2 / [found.degrees_within, found.degrees_between])
+    by_square = np.array([[1.0, 0.0], [-1.0 / size, 1.0 / size], [1.0 - 1.0 / size, 1.0 / size]])
+    values = np.array([found.within, found.between, found.intermediate])
+    covariance = by_square @ variance @ by_square.T
+    size_of = values.copy()
+    if between == 0.0:  # its square is uncertain all the same, its root as the root of that
+        size_of[1] = 0.5 * covariance[1, 1] ** 0.25
+    slope = 0.5 / size_of
+    return values, covariance * np.outer(slope, slope)
+
+
+RECIPE = Kind("scatter of ranges within and between sets", LAYOUT, measure_repeatability)

@@ -1,0 +1,466 @@
+"""From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.adjustment import CONVERGED, Fit, Solution, adjust
+from catseye.estimation.observations import Linear, Observations
+from catseye.estimation.robust import CHECKED, adjust_robustly
+from catseye.records.campaign import Campaign
+from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
+from catseye.reduction.epoch.dish import dish_advice
+from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.ranges import Electronics, Phases, Progress
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
+from catseye.reduction.epoch.unknowns import (
+    AIR,
+    APPROXIMATE,
+    FIXED_POINT,
+    HEADS,
+    SOUND,
+    THERMOMETERS,
+    ZEROS,
+    Network,
+    build_network,
+)
+from catseye.reduction.site.places import Place
+
+PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
+TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
+SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
+SETTLED_U = 0.01  # or than this share of its standard uncertainty
+UNSUSPICIOUS = 1.5  # variance factor, beyond which somebody is wrong though none stands out
+STEEP = 0.03  # °C/m between the stations, beyond which the thermometers are doubted
+
+
+@dataclass(frozen=True, eq=False)
+class RangeShots:
+    """Every target shot that has a phase, one row a shot, sorted by ranger; lengths in metres.
+
+    shot              index into the campaign's shots
+    ranger, target    names
+    phase             rad, the target's phase after the electronics' at that instant, [0, 2 pi)
+    electronics       rad, phase of the electronics at that instant
+    cycles, margin    whole half wavelengths and how far the coarse length was from another number
+    refractivity      n_g - 1 along the path
+    incidence         rad, on a prism's face; 0 for others
+    glass, obliquity  Pc (with what was estimated of it) and dPc, metres
+    zero, leakage     estimated corrections of the ranger's zero and of the rest of its leakage, to the range
+    head              what the mirror's axes, the coupling of amplitude to phase and cyclic terms add to the range
+    range_            distance scan point to target as this shot gives it, all corrections applied
+    u_range           its standard uncertainty: noise, electronics and path; systematic parameters not counted
+    residual          range_ minus the adjusted distance
+    standardised      test statistic of the adjustment
+    redundancy        of the adjustment
+    detectable        smallest error that a test at the level 0.1 % finds four times in five, m; rejection at |w| = 3.5
+                      asks for 5 % more
+    used              took part
+    thin              its whole cycles are not beyond doubt: what all other lines and the records predict of this range
+                      misses it by so much, or is so uncertain, that misfit and five standard uncertainties reach a
+                      quarter wavelength; repeats on one line share their cycles and do not check each other
+    """
+
+    shot: np.ndarray
+    ranger: tuple[str, ...]
+    target: tuple[str, ...]
+    phase: np.ndarray
+    electronics: np.ndarray
+    cycles: np.ndarray
+    margin: np.ndarray
+    refractivity: np.ndarray
+    incidence: np.ndarray
+    glass: np.ndarray
+    obliquity: np.ndarray
+    zero: np.ndarray
+    leakage: np.ndarray
+    head: np.ndarray
+    range_: np.ndarray
+    u_range: np.ndarray
+    residual: np.ndarray
+    standardised: np.ndarray
+    redundancy: np.ndarray
+    detectable: np.ndarray
+    used: np.ndarray
+    thin: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """The adjusted network.
+
+    points       names in order; places their records where they can be ranged to (fixed points are no places)
+    x            (points, 3) m, ground frame
+    covariance   (3 points, 3 points) m^2, order x y z of each point
+    start        (points, 3) m, where the adjustment began
+    shots        used shots at each point, fired there or from there
+    ranges       every shot with a phase
+    zeros        ranger: correction to its range, m, and standard uncertainty
+    heads        how far each effect of a head is off its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
+    leakage      ranger: what is left of its leakage, V (real, imaginary)
+    air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
+    sound        line: what it is found to read too warm, °C, and u; for lines of path_temperatures.csv
+    refractivity_ppm   mean group refractivity over the used paths
+    variance_factor, degrees_of_freedom   of everything but the typed positions
+    fits         of all groups, for reports
+    notes        what a person should know, one line each
+    unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
+    """
+
+    points: tuple[str, ...]
+    places: dict[str, Place]
+    x: np.ndarray
+    covariance: np.ndarray
+    start: np.ndarray
+    shots: np.ndarray
+    ranges: RangeShots
+    zeros: dict[str, tuple[float, float]]
+    heads: dict[str, tuple[float, float]]
+    leakage: dict[str, tuple[float, float]]
+    air: dict[str, tuple[float, float]]
+    refractivity_ppm: float
+    variance_factor: float
+    degrees_of_freedom: float
+    status: str
+    fits: tuple[Fit, ...]
+    notes: tuple[str, ...]
+    unresolved: dict[int, str]
+    sound: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def index(self, name: str) -> int:
+        """Row of a point."""
+        return self.points.index(name)
+
+    def block(self, names: Sequence[str]) -> np.ndarray:
+        """Covariance (3k, 3k) of some points, in the order given."""
+        columns = (3 * np.array([self.index(n) for n in names], dtype=int)[:, None] + np.arange(3)).ravel()
+        return self.covariance[np.ix_(columns, columns)]
+
+
+def adjust_coordinates(
+    campaign: Campaign,
+    phases: Phases,
+    electronics: dict[str, Electronics],
+    settings: Settings,
+    progress: Progress | None = None,
+) -> Coordinates:
+    """Coordinates of everything that was ranged to or from, with full covariance.
+
+    Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
+    until they no longer change. Wrong shots are searched for in the first pass, and in the second once more with what
+    the dish then says of its own prisms; later passes keep the choice. Before the first pass `resolve_cycles` looks
+    after points that are typed too badly for the nearest integer.
+
+    Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
+    n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
+    """
+    resolved = resolve_cycles(campaign, phases, electronics, settings, progress)
+    network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings)
+    if not network.rangers:
+        why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
+        raise InputError(f"shots.csv: {why}; nothing to adjust")
+    solution, shots = settle_network(network, resolved.starts, progress)
+    return coordinates_of(network, solution, shots, resolved)
+
+
+def settle_network(
+    network: Network,
+    starts: Mapping[str, np.ndarray],
+    progress: Progress | None = None,
+    *,
+    keep: float = 0.0,
+    predicted: bool = False,
+) -> tuple[Solution, list[tuple[ShotGroup, ShotParts]]]:
+    """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
+
+    network   with priors for whatever its shots do not hold
+    starts    point: (3,) m, or parameters by the name in `layout.at`, where to begin instead of the layout's start
+    keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
+    predicted the priors know where everything is to a few of the shots' sigmas: wrong shots are searched for only where
+              one stands out, since none can hide behind another
+
+    Raises EstimationError where it finds no answer.
+    """
+    layout, settings = network.layout, network.settings
+    x = np.array(layout.start)
+    for name, where in starts.items():
+        if name in layout.at:
+            x[layout.columns(name, len(where))] = where
+    free = np.array(layout.free)
+    points = [layout.columns(name) for name in network.places if name in layout.at]
+    coordinates = np.concatenate(points)
+    active, solution = None, None
+    advice: list[Linear] = []
+    for turn in range(PASSES):
+        if progress is not None:
+            progress("adjustment", turn, PASSES)
+        shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
+        groups: list[Observations] = [group for group, _ in shots] + network.priors
+        removable = [
+            np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS, SOUND))
+            for i, g in enumerate(groups)
+        ]
+        before = x
+        if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
+            solution = adjust(x, groups, free=free, names=layout.names)
+            predicted = _unsuspicious(solution, removable, settings.critical)
+            active = None
+        if turn < TESTED and not predicted:
+            solution = adjust_robustly(
+                x,
+                groups,
+                removable,
+                points=points,
+                advice=advice,
+                free=free,
+                active=active,
+                names=layout.names,
+                critical=settings.critical,
+            )
+        elif turn >= TESTED:
+            solution = adjust(x, groups, free=free, active=active, names=layout.names)
+        assert solution is not None
+        x, active = solution.require_converged().x, [f.active for f in solution.fits]
+        if not turn:
+            advice = dish_advice(network, x, solution.covariance)
+        moved = np.abs(x - before)[coordinates]
+        u = np.sqrt(np.diag(solution.covariance)[coordinates])
+        if turn and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
+            break
+    else:
+        raise EstimationError(
+            f"not settled: cycles, air and incidence still move {layout.names[coordinates[np.argmax(moved)]]} by "
+            f"{moved.max() / MILLIMETRE:.3f} mm after {PASSES} passes; check its typed position"
+        )
+    if progress is not None:
+        progress("adjustment", PASSES, PASSES)
+    assert solution is not None
+    return solution, shots
+
+
+def _unsuspicious(solution: Solution, removable: Sequence[np.ndarray], critical: float) -> bool:
+    """Whether every observation that may be wrong passes its test by half a sigma, and all together theirs."""
+    if not solution.solved or solution.status != CONVERGED:
+        return False
+    large = [np.abs(f.standardised[may]) > critical - 0.5 for f, may in zip(solution.fits, removable, strict=True)]
+    factor, _ = solution.variance_factor([f.name for f in solution.fits if f.name != APPROXIMATE])
+    return not any(each.any() for each in large) and factor < UNSUSPICIOUS
+
+
+def coordinates_of(
+    network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]], resolved: Resolved
+) -> Coordinates:
+    """What an adjusted network says of points, ranges, heads and air.
+
+    network, solution, shots   as `settle_network` took and gave them
+    resolved                   what was known of whole cycles before
+    """
+    layout, campaign = network.layout, network.campaign
+    names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
+    columns = np.concatenate([layout.columns(n) for n in names])
+    ranges = _ranges(network, solution, shots)
+    count = dict.fromkeys(names, 0)
+    for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
+        count[ranger] += int(used)
+        count[target] += int(used)
+    judged = [f.name for f in solution.fits if f.name != APPROXIMATE]
+    factor, degrees = solution.variance_factor(judged)
+
+    def estimate(column: int) -> tuple[float, float]:
+        return float(solution.x[column]), float(np.sqrt(solution.covariance[column, column]))
+
+    every = {n: estimate(layout.at[AIR] + i) for i, n in enumerate(network.field.names)}
+    sound = {line.name: every[line.name] for line in network.field.lines}
+    air = {n: value for n, value in every.items() if n not in sound}
+    leakage_at = {n: layout.columns(f"leakage {n}", 2) for n in network.rangers}
+    used_paths = ranges.refractivity[ranges.used]
+    return Coordinates(
+        points=tuple(names),
+        places=network.places,
+        x=solution.x[columns].reshape(-1, 3),
+        covariance=solution.covariance[np.ix_(columns, columns)],
+        start=np.array(layout.start)[columns].reshape(-1, 3),
+        shots=np.array([count[n] for n in names]),
+        ranges=ranges,
+        heads={
+            layout.names[column]: estimate(column)
+            for n in network.rangers
+            for unknown in head_unknowns(campaign, n)
+            for column in layout.columns(unknown.name, len(unknown.parts))
+        },
+        zeros={n: estimate(layout.at[f"zero {n}"]) for n in network.rangers},
+        leakage={n: (float(solution.x[c[0]]), float(solution.x[c[1]])) for n, c in leakage_at.items()},
+        air=air,
+        refractivity_ppm=float(used_paths.mean() / PPM) if len(used_paths) else float("nan"),
+        variance_factor=factor,
+        degrees_of_freedom=degrees,
+        status=solution.status,
+        fits=solution.fits,
+        notes=(
+            *_notes(network, solution, air, count),
+            *_sound_notes(network, solution, ranges, sound),
+            *_losses(ranges),
+            *resolved.notes,
+            *_thin_notes(ranges),
+        ),
+        unresolved=resolved.rejected,
+        sound=sound,
+    )
+
+
+def _ranges(network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]]) -> RangeShots:
+    x, layout, parts = solution.x, network.layout, [p for _, p in shots]
+    fits = solution.fits[: len(parts)]
+    zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []
+    quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
+    for (group, part), fit in zip(shots, fits, strict=True):
+        n = 1.0 + part.refractivity
+        own_zero = np.full(len(n), x[layout.at[f"zero {part.name}"]])
+        at = x[layout.at[part.name] + np.arange(3)]
+        to = np.array([x[layout.columns(t)] for t in part.target])
+        zero.append(own_zero)
+        leakage.append(-(part.leakage_slope @ x[layout.columns(f"leakage {part.name}", 2)]) / n)
+        rest = [x[layout.at[f"glass {t}"]] if f"glass {t}" in layout.at else 0.0 for t in part.target]
+        glass.append(part.glass + np.array(rest))
+        residual.append(fit.residual / n)
+        range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
+        u_range.append(fit.sigma / n)
+        detectable.append(fit.detectable_error / n)
+        error, u = line_errors(group, part.target, fit, solution)
+        thin.append(np.abs(error) + KEPT * u >= quarter)
+    join = np.concatenate
+    return RangeShots(
+        shot=join([p.electronics.shots for p in parts]),
+        ranger=tuple(p.name for p in parts for _ in p.target),
+        target=tuple(t for p in parts for t in p.target),
+        phase=join([p.phase for p in parts]),
+        electronics=join([p.electronics.phase for p in parts]),
+        cycles=join([p.cycles for p in parts]),
+        margin=join([p.margin for p in parts]),
+        refractivity=join([p.refractivity for p in parts]),
+        incidence=join([p.incidence for p in parts]),
+        glass=join(glass),
+        obliquity=join([p.obliquity for p in parts]),
+        zero=join(zero),
+        leakage=join(leakage),
+        head=join([p.head.at(x) for p in parts]),
+        range_=join(range_),
+        u_range=join(u_range),
+        residual=join(residual),
+        standardised=join([f.standardised for f in fits]),
+        redundancy=join([f.redundancy for f in fits]),
+        detectable=join(detectable),
+        used=join([f.active for f in fits]),
+        thin=join(thin),
+    )
+
+
+def _thin_notes(ranges: RangeShots) -> list[str]:
+    """Points on which the whole cycles of used shots hang on little."""
+    target = np.array(ranges.target)
+    notes = []
+    for name in sorted(set(ranges.target)):
+        mine = (target == name) & ranges.used
+        doubtful = mine & ranges.thin
+        if doubtful.any():
+            notes.append(
+                f"{name}: the whole cycles of {doubtful.sum()} of its {mine.sum()} shots are not beyond doubt: without "
+                "each, position and other shots do not say its range to a quarter wavelength at five sigma"
+            )
+    return notes
+
+
+def _losses(ranges: RangeShots) -> list[str]:
+    """Targets that lost all shots, or hang on one that no other checks; rangers that lost most of theirs."""
+    notes = []
+    target = np.array(ranges.target)
+    for name in sorted(set(ranges.target)):
+        mine = target == name
+        lost, alone = mine & ~ranges.used, mine & ranges.used & (ranges.detectable >= CHECKED * ranges.u_range)
+        if not (mine & ranges.used).any():
+            notes.append(
+                f"{name}: none of its {mine.sum()} shots fits the others and its typed position: its coordinates here "
+                "are not measured; check its typed position or say how bad it is (u_position_mm)"
+            )
+        elif lost.any() and alone.any():
+            notes.append(
+                f"{name}: {lost.sum()} of its {mine.sum()} shots contradict the rest and nothing checks {alone.sum()} "
+                "of those left: it may be further off than its uncertainty says; range it again"
+            )
+    ranger = np.array(ranges.ranger)
+    for name in sorted(set(ranges.ranger)):
+        mine = ranger == name
+        if mine.sum() > 2 and (mine & ~ranges.used).sum() > mine.sum() / 2:
+            notes.append(
+                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: rather its survey, its "
+                "mirror sheet or its samples than light from elsewhere"
+            )
+    return notes
+
+
+def _notes(
+    network: Network, solution: Solution, air: dict[str, tuple[float, float]], count: dict[str, int]
+) -> list[str]:
+    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
+    notes = []
+    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
+            names = [network.layout.names[c] for c in np.ravel(group.columns).tolist()]
+        if fit.name == THERMOMETERS:
+            for name, active in zip(names, fit.active, strict=True):
+                station = name.removeprefix(f"{AIR} ")
+                value, u = air[station]
+                if not active:
+                    notes.append(f"{station}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+        if fit.name == ZEROS:
+            for name, active, off, u in zip(names, fit.active, fit.residual, fit.sigma, strict=True):
+                ranger = name.removeprefix("zero ")
+                if not active:
+                    notes.append(
+                        f"{ranger}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
+                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(ranger).zp}"
+                    )
+        if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
+            worst = int(np.argmax(np.abs(fit.standardised)))
+            called = network.layout.names[int(np.ravel(group.columns)[worst])]
+            notes.append(
+                f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
+                f"{network.settings.critical}); check the sheet's value and u"
+            )
+    steepest = network.field.steepest(np.array([air[n][0] for n in network.field.stations]))
+    if abs(steepest) > STEEP:
+        notes.append(
+            f"the stations' thermometers differ by {steepest:+.3f} °C a metre of height: a strong inversion, "
+            "or one lies where no benchmark path passes"
+        )
+    typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
+    moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
+    unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
+    usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
+    wrong = {
+        unit.get(n, n): d
+        for n, d in zip(typed, moved, strict=True)
+        if d > 4.0 * max(usual, network.places[n].u_start or 0.0)
+    }
+    notes += [
+        f"{n}: its typed position is {d / MILLIMETRE:.0f} mm off, the others' some {np.median(moved) / MILLIMETRE:.0f}"
+        for n, d in wrong.items()
+    ]
+    return notes
+
+
+def _sound_notes(
+    network: Network, solution: Solution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
+) -> list[str]:
+    """What each sounded line did to the index of its shots, and whether the ranges believe it."""
+    w = next((f.standardised for f in solution.fits if f.name == SOUND), np.zeros(0))
+    mjd = network.campaign.shots.mjd_utc[ranges.shot]
+    pairs = [frozenset(pair) for pair in zip(ranges.ranger, ranges.target, strict=True)]
+    return [
+        line.note(mjd[[pair == line.ends for pair in pairs]], sound[line.name], w_line, network.settings.critical)
+        for line, w_line in zip(network.field.lines, w, strict=True)
+    ]

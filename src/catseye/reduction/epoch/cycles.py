@@ -1,0 +1,264 @@
+"""Whole cycles where a typed position is too bad for the nearest integer: found jointly from all rangers, or refused.
+
+A shot's nearest integer is safe while misfit and five standard uncertainties of its coarse length stay under a quarter
+wavelength. Shots that keep this are adjusted first; what they and the records (benchmarks, triplets' dimensions) then
+say of the others may make those safe. Points that are still known too badly are searched for with `ambiguity`, against
+the stations as adjusted, round after round: rangers of the feed arm first, then what only these have seen.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
+from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.ambiguity import AmbiguityStatus, Located
+from catseye.estimation.observations import Observations
+from catseye.estimation.robust import adjust_robustly
+from catseye.estimation.rows import full_jacobian
+from catseye.records.campaign import Campaign
+from catseye.reduction.epoch.cycle_search import Scene, search, spread
+from catseye.reduction.epoch.ranges import Electronics, Phases, Progress
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.shots import ShotGroup, shot_group
+from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, Network, build_network
+from catseye.reduction.site.motion import Motion
+
+KEPT = 5.0  # standard uncertainties of misfit that the margin must be worth
+ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
+MANY = 6  # points from which one note stands for all
+ROUNDS = 8  # cap of rounds; each makes a point safe, or is the last
+
+
+@dataclass(frozen=True, eq=False)
+class Resolved:
+    """What is known before the first pass of the adjustment.
+
+    starts     point: (3,) m, where the adjustment shall begin instead of the typed position
+    rejected   index into the campaign's shots: why its whole cycles cannot be known
+    notes      one line a point
+    """
+
+    starts: dict[str, np.ndarray]
+    rejected: dict[int, str]
+    notes: tuple[str, ...]
+
+
+def resolve_cycles(
+    campaign: Campaign,
+    phases: Phases,
+    electronics: dict[str, Electronics],
+    settings: Settings,
+    progress: Progress | None = None,
+    *,
+    motion: Motion | None = None,
+) -> Resolved:
+    """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
+
+    campaign, phases, electronics, settings, motion   as for `adjust_coordinates`
+    progress                                  called with (what, done, of how many)
+
+    Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
+    Raises EstimationError where the safe shots alone find no answer.
+
+    Source: the law of `signal.cycles`; search by [TEUNISSEN95], see `estimation.ambiguity`.
+    """
+    network = build_network(campaign, phases, electronics, settings, motion=motion)
+    doubtful = doubtful_points(network)
+    ends = {int(k): {name, campaign.shots.target[k]} for name, e in electronics.items() for k in e.shots}
+    waiting = {k for k, both in ends.items() if both & doubtful}
+    if not waiting:
+        return Resolved({}, {}, ())
+    x = np.array(network.layout.start)
+    asked = frozenset(doubtful)
+    last: dict[str, Located] = {}
+    found_as: dict[str, Located] = {}
+    for turn in range(ROUNDS):
+        if progress is not None:
+            progress("whole cycles", turn, ROUNDS)
+        scene = _adjusted(network, x, waiting)
+        x = scene.solution.x
+        safe = _safe(scene, waiting)
+        waiting -= safe
+        placed = {n for n in doubtful if not _too_wide(network, spread(scene, n))}
+        doubtful -= placed
+        found = set()
+        for name in sorted(doubtful & {n for k in waiting for n in ends[k]}):
+            mine = {k for k in waiting if name in ends[k] and not (ends[k] - {name}) & doubtful}
+            if not mine:
+                continue
+            last[name] = search(scene, name, mine)
+            if last[name].status is AmbiguityStatus.FOUND:
+                found.add(name)
+        for name in found:
+            x[network.layout.columns(name)] = last[name].x
+            found_as[name] = last[name]
+        doubtful -= found
+        waiting = {k for k in waiting if ends[k] & doubtful}  # wrong ones among the others show in the adjustment
+        if not waiting or not (found or safe or placed):
+            break
+    if progress is not None:
+        progress("whole cycles", ROUNDS, ROUNDS)
+    lost = sorted({name for k in waiting for name in ends[k] & doubtful})
+    starts = {name: x[network.layout.columns(name)] for name in sorted(asked)}  # a lost one may have safe shots as well
+    rejected = {k: _reason(network, settings, sorted(ends[k] & doubtful), last) for k in sorted(waiting)}
+    notes = [*_found_notes(network, settings, found_as), *_lost_notes(network, settings, lost, last)]
+    return Resolved(starts, rejected, tuple(notes))
+
+
+def doubtful_points(network: Network) -> set[str]:
+    """Typed points whose uncertainty does not keep five standard uncertainties within a quarter wavelength.
+
+    So are those that contradict a certified distance, whatever they claim.
+    """
+    usual, places = network.settings.u_position, network.places
+    wide = {n for n, p in places.items() if p.typed and _too_wide(network, p.u_typed(usual) ** 2 * np.eye(3))}
+    for b in network.campaign.benchmarks:
+        if b.target in places and b.ranger in places:
+            ends = places[b.target], places[b.ranger]
+            typed = [p for p in ends if p.typed]
+            miss = float(np.linalg.norm(ends[0].start - ends[1].start)) - b.certified_distance_mm * MILLIMETRE
+            u = float(np.linalg.norm([b.u_mm * MILLIMETRE, *(p.u_typed(usual) for p in typed)]))
+            wide |= {p.name for p in typed if abs(miss) > KEPT * ROUNDED * u}
+    return wide
+
+
+def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[str, Electronics]:
+    """The electronics at the shots that are left; a ranger without any stays, empty."""
+    left = {}
+    for name, e in electronics.items():
+        keep = np.array([int(k) not in out for k in e.shots], dtype=bool)
+        left[name] = replace(
+            e,
+            shots=e.shots[keep],
+            phase=e.phase[keep],
+            covariance=e.covariance[np.ix_(keep, keep)],
+            reference=e.reference[keep],
+        )
+    return left
+
+
+def line_errors(
+    group: ShotGroup, targets: tuple[str, ...], fit: Fit, solution: Solution
+) -> tuple[np.ndarray, np.ndarray]:
+    """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
+
+    Used repeats on one line come from one coarse length, so that their whole cycles are wrong together: the error they
+    have in common is e'Pv / e'P_v e, e being 1 for them, as `adjust` has it for a single shot.
+    """
+    error, u = fit.estimated_error.copy(), fit.detectable_error / NONCENTRALITY
+    on = np.flatnonzero(fit.active)
+    lines = {name: np.array([targets[k] == name for k in on], dtype=bool) for name in {targets[k] for k in on}}
+    repeated = [mine for mine in lines.values() if mine.sum() > 1]
+    if repeated:
+        weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
+        weighed = weight @ full_jacobian(group, solution.x)[on]
+        rest = weight @ fit.residual[on]
+        for mine in repeated:
+            own, seen = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
+            visible = max(own - seen @ solution.covariance @ seen, 1e-12 * own)
+            error[on[mine]], u[on[mine]] = rest[mine].sum() / visible, visible**-0.5
+    return error, u
+
+
+def _too_wide(network: Network, covariance: np.ndarray) -> bool:
+    """Whether a point is known too badly, in its worst direction, for the nearest integer."""
+    quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
+    return bool(KEPT * np.sqrt(np.linalg.eigvalsh(covariance)[-1]) > ROUNDED * quarter)
+
+
+def _adjusted(network: Network, x: np.ndarray, waiting: set[int]) -> Scene:
+    """The network adjusted without the shots that wait, wrong ones left out; all parameters with covariance."""
+    electronics = without_shots(network.electronics, waiting)
+    used: set[int] = set()
+    part = build_network(network.campaign, network.phases, electronics, network.settings, motion=network.motion)
+    if part.rangers:
+        column = {name: i for i, name in enumerate(network.layout.names)}
+        at = np.array([column[name] for name in part.layout.names])
+        pairs = [shot_group(part, name, x[at]) for name in part.rangers]
+        groups: list[Observations] = [group for group, _ in pairs] + part.priors
+        removable = [
+            np.full(len(g.observed), i < len(pairs) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
+        ]
+        solution = adjust_robustly(
+            x[at],
+            groups,
+            removable,
+            points=[part.layout.columns(n) for n in part.places if n in part.layout.at],
+            free=np.array(part.layout.free),
+            names=part.layout.names,
+            critical=network.settings.critical,
+        ).require_converged()
+        x = x.copy()
+        x[at] = solution.x
+        used = {
+            int(k)
+            for fit, (_, p) in zip(solution.fits, pairs, strict=False)
+            for k, on in zip(p.electronics.shots, fit.active, strict=True)
+            if on
+        }
+    pairs = [shot_group(network, name, x) for name in network.rangers]
+    active = [np.isin(p.electronics.shots, sorted(used)) for _, p in pairs]
+    active += [np.ones(len(g.observed), dtype=bool) for g in network.priors]
+    whole = adjust(
+        x,
+        [*(g for g, _ in pairs), *network.priors],
+        free=np.array(network.layout.free),
+        active=active,
+        names=network.layout.names,
+    ).require_converged()
+    pairs = [shot_group(network, name, whole.x) for name in network.rangers]
+    return Scene(network, [g for g, _ in pairs], [p for _, p in pairs], whole)
+
+
+def _safe(scene: Scene, waiting: set[int]) -> set[int]:
+    """Waiting shots whose range is predicted so well by all the others that the nearest integer is safe."""
+    half = 0.5 * SPEED_OF_LIGHT / scene.network.campaign.site.ranging.modulation_hz
+    safe = set()
+    for fit, part in zip(scene.solution.fits, scene.parts, strict=False):
+        u = fit.detectable_error / NONCENTRALITY
+        misfit = fit.estimated_error - half * np.rint(fit.estimated_error / half)  # cycles were those of an older place
+        kept = np.abs(misfit) + KEPT * u < 0.5 * half
+        safe |= {int(k) for k, ok in zip(part.electronics.shots, kept, strict=True) if ok}
+    return safe & waiting
+
+
+def _u_mm(network: Network, settings: Settings, name: str) -> float:
+    """Standard uncertainty of each coordinate as typed."""
+    return network.places[name].u_typed(settings.u_position) / MILLIMETRE
+
+
+def _found_notes(network: Network, settings: Settings, found: dict[str, Located]) -> list[str]:
+    if len(found) > MANY:
+        least = min(found, key=lambda name: found[name].discrimination)
+        return [
+            f"{len(found)} points known too badly for the nearest integer: whole cycles found jointly; least sure "
+            f"{least}, {_next(found[least])}"
+        ]
+    return [
+        f"{name}: position known to {_u_mm(network, settings, name):.0f} mm only; whole cycles found "
+        f"jointly from {len(one.cycles)} shots{', one of them left out' * (one.left_out >= 0)}, {_next(one)}"
+        for name, one in sorted(found.items())
+    ]
+
+
+def _next(found: Located) -> str:
+    if not np.isfinite(found.discrimination):
+        return "no other candidate"
+    return f"next candidate at least {np.sqrt(found.discrimination):.0f} sigma worse"
+
+
+def _lost_notes(network: Network, settings: Settings, lost: list[str], last: dict[str, Located]) -> list[str]:
+    if len(lost) > MANY:
+        return [
+            f"{len(lost)} points have shots whose whole cycles are unknown, see rejected: {', '.join(lost[:MANY])} ..."
+        ]
+    return [_reason(network, settings, [name], last) for name in lost]
+
+
+def _reason(network: Network, settings: Settings, names: list[str], last: dict[str, Located]) -> str:
+    """Why the whole cycles of a shot are unknown, by the points that it hangs on."""
+    name = names[0]
+    u = _u_mm(network, settings, name)
+    why = last[name].text if name in last else "the other ends of its shots are known as badly; survey it better"
+    return f"whole cycles unknown: {name} is typed to {u:.0f} mm only; {why}"

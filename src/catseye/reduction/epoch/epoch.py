@@ -1,0 +1,113 @@
+"""The main job: a campaign's samples to coordinates, pose and surface."""
+
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.reduction.epoch.coordinates import Coordinates, adjust_coordinates
+from catseye.reduction.epoch.dew import dew_risk
+from catseye.reduction.epoch.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases, walk_notes
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.surface import Surface, fit_surface
+from catseye.reduction.site.places import sheet_notes
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """Everything that a campaign gave.
+
+    status     one word a shot, in the campaign's order: "used", "reference", or what its reason begins with
+    rejected   shot id: reason; reference shots included
+    notes      what a person should know, one line each
+    """
+
+    campaign: Campaign
+    settings: Settings
+    phases: Phases
+    electronics: dict[str, Electronics]
+    coordinates: Coordinates
+    surface: Surface | None
+    status: tuple[str, ...]
+    rejected: dict[int, str]
+    notes: tuple[str, ...]
+
+
+def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress: Progress | None = None) -> Reduction:
+    """Coordinates, pose and surface of one campaign during which nothing moved.
+
+    campaign   as `read_campaign` gives it
+    settings   assumptions beyond the records (default: those of the layout)
+    progress   called with (what, done, of how many)
+
+    Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
+    """
+    settings = settings or Settings()
+    phases = measure_phases(campaign, settings, progress)
+    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+        electronics, wrong = follow_electronics(campaign, phases)
+        coordinates = adjust_coordinates(campaign, phases, electronics, settings, progress)
+        surface, missing = fit_surface(campaign, coordinates)
+    reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved
+    ranges = coordinates.ranges
+    for row, k in enumerate(ranges.shot):
+        if not ranges.used[row]:
+            reasons[int(k)] = _misfit(coordinates, row, settings)
+    status = tuple(
+        reasons[k].partition(":")[0] if k in reasons else "reference" if target == REFERENCE else "used"
+        for k, target in enumerate(campaign.shots.target)
+    )
+    notes = [
+        *coordinates.notes,
+        *sheet_notes(campaign),
+        *_weak_rangers(campaign, phases),
+        *walk_notes(campaign, phases, wrong),
+        *dew_risk(campaign, surface_minus_air_c=settings.surface_minus_air_c).notes,
+        *([missing] if missing else []),
+    ]
+    return Reduction(
+        campaign,
+        settings,
+        phases,
+        electronics,
+        coordinates,
+        surface,
+        status,
+        {int(campaign.shots.shot[k]): reasons[k] for k in sorted(reasons)},
+        tuple(notes),
+    )
+
+
+def _misfit(coordinates: Coordinates, row: int, settings: Settings) -> str:
+    ranges = coordinates.ranges
+    error, w = ranges.residual[row], ranges.standardised[row]
+    if abs(w) <= settings.critical:
+        return (
+            f"undecided: this shot and another on {ranges.target[row]} contradict each other, and nothing says which "
+            "is wrong; both are left out"
+        )
+    return (
+        f"reflected: range {abs(error) * 1e3:.3f} mm too {'long' if error > 0 else 'short'} "
+        f"for the adjusted points (w {w:.1f}, limit {settings.critical}): light from elsewhere in the return"
+    )
+
+
+def _weak_rangers(campaign: Campaign, phases: Phases) -> list[str]:
+    """Rangers whose returns are a small part of what the others get."""
+    usual: dict[str, float] = {}
+    for name in campaign.rangers:
+        lit = sorted(
+            float(phases.amplitude[k])
+            for k, (ranger, target) in enumerate(zip(campaign.shots.ranger, campaign.shots.target, strict=True))
+            if ranger == name and target != REFERENCE and not phases.reason[k]
+        )
+        if lit:
+            usual[name] = lit[len(lit) // 2]
+    if len(usual) < 3:
+        return []
+    typical = sorted(usual.values())[len(usual) // 2]
+    return [
+        f"{name} is weak: usual return {value:.2f} V, {100 * value / typical:.0f} % of the others'"
+        for name, value in usual.items()
+        if value < typical / 2.5
+    ]

@@ -1,0 +1,186 @@
+"""What a ranger's own head adds to its ranges beyond zero and leakage, as far as its mirror sheet knows of it.
+
+Three effects, each only where the sheet gives a value or an uncertainty for it:
+    axes        the mirror's axes and the beam do not meet: of target and reference cube, each at its own angles
+    amplitude   the phase grows with ln(amplitude); counted from the ranger's own reference shots, interpolated to the
+                instant of the shot, so that the references themselves need no correction
+    cyclic      a wave of the phase after the electronics'
+The sheet's values are corrected; how far off they may be are parameters of the ranger, shared by all its shots, with
+the sheet's uncertainties as priors (u_axis_mm: the four offsets independent of each other).
+
+A campaign's records carry no encoder counts: a shot is taken as fired in the direct pointing, unless the mirror's
+azimuth limits forbid that and allow the prime one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
+from catseye.errors import ValidityError
+from catseye.geometry.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
+from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
+from catseye.geometry.pointing import Station
+from catseye.records.campaign import Campaign
+from catseye.records.mirror import Mirror
+from catseye.records.refusal import refusal
+from catseye.reduction.site.stations import AXES, station_in
+from catseye.signal.amplitude import amplitude_by_coefficient, amplitude_phase
+from catseye.signal.cyclic import cyclic_design, cyclic_range
+
+UNSAID_ORDERS = 2  # of a cyclic deviation of which the sheet says the uncertainty alone
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """How far an effect's values may be off the sheet's: a parameter of a few parts, expected zero.
+
+    name    "axes ZY101", in the layout
+    parts   of it
+    u       of each, m or rad
+    key     where the sheet says so
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    u: float
+    key: str
+
+
+@dataclass(frozen=True, eq=False)
+class HeadCorrections:
+    """What to add to one ranger's ranges.
+
+    value     (m,) m, by the sheet
+    columns   (m, q) parameters that say how far the sheet is off
+    slopes    (m, q) derivatives of the correction by these, metres a unit
+    """
+
+    value: np.ndarray
+    columns: np.ndarray
+    slopes: np.ndarray
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """(m,) m, by the sheet and the parameters x together."""
+        return self.value + np.sum(self.slopes * x[self.columns], axis=1)
+
+
+def head_unknowns(campaign: Campaign, name: str) -> list[Unknown]:
+    """The parameters of a ranger's head; none for a sheet that knows nothing of these effects.
+
+    Raises InputError for a feed-arm ranger whose sheet speaks of its axes while feedarm.toml does not say how its mount
+    is turned.
+    """
+    mirror = campaign.mirror_of(name)
+    unknowns = []
+    if mirror.u_axis_mm is not None:
+        mounted(campaign, name)
+        parts = tuple(key.removesuffix("_mm").replace("_", " ") for key in AXES)
+        unknowns.append(Unknown(f"axes {name}", parts, mirror.u_axis_mm * MILLIMETRE, "u_axis_mm"))
+    if mirror.u_amplitude_to_phase_rad is not None:
+        u = mirror.u_amplitude_to_phase_rad
+        unknowns.append(Unknown(f"amplitude {name}", ("",), u, "u_amplitude_to_phase_rad"))
+    if mirror.u_cyclic_mm is not None:
+        orders = range(1, _orders(mirror) + 1)
+        parts = (*(f"cosine {k}" for k in orders), *(f"sine {k}" for k in orders))
+        unknowns.append(Unknown(f"cyclic {name}", parts, mirror.u_cyclic_mm * MILLIMETRE, "u_cyclic_mm"))
+    return unknowns
+
+
+def head_corrections(
+    campaign: Campaign,
+    name: str,
+    at: dict[str, int],
+    *,
+    sight: np.ndarray,
+    phase: np.ndarray,
+    amplitude: np.ndarray,
+    reference_amplitude: np.ndarray,
+    index: np.ndarray,
+) -> HeadCorrections:
+    """Corrections of one ranger's ranges and their derivatives.
+
+    name                 of the ranger
+    at                   first column of each parameter of the adjustment, by name
+    sight                (m, 3) m, ground frame: from the scan point to the target
+    phase                (m,) rad, the target's after the electronics', as measured
+    amplitude            (m,) V, of the target's return
+    reference_amplitude  (m,) V, of the cube's return at that instant
+    index                (m,) group index of the path
+
+    The amplitude's own noise is left out: it adds coefficient^2/2 of the phase's u, at most half a percent.
+
+    Source: [PARKER04] section 5.3 (axes), chapter 6, item 5 (amplitude), 5.2.1 (what makes a cyclic deviation).
+    """
+    mirror = campaign.mirror_of(name)
+    m = len(phase)
+    value, columns, slopes = np.zeros(m), [], []
+    for unknown in head_unknowns(campaign, name):
+        kind = unknown.name.partition(" ")[0]
+        if kind == "axes":
+            change, by = _axes(campaign, name, sight)
+        elif kind == "amplitude":
+            # A phase read too high is a range read too short.
+            per_radian = 0.5 * SPEED_OF_LIGHT / (campaign.site.ranging.modulation_hz * TWO_PI * index)
+            change = per_radian * amplitude_phase(amplitude, reference_amplitude, mirror.amplitude_to_phase_rad)
+            by = per_radian[:, None] * amplitude_by_coefficient(amplitude, reference_amplitude)[:, :1]
+        else:
+            cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
+            change, by = -cyclic_range(phase, cosine, sine), -cyclic_design(phase, _orders(mirror))
+        value = value + change
+        columns.append(np.broadcast_to(at[unknown.name] + np.arange(len(unknown.parts)), by.shape))
+        slopes.append(by)
+    none = np.zeros((m, 0))
+    return HeadCorrections(value, np.concatenate([none.astype(int), *columns], 1), np.concatenate([none, *slopes], 1))
+
+
+def _orders(mirror: Mirror) -> int:
+    return len(mirror.cyclic_cosine_mm) or UNSAID_ORDERS
+
+
+def _axes(campaign: Campaign, name: str, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Correction (m,) and its derivatives (m, 4) by the four offsets: less the target's change, plus the cube's.
+
+    Source: [PARKER04] eq. 2.8 and 2.12 for the mirror's axes, 2.21 and 2.22 for the cube's angles.
+    """
+    station, mirror = mounted(campaign, name), campaign.mirror_of(name)
+    offsets = np.array([getattr(mirror, key) for key in AXES]) * MILLIMETRE
+    target = sight @ station.mirror_from_ground.T
+    prime = only_prime(mirror, direction_angles(target)[0])
+    theta, phi = beam_angles(target, offsets, prime=prime)
+    if np.isnan(phi).any():
+        raise ValidityError(
+            f"{name}: a target lies straight behind its mirror, where no beam reaches it: check the typed position and "
+            "how its mount is turned"
+        )
+    change, slopes = path_change(theta, phi, np.linalg.norm(target, axis=-1), offsets, prime=prime)
+    theta_0, phi_0 = azimuth_angle(mirror.azm_zrg, mirror.na0), elevation_angle(mirror.elv_zrg, mirror.ne0)
+    if abs(phi_0) > np.pi:
+        raise refusal(
+            f"mirrors/{mirror.zp}.toml",
+            f"elv_zrg = {mirror.elv_zrg} turns the mirror's face from the beam, {np.degrees(abs(phi_0)) / 2:.1f} "
+            "degrees (expected at most 25000 counts from ne0, so that axis offsets have a meaning)",
+        )
+    change_0, slopes_0 = path_change(theta_0, phi_0, mirror.d0_mm * MILLIMETRE, offsets)
+    return change_0 - change, slopes_0 - slopes
+
+
+def mounted(campaign: Campaign, name: str) -> Station:
+    """The ranger's mirror as it stands; InputError on the feed arm where feedarm.toml does not say how it is turned."""
+    station, mirror = station_in(campaign, name), campaign.mirror_of(name)
+    if station is not None:
+        return station
+    said = next((key for key in AXES if getattr(mirror, key)), "u_axis_mm")
+    raise refusal(
+        f"mirrors/{mirror.zp}.toml",
+        f"{said} = {getattr(mirror, said)} cannot be applied: {name} is on the feed arm and no record says how its "
+        "mirror is turned (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, mirror_offset_mm, "
+        "beam_x_mm, beam_y_mm, u_axis_mm)",
+    )
+
+
+def only_prime(mirror: Mirror, theta: np.ndarray) -> np.ndarray:
+    """Where the azimuth limits forbid the direct pointing and allow the prime one."""
+
+    low, high, direct = mirror.az_low_limit, mirror.az_high_limit, azimuth_counts(theta, mirror.na0)
+    return ~within(direct, low, high) & (within(direct + HALF_TURN, low, high) | within(direct - HALF_TURN, low, high))

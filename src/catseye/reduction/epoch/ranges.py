@@ -1,0 +1,370 @@
+"""From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import SECONDS_PER_DAY
+from catseye.errors import EstimationError
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.mirror import Mirror
+from catseye.reduction.epoch.settings import Settings
+from catseye.signal.buffers import BufferStatus, inspect_buffers
+from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
+from catseye.signal.cycles import fraction
+from catseye.signal.drift import drift_at, reference_surprise
+from catseye.signal.leakage import subtract_leakage
+from catseye.signal.walk import estimate_walk, walk_test
+
+Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
+
+MRAD_PER_ROOT_HOUR = 1e-3 / 60.0  # rad per root second
+SURPRISE = 5.0  # standard uncertainties by which a reference may miss its neighbours' prediction
+WARM_UP = 0.03  # rad, more allowed at the ends of a ranger's block, where a transient is extrapolated
+BEND = 0.005  # rad, more allowed inside, where only its curvature counts
+REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which something else is in it
+
+
+@dataclass(frozen=True, eq=False)
+class Phases:
+    """What every shot's samples say, in the order of the campaign's shots.
+
+    phasor      V, complex, free of leakage
+    u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter, the two taken as alike
+    u_across    V, of the quadrature that turns the phasor, noise alike in neighbouring cycles allowed for; below 16
+                cycles u_phasor itself
+    offset      V
+    harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
+    largest     V, largest magnitude of a sample
+    reason      why a shot cannot be used, "" where it can
+    """
+
+    phasor: np.ndarray
+    u_phasor: np.ndarray
+    u_across: np.ndarray
+    offset: np.ndarray
+    harmonics: np.ndarray
+    largest: np.ndarray
+    reason: tuple[str, ...]
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """V."""
+        return np.abs(self.phasor)
+
+    @property
+    def phase(self) -> np.ndarray:
+        """rad in [0, 2 pi)."""
+        return fraction(np.angle(self.phasor), 0.0)
+
+    @property
+    def u_phase(self) -> np.ndarray:
+        """rad, from the samples' noise; infinite without a return."""
+        amplitude = self.amplitude
+        return np.divide(self.u_across, amplitude, out=np.full_like(self.u_across, np.inf), where=amplitude > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Electronics:
+    """The drifting phase of one ranger's electronics at its usable target shots.
+
+    shots        (m,) indices into the campaign's shots
+    phase        (m,) rad
+    covariance   (m, m) rad^2, from the noise of the references and the walk between them
+    reference    (m,) V, complex: the reference phasor that the leakage acts on; its magnitude, the cube's return at
+                 that instant, is what amplitude-to-phase coupling counts from
+    """
+
+    shots: np.ndarray
+    phase: np.ndarray
+    covariance: np.ndarray
+    reference: np.ndarray
+
+
+def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | None = None) -> Phases:
+    """Phase and amplitude of every shot, leakage removed, with the reason where a shot shows no light.
+
+    A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
+    leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
+    changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see `signal.buffers`.
+    """
+    shots, adc = campaign.shots, campaign.site.adc
+    n = len(shots.shot)
+    volts_per_code = adc.full_scale_volt / 2 ** (adc.bits - 1)
+    detected = Detected.empty(n)
+    shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
+    done = 0
+    for cycles, samples_per_cycle in shapes:
+        alike = np.flatnonzero((shots.cycles == cycles) & (shots.samples_per_cycle == samples_per_cycle))
+        for start in range(0, len(alike), 64):
+            rows = alike[start : start + 64]
+            samples = campaign.frames[shots.frame[rows], : cycles * samples_per_cycle]
+            detected.put(rows, samples, samples_per_cycle, volts_per_code, adc.bits)
+            done += len(rows)
+            if progress is not None:
+                progress("samples to phases", done, n)
+    mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
+    return judged_phases(
+        detected, shots.cycles, shots.samples_per_cycle, mirrors, settings, lambda a: _usual_amplitude(campaign, a)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Detected:
+    """What synchronous detection found in n buffers, leakage still in it; fields as in `signal.phase.Detection`.
+
+    wrong   why a buffer's samples cannot be believed, "" where they can
+    """
+
+    raw: np.ndarray
+    u_phasor: np.ndarray
+    offset: np.ndarray
+    harmonics: np.ndarray
+    largest: np.ndarray
+    clipped: np.ndarray
+    total: np.ndarray
+    between: np.ndarray
+    wrong: list[str]
+
+    @staticmethod
+    def empty(n: int) -> "Detected":
+        """Room for n buffers."""
+        one, three = np.zeros(n), np.zeros((n, 3))
+        return Detected(
+            np.zeros(n, dtype=complex),
+            one,
+            one.copy(),
+            np.zeros((n, 2)),
+            one.copy(),
+            np.zeros(n, dtype=int),
+            three,
+            three.copy(),
+            [""] * n,
+        )
+
+    def put(
+        self, rows: np.ndarray, samples: np.ndarray, samples_per_cycle: int, volts_per_code: float, bits: int
+    ) -> None:
+        """Detect buffers (b, cycles samples_per_cycle) of one shape into rows (b,)."""
+        ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+        found = seen.detection
+        for k, row in enumerate(rows):
+            if seen.status[k] in (BufferStatus.DROPOUT, BufferStatus.STUCK):
+                self.wrong[row] = seen.text(k)
+        self.total[rows], self.between[rows] = found.scatter.total, found.scatter.between
+        self.raw[rows], self.u_phasor[rows], self.offset[rows] = found.phasor, found.u_phasor, found.offset
+        self.harmonics[rows], self.largest[rows], self.clipped[rows] = found.harmonics, found.largest, found.clipped
+
+
+def judged_phases(
+    detected: Detected,
+    cycles: np.ndarray,
+    samples_per_cycle: np.ndarray,
+    mirrors: Sequence[Mirror],
+    settings: Settings,
+    usual_of: Callable[[np.ndarray], np.ndarray],
+) -> Phases:
+    """Phasors free of leakage, their uncertainties, and why a shot cannot be used.
+
+    detected                     n buffers
+    cycles, samples_per_cycle    (n,)
+    mirrors                      n, the sheets of the heads
+    usual_of                     from amplitudes (n,), V, to what is usual for each; for the text of a blocked one
+    """
+    raw, u_phasor, clipped, largest = detected.raw, detected.u_phasor, detected.clipped, detected.largest
+    n = len(raw)
+    phasor = subtract_leakage(
+        raw,
+        np.array([m.leakage_amplitude_volt for m in mirrors]),
+        np.array([m.leakage_phase_rad for m in mirrors]),
+    )
+    scatter = CycleScatter(cycles, detected.total, detected.between, np.zeros(n, dtype=np.int64))
+    enough = cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
+    u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), u_phasor)
+    usual = usual_of(np.abs(phasor))
+    reason = [
+        why_not(
+            complex(raw[k]),
+            complex(phasor[k]),
+            float(u_phasor[k]),
+            int(clipped[k]),
+            float(largest[k]),
+            (int(cycles[k]), int(samples_per_cycle[k])),
+            mirrors[k],
+            settings,
+            float(usual[k]),
+        )
+        or detected.wrong[k]
+        for k in range(n)
+    ]
+    return Phases(phasor, u_phasor, u_across, detected.offset, detected.harmonics, largest, tuple(reason))
+
+
+def why_not(
+    raw: complex,
+    phasor: complex,
+    u_phasor: float,
+    clipped: int,
+    largest: float,
+    sampling: tuple[int, int],
+    mirror: Mirror,
+    settings: Settings,
+    usual: float,
+) -> str:
+    """Why a buffer's phase cannot be used, "" where it can.
+
+    raw, phasor   V, with leakage in it and without
+    clipped       samples at the converter's end
+    largest       V
+    sampling      cycles and samples a cycle
+    usual         V, for the text
+    """
+    limit = settings.smallest_return * math.hypot(u_phasor, mirror.u_leakage_volt)
+    if clipped:
+        return f"clipped: {clipped} samples at the converter's end ({largest:.2f} V)"
+    if not math.isfinite(limit):
+        return (
+            f"noise unknown: {sampling[0]} cycles of {sampling[1]} samples show no scatter "
+            "(expected at least 2 cycles, or 8 samples)"
+        )
+    if abs(phasor) < limit:
+        return f"blocked: return {abs(phasor):.4f} V, below the limit of {limit:.4f} V (usual {usual:.2f} V)"
+    if abs(raw) < limit:
+        return (
+            f"dead: the samples hold {abs(raw):.4f} V, not even the leakage of "
+            f"{mirror.leakage_amplitude_volt:.4f} V: converter or cable"
+        )
+    return ""
+
+
+def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
+    """Median amplitude of each shot's ranger, reference and target shots apart."""
+    key = np.array([f"{r} {t == REFERENCE}" for r, t in zip(campaign.shots.ranger, campaign.shots.target, strict=True)])
+    usual = np.zeros(len(amplitude))
+    for each in np.unique(key):
+        usual[key == each] = np.median(amplitude[key == each])
+    return usual
+
+
+def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, Electronics], dict[int, str]]:
+    """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
+
+    References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
+    ranger without any good reference cannot range.
+
+    Source: [PARKER04] eqs. 5.12 and 5.13; between references the electronics walk at random by the site's figure.
+    """
+    shots = campaign.shots
+    seconds = (shots.mjd_utc - shots.mjd_utc[0]) * SECONDS_PER_DAY
+    walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR
+    ranger, target = np.array(shots.ranger), np.array(shots.target)
+    usable = np.array([not r for r in phases.reason])
+    variance = np.where(usable, phases.u_phase, 0.0) ** 2
+    rejected: dict[int, str] = {}
+    electronics: dict[str, Electronics] = {}
+    for name in campaign.rangers:
+        mine = ranger == name
+        lit = np.flatnonzero(mine & usable & (target != REFERENCE))
+        references = np.flatnonzero(mine & usable & (target == REFERENCE))
+        references = references[np.argsort(seconds[references], kind="stable")]
+        wrong = _wrong_references(seconds, phases, variance, references, walk)
+        rejected.update(wrong)
+        references = np.array([k for k in references if k not in wrong], dtype=int)
+        if not len(references):
+            rejected.update(
+                {
+                    int(k): f"no reference: {name} has no usable shot on its internal cube, its drift is unknown"
+                    for k in lit
+                }
+            )
+            continue
+        unwrapped = np.unwrap(np.angle(phases.phasor[references]))
+        phase, covariance = drift_at(
+            seconds[references], unwrapped, variance[references], seconds[lit], random_walk=walk
+        )
+        level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
+        electronics[name] = Electronics(lit, phase, covariance, level * np.exp(1j * phase))
+    return electronics, rejected
+
+
+def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> list[str]:
+    """A line where the good references of all rangers together walk otherwise than the site's figure says.
+
+    wrong   references that are left out, indices into the campaign's shots
+
+    Each ranger's first reference is left out too: a warm-up is no walk. Tested at one in a thousand.
+    """
+    shots = campaign.shots
+    good = np.array([t == REFERENCE for t in shots.target]) & np.array([not r for r in phases.reason])
+    good[list(wrong)] = False
+    rows = [np.flatnonzero(good & (np.array(shots.ranger) == name))[1:] for name in campaign.rangers]
+    rows = [r for r in rows if len(r) > 1 and np.ptp(shots.mjd_utc[r]) > 0.0]
+    if not rows:
+        return []
+    told = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
+    k = np.concatenate(rows)
+    references = (
+        (shots.mjd_utc[k] - shots.mjd_utc[0]) * SECONDS_PER_DAY,
+        np.concatenate([np.unwrap(np.angle(phases.phasor[r])) for r in rows]),
+        phases.u_phase[k] ** 2,
+    )
+    series = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+    test = walk_test(*references, random_walk=told * MRAD_PER_ROOT_HOUR, series=series, probability=0.999)
+    if test.passed:
+        return []
+    verdict = f"not by the {told:g} of site.toml: u_range is too {'small' if test.statistic > test.high else 'large'}"
+    try:
+        found = estimate_walk(*references, series=series)
+    except EstimationError:  # the test needs one difference of references, an estimate two
+        return [f"the electronics walk between references, but {verdict}"]
+    if found.random_walk == 0.0:
+        return [f"the electronics show no walk between references beyond their noise, {verdict}"]
+    low, high = (v / MRAD_PER_ROOT_HOUR for v in found.interval())
+    return [
+        f"the electronics walk by {found.random_walk / MRAD_PER_ROOT_HOUR:.1f} mrad per root hour between references "
+        f"(95 %: {low:.1f} to {high:.1f}), {verdict}"
+    ]
+
+
+def _wrong_references(
+    seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
+) -> dict[int, str]:
+    wrong: dict[int, str] = {}
+    usual = float(np.median(phases.amplitude[references])) if len(references) else 0.0
+    for k in references:
+        if len(references) > 2 and abs(phases.amplitude[k] / usual - 1.0) > REFERENCE_AMPLITUDE:
+            wrong[int(k)] = (
+                f"bad reference: return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: "
+                "something else is in the beam"
+            )
+    while True:
+        left = np.array([k for k in references if k not in wrong], dtype=int)
+        if len(left) < 3:
+            return wrong
+        difference, allowed = _surprises(seconds, phases, variance, left, walk)
+        suspects = np.flatnonzero(np.abs(difference) > allowed)
+        if not len(suspects):
+            return wrong
+        # A wrong reference makes its neighbours look wrong too: it is the one without which the others agree best.
+        rest = []
+        for suspect in suspects:
+            d, a = _surprises(seconds, phases, variance, np.delete(left, suspect), walk)
+            rest.append(float(np.max(np.abs(d) / a)))
+        worst = int(suspects[int(np.argmin(rest))])
+        wrong[int(left[worst])] = (
+            f"bad reference: phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
+            f"(allowed {allowed[worst]:.4f})"
+        )
+
+
+def _surprises(
+    seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """How far each of two or more references (in order of time) is off what the others predict, and may be; rad."""
+    phase = np.unwrap(np.angle(phases.phasor[references]))
+    difference, u = reference_surprise(seconds[references], phase, variance[references], random_walk=walk)
+    at_an_end = np.isin(np.arange(len(references)), (0, len(references) - 1))
+    return difference, SURPRISE * u + np.where(at_an_end, WARM_UP, BEND)

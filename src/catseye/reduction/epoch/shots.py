@@ -1,0 +1,211 @@
+"""A ranger's shots as observations: distances in optical metres, with every correction and its derivative."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.estimation.observations import Distances, MovingDistances
+from catseye.optics.prism import obliquity_correction, obliquity_slope
+from catseye.reduction.epoch.head import HeadCorrections, head_corrections
+from catseye.reduction.epoch.ranges import Electronics
+from catseye.reduction.epoch.unknowns import AIR, Network, path_of
+from catseye.reduction.site.places import unit
+from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
+
+ShotGroup = Distances | MovingDistances
+
+
+@dataclass(frozen=True, eq=False)
+class ShotParts:
+    """The pieces of one ranger's ranges, for the record of every correction.
+
+    name, electronics  of the ranger; its other fields have a row a shot
+    target             names
+    phase              rad, the target's after the electronics', as measured
+    cycles, margin     whole half wavelengths and how far the coarse length was from another number, m
+    refractivity       n_g - 1 along the path
+    incidence          rad, on a prism's face
+    glass, obliquity   Pc and dPc, m
+    leakage_slope      (m, 2) m/V, of the observed optical length by the rest of leakage
+    head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
+    """
+
+    name: str
+    electronics: Electronics
+    target: tuple[str, ...]
+    phase: np.ndarray
+    cycles: np.ndarray
+    margin: np.ndarray
+    refractivity: np.ndarray
+    incidence: np.ndarray
+    glass: np.ndarray
+    obliquity: np.ndarray
+    leakage_slope: np.ndarray
+    head: HeadCorrections
+
+
+def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
+    """One ranger's shots as distances in optical metres, with everything that depends on where things are.
+
+    Where the network moves, x are the points at its epoch, and each shot finds them where the telescope carried them.
+    """
+    campaign, layout, places = network.campaign, network.layout, network.places
+    electronics, phases = network.electronics[name], network.phases
+    rows = electronics.shots
+    targets = tuple(campaign.shots.target[k] for k in rows)
+    m = len(rows)
+    origin = np.full(m, layout.at[name])
+    target = np.array([layout.at[t] for t in targets])
+    a = x[origin[:, None] + np.arange(3)]
+    b = x[target[:, None] + np.arange(3)]
+    turns = None
+    if network.motion is not None:
+        times = campaign.shots.mjd_utc[rows]
+        turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
+        a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
+    towards = a - b
+    distance = np.linalg.norm(towards, axis=1)
+    towards = towards / distance[:, None]
+
+    air_columns = layout.columns(AIR, len(network.field.names))
+    air = network.field.along(campaign.shots.mjd_utc[rows], a, b, x[air_columns])
+    n = 1.0 + air.refractivity
+    d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
+    glass = np.array([places[t].constant for t in targets])
+    has_rest = np.array([f"glass {t}" in layout.at for t in targets])
+    rest_columns = np.array([layout.at.get(f"glass {t}", 0) for t in targets])  # column 0 with derivative 0: none
+    seen = towards if turns is None else np.einsum("mji,mj->mi", turns[2], towards)  # by a target that stands still
+    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, seen, x)
+
+    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
+    phase = fraction(phases.phase[rows], electronics.phase)
+    lit, cube = phases.phasor[rows], electronics.reference
+    head = head_corrections(
+        campaign,
+        name,
+        layout.at,
+        sight=b - a if turns is None else np.einsum("mji,mj->mi", turns[0], b - a),
+        phase=phase,
+        amplitude=np.abs(lit),
+        reference_amplitude=np.abs(cube),
+        index=n,
+    )
+    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]] - head.at(x))
+    cycles, margin = whole_cycles(coarse, phase, half)
+    observed = unwrapped_length(cycles, phase, half)
+
+    # Leakage left over, complex dL: a phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
+    per_radian = -half / TWO_PI
+    turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
+    leakage_slope = per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
+
+    covariance = np.diag((per_radian * phases.u_phase[rows]) ** 2) + per_radian**2 * electronics.covariance
+    lasting = 0.0 if network.motion is None else network.motion.lasting
+    path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance * np.sqrt(1.0 - lasting**2)
+    same = np.array(targets)[:, None] == np.array(targets)
+    covariance += same * np.outer(path, path)
+    if network.motion is not None:
+        covariance += np.diag(n**2 * network.motion.jitter(name, targets))
+
+    offset = (
+        -n * (glass + obliquity + d0 + head.value)
+        - distance * (air.slopes @ x[air_columns])
+        + n * np.sum(normal_slopes * x[normal_columns], axis=1)
+    )
+    paths = np.array([[layout.at.get(path_of(name, t), -1)] for t in targets])  # -1: none
+    nuisance = np.concatenate(
+        [
+            paths,
+            np.full((m, 1), layout.at[f"zero {name}"]),
+            np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
+            np.broadcast_to(air_columns, (m, len(air_columns))),
+            normal_columns,
+            rest_columns[:, None],
+            head.columns,
+        ],
+        axis=1,
+    )
+    coefficient = np.concatenate(
+        [
+            PPM * distance[:, None] * (paths >= 0),
+            -n[:, None],
+            leakage_slope,
+            distance[:, None] * air.slopes,
+            -n[:, None] * normal_slopes,
+            (-n * has_rest)[:, None],
+            -n[:, None] * head.slopes,
+        ],
+        axis=1,
+    )
+    group: ShotGroup
+    if turns is None:
+        group = Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient)
+    else:
+        group = MovingDistances(
+            name, observed, covariance, origin, target, *turns, n, offset, nuisance=nuisance, coefficient=coefficient
+        )
+    parts = ShotParts(
+        name=name,
+        electronics=electronics,
+        target=targets,
+        phase=phase,
+        cycles=cycles,
+        margin=margin,
+        refractivity=air.refractivity,
+        incidence=incidence,
+        glass=glass,
+        obliquity=obliquity,
+        leakage_slope=leakage_slope,
+        head=head,
+    )
+    return group, parts
+
+
+def other_ends(group: ShotGroup, row: int, own: int, x: np.ndarray) -> np.ndarray:
+    """(3,) m, ground: from where a shot's other end looks at the point whose x is in column `own`, that point standing.
+
+    A moving point stands, and what it is ranged from moves the other way: |B p + b - a| = |p - B'(a - b)|.
+    """
+    origin, target = int(group.origin[row]), int(group.target[row])
+    other = x[(target if origin == own else origin) + np.arange(3)]
+    if isinstance(group, Distances):
+        return np.asarray(other)
+    ends = (group.origin_turn[row], group.origin_shift[row]), (group.target_turn[row], group.target_shift[row])
+    (turn, shift), (own_turn, own_shift) = ends[::-1] if origin == own else ends
+    return np.asarray(own_turn.T @ (turn @ other + shift - own_shift))
+
+
+def _obliquity(
+    network: Network, targets: Sequence[str], towards: np.ndarray, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Incidence and dPc at the estimated normals, and the derivatives of dPc by each normal's two tilts.
+
+    A shot on anything but a prism gets the first parameter's column with a zero derivative.
+    """
+    m = len(targets)
+    ranging = network.campaign.site.ranging
+    ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
+    incidence, correction, slopes = np.zeros(m), np.zeros(m), np.zeros((m, 2))
+    columns = np.zeros((m, 2), dtype=int)
+    for k, target in enumerate(targets):
+        place = network.places[target]
+        if place.normal is None:
+            continue
+        columns[k] = network.layout.columns(f"normal {place.group}", 2)
+        normal, across = _tilted(place.normal, x[columns[k]])
+        incidence[k] = np.arccos(np.clip(normal @ towards[k], -1.0, 1.0))
+        # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
+        cosine = np.cos(min(incidence[k], 0.5 * np.pi))
+        correction[k] = obliquity_correction(place.height, ratio, cosine, phase=bends)
+        if incidence[k] > 1e-6:  # at normal incidence the correction is flat
+            by_angle = obliquity_slope(place.height, ratio, cosine, phase=bends)
+            slopes[k] = -by_angle * (across @ towards[k]) / np.sin(incidence[k])
+    return incidence, correction, columns, slopes
+
+
+def _tilted(normal: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The normal tilted by two small angles (rad) along two directions of the face, and those directions (2, 3)."""
+    across = np.linalg.svd(normal[None])[2][1:]
+    return unit(normal + tilt @ across), across

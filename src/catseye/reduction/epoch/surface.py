@@ -1,0 +1,80 @@
+"""The dish: which points are on it, the paraboloid that fits them, its pose against the nominal posture."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.records.campaign import Campaign
+from catseye.reduction.epoch.coordinates import Coordinates
+from catseye.reduction.epoch.dish import dish_prisms
+from catseye.reduction.site.places import nominal_frame
+
+FEWEST_CHECKS = 3  # used shots at a prism before it may shape the dish
+UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The dish prisms' fit.
+
+    names          of the prisms, in order
+    fit            the paraboloid and the deviations
+    focal_length   m, as designed, held
+    pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
+    """
+
+    names: tuple[str, ...]
+    fit: ParaboloidFit
+    focal_length: float
+    pivot: np.ndarray
+
+    @property
+    def rms(self) -> float:
+        """Of the normal deviations, m."""
+        return float(np.sqrt(np.mean(self.fit.deviation**2)))
+
+    @property
+    def u_deviation(self) -> np.ndarray:
+        """(k,) m."""
+        return np.sqrt(np.diag(self.fit.deviation_covariance))
+
+    def pose(self) -> dict[str, Any]:
+        """Axis, vertex and focus in the ground frame, and the rigid motion from the nominal posture, SI units."""
+        axis = self.fit.frame.rotation[:, 2]
+        vertex = self.fit.frame.translation
+        return {
+            "frame": "ground",
+            "pivot": self.pivot.tolist(),
+            "axis": axis.tolist(),
+            "vertex": vertex.tolist(),
+            "focus": (vertex + self.focal_length * axis).tolist(),
+            "translation": self.fit.translation.tolist(),
+            "rotation": self.fit.rotation.tolist(),
+            "covariance": self.fit.covariance.tolist(),
+            "covariance_order": ["translation x", "y", "z", "rotation x", "y", "z"],
+            "unobserved": [UNOBSERVED],
+        }
+
+
+def fit_surface(campaign: Campaign, coordinates: Coordinates) -> tuple[Surface | None, str]:
+    """The dish from its prisms (single prisms of the reflector frame), and why there is none, "" where there is.
+
+    A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.
+    """
+    names = tuple(
+        name
+        for name in dish_prisms(campaign)
+        if name in coordinates.points and coordinates.shots[coordinates.index(name)] >= FEWEST_CHECKS
+    )
+    nominal = nominal_frame(campaign)
+    focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
+    rows = [coordinates.index(n) for n in names]
+    try:
+        fit = fit_paraboloid(coordinates.x[rows], coordinates.block(names), nominal, focal_length)
+    except EstimationError as problem:
+        return None, f"no paraboloid: {problem}"
+    return Surface(names, fit, focal_length, nominal.translation), ""

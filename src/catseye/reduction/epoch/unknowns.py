@@ -1,0 +1,321 @@
+"""The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import InputError
+from catseye.estimation.observations import Distances, Linear, Observations
+from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.triplet import Triplet
+from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.ranges import Electronics, Phases
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.site.motion import Motion
+from catseye.reduction.site.places import Place, places_of, unit
+
+FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's scan point ZY101
+AIR = "the air"  # no point can have this name: it has a blank
+APPROXIMATE = "approximate positions"
+THERMOMETERS = "thermometers"
+SOUND = "path temperatures"
+ZEROS = "ranger zeros"
+HEADS = "head effects"
+PATHS = "lasting paths"
+
+
+def path_of(ranger: str, target: str) -> str:
+    """The parameter of what lasts of a line's index, ppm."""
+    return f"path {ranger} {target}"
+
+
+@dataclass
+class Layout:
+    """Where each parameter stands in the vector of the adjustment."""
+
+    names: list[str] = field(default_factory=list)
+    at: dict[str, int] = field(default_factory=dict)
+    start: list[float] = field(default_factory=list)
+    free: list[bool] = field(default_factory=list)
+
+    def add(self, name: str, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None) -> None:
+        """Append the parts of a quantity with their start values; False in `free` holds one."""
+        self.at[name] = len(self.names)
+        self.names.extend(f"{name} {part}".strip() for part in parts)
+        self.start.extend(float(s) for s in start)
+        self.free.extend(free if free is not None else [True] * len(parts))
+
+    def columns(self, name: str, count: int = 3) -> np.ndarray:
+        """Indices of the first parts of a quantity."""
+        return self.at[name] + np.arange(count)
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what."""
+
+    campaign: Campaign
+    settings: Settings
+    phases: Phases
+    electronics: dict[str, Electronics]
+    places: dict[str, Place]
+    layout: Layout
+    field: AirField
+    priors: list[Observations]
+    motion: Motion | None = None
+
+    @property
+    def rangers(self) -> list[str]:
+        """Those that fired a usable shot."""
+        return [
+            name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
+        ]
+
+    def seen_from(self, ranger: str) -> "Network":
+        """The network whose air knows the lines of one ranger's usable shots, in their order."""
+        if not self.field.lines:
+            return self
+        shots, rows = self.campaign.shots, self.electronics[ranger].shots
+        ends = [frozenset((ranger, shots.target[k])) for k in rows]
+        return replace(self, field=self.field.on_lines(shots.mjd_utc[rows], ends))
+
+
+def build_network(
+    campaign: Campaign,
+    phases: Phases,
+    electronics: dict[str, Electronics],
+    settings: Settings,
+    *,
+    motion: Motion | None = None,
+    also: Collection[str] = (),
+) -> Network:
+    """The unknowns and priors of a campaign.
+
+    motion   where the telescope moves between the shots; its points are then those of the motion's epoch
+    also     rangers and targets that take part as if they had fired or been fired at
+
+    Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
+    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
+    (thermometers, profile, sounded lines), two tilts of every prism face, and the rest of every glass constant.
+    """
+    places = places_of(campaign)
+    fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
+    fired |= set(also) & set(places)
+    fired |= {t for triplet in campaign.triplets.values() if fired & set(triplet.targets) for t in triplet.targets}
+    shooting = {name for name, e in electronics.items() if len(e.shots)} | (set(also) & set(campaign.rangers))
+    seen = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
+
+    layout = Layout()
+    for name, place in sorted(seen.items()):
+        layout.add(name, "xyz", place.start)
+    for name, monument in campaign.monuments.items():
+        u = (monument.u_x_mm, monument.u_y_mm, monument.u_z_mm)
+        where = np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE
+        layout.add(name + FIXED_POINT, "xyz", where, [value > 0.0 for value in u])
+    for name in sorted(shooting):
+        layout.add(f"zero {name}", [""], [0.0])
+        layout.add(f"leakage {name}", ["real", "imaginary"], [0.0, 0.0])
+        for unknown in head_unknowns(campaign, name):
+            layout.add(unknown.name, unknown.parts, np.zeros(len(unknown.parts)))
+    air = AirField.of(campaign, settings)
+    layout.add(AIR, air.names, np.zeros(len(air.names)))
+    for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
+        layout.add(f"normal {group}", ["1", "2"], [0.0, 0.0])
+    for name in sorted(fired):
+        if seen[name].u_constant > 0.0:
+            layout.add(f"glass {name}", [""], [0.0])
+    u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
+    fired_lines = {path_of(n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots}
+    lines = sorted(fired_lines) if u_path > 0.0 else []
+    for line in lines:
+        layout.add(line, [""], [0.0])
+    priors = _priors(campaign, settings, seen, layout, air)
+    if lines:
+        columns = [layout.at[line] for line in lines]
+        priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
+    return Network(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+
+
+def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:
+    """Parameters known beforehand, one by one."""
+    count = np.size(columns)
+    return Linear(
+        name,
+        np.asarray(observed, dtype=float),
+        np.asarray(sigma, dtype=float) ** 2,
+        np.asarray(columns),
+        np.eye(count),
+    )
+
+
+def _priors(
+    campaign: Campaign, settings: Settings, seen: dict[str, Place], layout: Layout, air: AirField
+) -> list[Observations]:
+    count = len(air.stations)
+    at = layout.columns(AIR, len(air.names))
+    priors = [
+        *_survey(campaign, seen, layout),
+        *_heads(campaign, layout),
+        _independent(THERMOMETERS, at[:count], np.zeros(count), air.sigmas[:count]),
+        _independent("air profile", at[count : count + 1], [0.0], air.sigmas[count : count + 1]),
+        *_sound(air, at[count + 1 :]),
+        *_directions(campaign, settings, layout),
+        *_glass(seen, layout),
+    ]
+    typed = [n for n, p in sorted(seen.items()) if p.typed]
+    if typed:
+        columns = np.concatenate([layout.columns(n) for n in typed])
+        where = np.concatenate([seen[n].start for n in typed])
+        u_start = np.repeat([seen[n].u_typed(settings.u_position) for n in typed], 3)
+        priors.append(_independent(APPROXIMATE, columns, where, u_start))
+    for triplet in campaign.triplets.values():
+        if triplet.ball.target in seen:
+            priors.extend(_triplet(triplet, seen, layout, settings))
+    for benchmark in campaign.benchmarks:
+        if benchmark.target in seen and benchmark.ranger in seen:
+            u = _positive(benchmark.u_mm * MILLIMETRE, f"benchmarks.csv: {benchmark.target}, u_mm")
+            length = benchmark.certified_distance_mm * MILLIMETRE
+            priors.append(_length("benchmarks", length, u, layout, benchmark.ranger, benchmark.target))
+    return priors
+
+
+def _sound(air: AirField, columns: np.ndarray) -> list[Observations]:
+    """How much too warm the sound of each line may read: a parameter a line, as its length errs in all rows alike."""
+    if not air.lines:
+        return []
+    return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
+
+
+def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[Observations]:
+    """Fixed points as surveyed (a zero u holds a coordinate, it defines the datum), mirrors above them as measured."""
+    priors: list[Observations] = []
+    columns, observed, sigma = [], [], []
+    for name, monument in campaign.monuments.items():
+        for i, axis in enumerate("xyz"):
+            u = getattr(monument, f"u_{axis}_mm") * MILLIMETRE
+            if u > 0.0:
+                columns.append(layout.at[name + FIXED_POINT] + i)
+                observed.append(getattr(monument, f"{axis}_mm") * MILLIMETRE)
+                sigma.append(u)
+        mirror = campaign.mirror_of(name)
+        fixed = layout.columns(name + FIXED_POINT)
+        u_offset = _positive(mirror.u_offset_mm * MILLIMETRE, f"mirrors/{mirror.zp}.toml: u_offset_mm")
+        priors.append(
+            Linear(
+                "mirror offsets",
+                seen[name].start - np.array(layout.start)[fixed],
+                np.full(3, u_offset**2),
+                np.concatenate([layout.columns(name), fixed]),
+                np.hstack([np.eye(3), -np.eye(3)]),
+            )
+        )
+    if columns:
+        priors.append(_independent("monuments", columns, observed, sigma))
+    return priors
+
+
+def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
+    """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
+    rangers = [n for n in campaign.rangers if f"zero {n}" in layout.at]
+    mirrors = [campaign.mirror_of(n) for n in rangers]
+    zeros = [layout.at[f"zero {n}"] for n in rangers]
+    u_zero = [_positive(m.u_d0_mm * MILLIMETRE, f"mirrors/{m.zp}.toml: u_d0_mm") for m in mirrors]
+    quadratures = [c for n in rangers for c in layout.columns(f"leakage {n}", 2)]
+    u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
+    return [
+        _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
+        _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
+        *(_head(campaign, n, layout) for n in rangers if head_unknowns(campaign, n)),
+    ]
+
+
+def _head(campaign: Campaign, name: str, layout: Layout) -> Linear:
+    """How far the effects of one ranger's head may be off its sheet."""
+    zp = campaign.mirror_of(name).zp
+    columns: list[int] = []
+    u: list[float] = []
+    for unknown in head_unknowns(campaign, name):
+        columns.extend(layout.columns(unknown.name, len(unknown.parts)))
+        u.extend([_positive(unknown.u, f"mirrors/{zp}.toml: {unknown.key}")] * len(unknown.parts))
+    return _independent(HEADS, columns, np.zeros(len(columns)), u)
+
+
+def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[Observations]:
+    """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
+    normals = [name for name in layout.at if name.startswith("normal ")]
+    if not normals:
+        return []
+    triplets = [n.removeprefix("normal ") in campaign.triplets for n in normals]
+    columns = [c for n in normals for c in layout.columns(n, 2)]
+    u = np.repeat(np.where(triplets, settings.u_plate_normal, settings.u_normal), 2)
+    return [_independent("normals", columns, np.zeros(len(columns)), u)]
+
+
+def _glass(seen: dict[str, Place], layout: Layout) -> list[Observations]:
+    """The rests of the glass constants, each common to every shot on its target."""
+    names = [name for name in sorted(seen) if f"glass {name}" in layout.at]
+    if not names:
+        return []
+    columns = [layout.at[f"glass {name}"] for name in names]
+    return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
+
+
+def _positive(u: float, where: str) -> float:
+    if u <= 0.0:
+        raise InputError(f"{where} = 0 (expected above 0: an exact value cannot be weighed against ranges)")
+    return u
+
+
+def _length(name: str, length: float, u: float, layout: Layout, origin: str, target: str) -> Distances:
+    one = np.ones(1)
+    return Distances(
+        name,
+        length * one,
+        u**2 * np.eye(1),
+        layout.columns(origin, 1),
+        layout.columns(target, 1),
+        one,
+        0.0 * one,
+        np.zeros((1, 0), dtype=int),
+        np.zeros((1, 0)),
+    )
+
+
+def _triplet(triplet: Triplet, seen: dict[str, Place], layout: Layout, settings: Settings) -> list[Observations]:
+    """What a data sheet says of a unit: ball above the prisms' mid-point, prisms apart by d12 along the axis.
+
+    The axis is good to some tenths of a degree, 3 mm across the unit: it only helps where a prism was not ranged.
+    """
+    left, right, ball = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
+    where = f"triplets/{triplet.triplet}.toml"
+    normal = seen[left].normal
+    assert normal is not None
+    along = np.outer(normal, normal)
+    u_h = _positive(triplet.u_h_corr_mm * MILLIMETRE, f"{where}: u_h_corr_mm")
+    u_lateral = _positive(triplet.u_lateral_mm * MILLIMETRE, f"{where}: u_lateral_mm")
+    u_d12 = _positive(triplet.u_d12_mm * MILLIMETRE, f"{where}: u_d12_mm")
+    eye = np.eye(3)
+    length = triplet.d12_mm * MILLIMETRE
+    axis = unit(seen[right].start - seen[left].start)
+    across = np.linalg.svd(axis[None])[2][1:]
+    return [
+        Linear(
+            "triplet balls",
+            triplet.h_corr_mm * MILLIMETRE * normal,
+            u_h**2 * along + u_lateral**2 * (eye - along),
+            np.concatenate([layout.columns(ball), layout.columns(left), layout.columns(right)]),
+            np.hstack([eye, -0.5 * eye, -0.5 * eye]),
+        ),
+        _length("triplet spacings", length, u_d12, layout, left, right),
+        Linear(
+            "triplet axes",
+            np.zeros(2),
+            (length * settings.u_plate_normal) ** 2 * np.eye(2),
+            np.concatenate([layout.columns(left), layout.columns(right)]),
+            np.hstack([-across, across]),
+        ),
+    ]

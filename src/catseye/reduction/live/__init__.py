@@ -1,0 +1,1 @@
+"""The same recipe as shots come: states carried from epoch to epoch."""

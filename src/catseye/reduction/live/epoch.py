@@ -1,0 +1,208 @@
+"""One epoch of a living site: its shots, what was carried to it, one adjustment, and what is carried on.
+
+The recipe is that of a campaign (`coordinates.settle_network`), with two differences: each shot finds its ends where
+the telescope had carried them, and what earlier epochs know takes the place of the records' priors.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.observations import Linear, Observations
+from catseye.geometry.frame import Transform
+from catseye.records.campaign import Campaign
+from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.shot import Shots
+from catseye.records.site_folder import SiteFolder
+from catseye.records.weather import Weather
+from catseye.reduction.epoch.coordinates import Coordinates, coordinates_of, settle_network
+from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
+from catseye.reduction.epoch.ranges import follow_electronics
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.unknowns import Network, build_network
+from catseye.reduction.live.shots import Taken, phases_of
+from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
+from catseye.reduction.site.motion import Motion, ground_from
+
+SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of what a round claims
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Epoch:
+    """What an epoch's adjustment gave.
+
+    rows          its shots, repeats joined
+    coordinates   in the ground frame, at the epoch
+    carried       all that lasts
+    reasons       row of the shots: why it was left out
+    """
+
+    rows: tuple[Taken, ...]
+    coordinates: Coordinates
+    carried: Carried
+    reasons: dict[int, str]
+
+
+def campaign_of(
+    site: SiteFolder,
+    rows: Sequence[Taken],
+    weather: Sequence[LiveWeather],
+    *,
+    azimuth: float,
+    elevation: float,
+    mjd: float,
+) -> Campaign:
+    """The shots of an epoch as a campaign of a telescope that stands as it stood then.
+
+    rows      shots, in any order; times are those of the buffers' middles
+    weather   readings of the stations that speak; the others are left out of the site
+    azimuth, elevation, mjd   rad, of the epoch
+
+    Raises InputError: no weather at all.
+    """
+    stations = tuple(s for s in site.site.weather_station if any(w.station == s.name for w in weather))
+    if not stations:
+        raise InputError("no weather station has spoken (expected at least one reading before an epoch is solved)")
+    posture = site.site.campaign.model_copy(
+        update={"azimuth_deg": azimuth / DEGREE % 360.0, "elevation_deg": elevation / DEGREE, "start_mjd_utc": mjd}
+    )
+    said = [w for w in weather if any(w.station == s.name for s in stations)]
+    fields = {name: getattr(site, name) for name in SiteFolder.__dataclass_fields__}
+    fields["site"] = site.site.model_copy(update={"campaign": posture, "weather_station": stations})
+    return Campaign(
+        **fields,
+        weather=Weather(
+            np.array([w.ticks / TICKS_PER_DAY for w in said]),
+            tuple(w.station for w in said),
+            np.array([w.temperature_c for w in said]),
+            np.array([w.pressure_hpa for w in said]),
+            np.array([w.humidity_percent for w in said]),
+        ),
+        shots=Shots(
+            np.array([r.shot.number for r in rows], dtype=np.int64),
+            np.array([r.mjd for r in rows]),
+            tuple(r.shot.ranger for r in rows),
+            tuple(r.shot.target for r in rows),
+            np.array([r.shot.cycles for r in rows], dtype=np.int64),
+            np.array([r.shot.samples_per_cycle for r in rows], dtype=np.int64),
+            np.arange(len(rows)),
+        ),
+        frames=np.empty((0, 0), dtype=np.int16),
+    )
+
+
+def solve_epoch(
+    campaign: Campaign,
+    rows: Sequence[Taken],
+    motion: Motion,
+    settings: Settings,
+    *,
+    carried: Carried | None,
+    lasting: Sequence[str],
+    ticks: int,
+) -> Epoch:
+    """Everything that the shots of an epoch and what was carried to it say.
+
+    campaign   of the shots, see `campaign_of`
+    rows       the same shots with their phases
+    motion     of the telescope, its epoch that of `ticks`
+    settings   of the reduction
+    carried    prior at this very instant, None for the first epoch
+    lasting    rangers and targets that stay in the state
+    ticks      the epoch
+
+    Raises InputError where no shot can be used and EstimationError where the adjustment finds no answer.
+    """
+    phases = phases_of(list(rows))
+    reasons = {k: reason for k, reason in enumerate(phases.reason) if reason}
+    electronics, wrong = follow_electronics(campaign, phases)
+    reasons |= wrong
+    resolved = Resolved({}, {}, ())
+    if carried is None:
+        resolved = resolve_cycles(campaign, phases, electronics, settings, motion=motion)
+        electronics = without_shots(electronics, set(resolved.rejected))
+    network = build_network(campaign, phases, electronics, settings, motion=motion, also=lasting)
+    if not network.rangers:
+        raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
+    frames = frames_at(network, motion)
+    if carried is not None:
+        network = _with_carried(network, carried, frames)
+    solution, shots = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
+    found = coordinates_of(network, solution, shots, resolved)
+    reasons |= resolved.rejected
+    layout = network.layout
+    lasts = np.array([i for i, free in enumerate(layout.free) if free and _lasts(layout.names[i], lasting)])
+    names = tuple(layout.names[i] for i in lasts)
+    seen = from_ground(
+        names,
+        solution.x[lasts],
+        solution.covariance[np.ix_(lasts, lasts)],
+        frames,
+        ticks=ticks,
+        elevation=float(motion.track.at(motion.epoch)[1]),
+    )
+    return Epoch(tuple(rows), found, seen if carried is None else with_unseen(carried, seen), reasons)
+
+
+def frames_at(network: Network, motion: Motion) -> dict[str, Transform]:
+    """Ground from the frame of each moving point of a network, at the epoch."""
+    return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.at}
+
+
+def frames_of_points(motion: Motion, names: Sequence[str]) -> dict[str, Transform]:
+    """Ground from the frame of each of some points that move, at the motion's epoch."""
+    azimuth, elevation = motion.track.at(motion.epoch)
+    kinds = {f: ground_from(motion.site, f, azimuth, elevation).single for f in ("alidade", "reflector")}
+    return {name: kinds[motion.frames[name]] for name in names if motion.frames.get(name) in kinds}
+
+
+def _lasts(name: str, lasting: Sequence[str]) -> bool:
+    """Whether a parameter is one of something that stays: the air, a ranger's, a lasting point's."""
+    point = name.rpartition(" ")[0]
+    if point in lasting or point.endswith("-F") or name.startswith(("the air ", "zero ", "leakage ")):
+        return True
+    if name.startswith(("axes ", "amplitude ", "cyclic ")):
+        return True
+    kind, _, rest = name.partition(" ")
+    if kind == "path":
+        return all(end in lasting for end in rest.split(" "))
+    if kind == "normal":
+        group = rest.rpartition(" ")[0]
+        return group in lasting or any(n.startswith(f"{group}-") for n in lasting)
+    return kind == "glass" and rest in lasting
+
+
+def _with_carried(network: Network, carried: Carried, frames: Mapping[str, Transform]) -> Network:
+    """The network that begins at the carried state and has it instead of the priors that it took in already."""
+    x, covariance = to_ground(carried, frames)
+    at = {name: i for i, name in enumerate(network.layout.names)}
+    shared = [i for i, name in enumerate(carried.names) if name in at]
+    columns = np.array([at[carried.names[i]] for i in shared])
+    prior = Linear("carried on", x[shared], covariance[np.ix_(shared, shared)], columns, np.eye(len(shared)))
+    known = set(columns.tolist()) | {i for i, free in enumerate(network.layout.free) if not free}
+    left = [g for g in (_without_known(group, known) for group in network.priors) if g is not None]
+    start = np.array(network.layout.start)
+    start[columns] = x[shared]
+    return replace(network, layout=replace(network.layout, start=start.tolist()), priors=[prior, *left])
+
+
+def _without_known(group: Observations, known: set[int]) -> Observations | None:
+    """A prior without what the carried state has taken in already: rows all of whose parameters are known."""
+    columns = np.asarray(group.columns)
+    if columns.ndim == 2:  # a row its own: distances between carried points
+        return None if set(columns[columns >= 0].tolist()) <= known else group
+    if set(columns.tolist()) <= known:
+        return None
+    if not isinstance(group, Linear) or group.matrix.shape != (len(columns), len(columns)):
+        return group
+    new = np.array([int(c) not in known for c in columns])
+    if new.all() or np.count_nonzero(group.matrix - np.diag(np.diag(group.matrix))):
+        return group
+    if group.covariance.ndim != 1:
+        raise EstimationError(f"{group.name}: a prior of some carried parameters and some new is not independent")
+    return Linear(group.name, group.observed[new], group.covariance[new], columns[new], group.matrix[np.ix_(new, new)])

@@ -1,0 +1,243 @@
+"""One shot at a time: samples to a phase with its status, and at once a range with what is known by then.
+
+The range of `LiveRange` is a first answer: corrections are those of the line's last epoch, the electronics those of the
+last good reference. The epoch's solution uses the phases, not these ranges.
+"""
+
+import cmath
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
+from catseye.records.live import LiveShot
+from catseye.records.mirror import Mirror
+from catseye.records.site import Adc
+from catseye.records.site_folder import REFERENCE
+from catseye.reduction.epoch.ranges import Detected, Phases, why_not
+from catseye.reduction.epoch.settings import Settings
+from catseye.signal.buffers import shortest_run
+from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
+
+USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
+U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
+REFERENCE_CHANGE = 0.03  # of the cube's amplitude, beyond which something else is in its return
+Status = str
+
+
+@dataclass(frozen=True)
+class ShotAnswer:
+    """What one shot is worth, at once.
+
+    status     "used", "reference", or the first word of why not: blocked, clipped, dead, dropout, stuck, noise unknown,
+               "no reference", "no place"
+    text       one line, "" where all is well
+    amplitude  V, leakage taken out
+    phase      rad, the same, in [0, 2 pi)
+    range_     m, from the scan point; NaN where there is none
+    u_range    m, noise and drift since the reference
+    misfit     m, range less what was predicted
+    """
+
+    status: Status
+    text: str
+    amplitude: float
+    phase: float
+    range_: float = math.nan
+    u_range: float = math.nan
+    misfit: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """A shot with its phase, kept for the epoch: a row of `Phases`; `repeats`: numbers of those that it stands for."""
+
+    shot: LiveShot
+    mjd: float
+    phasor: complex
+    u_phasor: float
+    u_across: float
+    offset: float
+    harmonics: NDArray[np.float64]
+    largest: float
+    reason: str
+    repeats: tuple[int, ...] = ()
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Its own number, or those of all repeats that it stands for."""
+        return self.repeats or (self.shot.number,)
+
+
+@dataclass
+class Line:
+    """What a line's last epoch made of its range: optical path = index (distance + added), m."""
+
+    index: float
+    added: float
+
+
+@dataclass
+class RangerNow:
+    """What is known of one ranger between epochs."""
+
+    references: deque[Taken] = field(default_factory=lambda: deque(maxlen=64))
+    usual: dict[bool, deque[float]] = field(
+        default_factory=lambda: {True: deque(maxlen=USUAL_OF), False: deque(maxlen=USUAL_OF)}
+    )
+
+
+def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual: float, run: float = 0.0) -> Taken:
+    """The phase of one shot, judged as `catseye reduce` judges it.
+
+    usual   V, amplitude that such shots have; for the text alone
+    run     rad a cycle, by which the phase is known to move; taken out before the mean
+
+    Where the samples did not travel the ranger's own amplitude and phase count, their noise a guess (`U_UNSEEN_VOLT`),
+    and clipping and dropouts are not seen.
+    """
+    seen = _Seen()
+    if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
+        told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
+        seen.wrong = f"wrong length: {told} {shot.cycles * shot.samples_per_cycle}"
+    elif shot.samples is not None:
+        leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+        _detect(shot, shot.samples, seen, adc.bits, run, leaked)
+    elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
+        seen.wrong = "no samples: neither the buffer came nor what the ranger made of it"
+    else:
+        seen.raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
+        seen.u_phasor, seen.largest = U_UNSEEN_VOLT, shot.amplitude
+    phasor = seen.raw - mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+    sampling = shot.cycles, shot.samples_per_cycle
+    reason = why_not(seen.raw, phasor, seen.u_phasor, seen.clipped, seen.largest, sampling, mirror, settings, usual)
+    across = seen.u_phasor
+    if shot.samples is None:
+        across = U_UNSEEN_VOLT
+    elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer tell too little of one quadrature's own scatter
+        across = math.sqrt(variance_across(seen.total, seen.between, shot.cycles, phasor))
+    return Taken(
+        shot,
+        shot.middle_mjd,
+        phasor,
+        seen.u_phasor,
+        across,
+        seen.offset,
+        np.array(seen.harmonics),
+        seen.largest,
+        seen.wrong or reason,
+    )
+
+
+@dataclass
+class _Seen:
+    """What detection found in one buffer, V: `Detected` of one, without arrays."""
+
+    raw: complex = 0j
+    u_phasor: float = 0.0
+    offset: float = 0.0
+    harmonics: tuple[float, float] = (0.0, 0.0)
+    largest: float = 0.0
+    clipped: int = 0
+    total: Sequence[float] = (0.0, 0.0, 0.0)
+    between: Sequence[float] = (0.0, 0.0, 0.0)
+    wrong: str = ""
+
+
+def _detect(shot: LiveShot, samples: NDArray[np.int16], into: _Seen, bits: int, run: float, leaked: complex) -> None:
+    """A buffer, compiled; what is wrong with it in words, by the plain form."""
+    from catseye.signal import buffer_kernel as kernel
+
+    n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
+    ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    found, still = np.zeros(16), np.zeros(8)
+    if m < 2:  # a single cycle's noise comes from its overtones: rare, and not here
+        _plainly(samples, into, n, volts, bits)
+        return
+    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, found, still)
+    out, stand = found.tolist(), still.tolist()
+    if out[kernel.CLIPPED] or out[kernel.DROPPED] or out[kernel.LONGEST] >= shortest_run(n):
+        _plainly(samples, into, n, volts, bits)
+    mean, moments = (out[0:2], out[kernel.TOTAL :]) if run == 0.0 else (stand[0:2], stand[2:])
+    into.raw = complex(mean[0], mean[1]) * volts + (leaked if run else 0.0)
+    into.u_phasor = math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts
+    into.offset, into.clipped = out[kernel.OFFSET] * volts, int(out[kernel.CLIPPED])
+    into.harmonics = out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts
+    into.largest = max(-out[kernel.LOW], out[kernel.HIGH]) * volts
+    into.total, into.between = ([v * volts**2 for v in part] for part in (moments[:3], moments[3:6]))
+
+
+def _plainly(samples: NDArray[np.int16], into: _Seen, n: int, volts: float, bits: int) -> None:
+    """By the form of the campaigns."""
+    found = Detected.empty(1)
+    found.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+    into.raw, into.u_phasor, into.offset = complex(found.raw[0]), float(found.u_phasor[0]), float(found.offset[0])
+    into.harmonics = float(found.harmonics[0, 0]), float(found.harmonics[0, 1])
+    into.largest, into.clipped, into.wrong = float(found.largest[0]), int(found.clipped[0]), found.wrong[0]
+    into.total, into.between = found.total[0].tolist(), found.between[0].tolist()
+
+
+def phases_of(rows: list[Taken]) -> Phases:
+    """Shots as the batch recipes want them."""
+    return Phases(
+        np.array([r.phasor for r in rows], dtype=complex),
+        np.array([r.u_phasor for r in rows]),
+        np.array([r.u_across for r in rows]),
+        np.array([r.offset for r in rows]),
+        np.array([r.harmonics for r in rows]).reshape(-1, 2),
+        np.array([r.largest for r in rows]),
+        tuple(r.reason for r in rows),
+    )
+
+
+def answer(
+    row: Taken,
+    now: RangerNow,
+    *,
+    predicted: Callable[[], float] | None,
+    line: Callable[[], Line],
+    d0: float,
+    modulation_hz: float,
+    walk: float,
+) -> ShotAnswer:
+    """What one shot says at once.
+
+    now         of its ranger, before this shot
+    predicted   distance, m, scan point to target at its middle; None where nobody knows
+    line        what its line's corrections are
+    d0          m, of the internal cube
+    walk        rad per root second, of the electronics
+
+    Source: [PARKER04] eq. 5.12 and 5.18: D = ((N - p/2pi) c/2f)/n - (glass, axes, zero) + D0.
+    """
+    amplitude, phase = abs(row.phasor), math.atan2(row.phasor.imag, row.phasor.real) % TWO_PI
+    if row.reason:
+        return ShotAnswer(row.reason.partition(":")[0], row.reason, amplitude, phase)
+    if row.shot.target == REFERENCE:
+        usual = now.usual[True]
+        level = median(usual) if len(usual) >= 3 else amplitude
+        if abs(amplitude / level - 1.0) > REFERENCE_CHANGE:
+            text = f"bad reference: return {amplitude:.3f} V where the cube gives {level:.3f} V"
+            return ShotAnswer("bad reference", text, amplitude, phase)
+        return ShotAnswer("reference", "", amplitude, phase, d0, 0.0, 0.0)
+    if not now.references:
+        text = "no reference: the ranger has no good shot on its internal cube yet"
+        return ShotAnswer("no reference", text, amplitude, phase)
+    if predicted is None:
+        return ShotAnswer("no place", "no place: the telescope has told no posture", amplitude, phase)
+    last = now.references[-1]
+    half = 0.5 * SPEED_OF_LIGHT / modulation_hz
+    share = ((phase - math.atan2(last.phasor.imag, last.phasor.real)) / TWO_PI) % 1.0
+    corrections, distance = line(), predicted()
+    coarse = corrections.index * (distance + corrections.added)
+    optical = (round(coarse / half + share) - share) * half
+    range_ = optical / corrections.index - corrections.added
+    u_phase = math.hypot(row.u_across / amplitude, last.u_across / max(abs(last.phasor), 1e-9))
+    drift = walk * math.sqrt(abs(row.mjd - last.mjd) * SECONDS_PER_DAY)
+    u = half / TWO_PI / corrections.index * math.hypot(u_phase, drift)
+    return ShotAnswer("used", "", amplitude, phase, range_, u, range_ - distance)

@@ -1,0 +1,1 @@
+"""Beam and link: what light arrives, and what it does to a range."""

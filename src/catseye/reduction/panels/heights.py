@@ -1,0 +1,367 @@
+"""Readings of the panel setting instrument to heights of panel corners, and to turns of their screws.
+
+Two things are set at a corner. The screws set the panels' corners to each other: what counts is each height beside the
+mean of those that meet there, which the tool sees to some µm whatever the rest of the dish does. The actuator under
+them moves all alike: that mean over the design is seen through the shaft's height, as well as the lasers know it.
+A height here is a departure: of the panel's surface from design offset and map, so that zero at all corners lays the
+panel's best fit on the design.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.estimation.adjustment import NONCENTRALITY, Solution, adjust
+from catseye.estimation.reliability import checked, single_level, w_critical
+from catseye.geometry.panel_surface import axes
+from catseye.records.panel_instrument import PanelInstrument
+from catseye.records.panel_layout import PanelLayout
+from catseye.records.panel_readings import PanelReadings, PanelSurvey
+from catseye.reduction.panels.maps import FittedMap
+from catseye.reduction.panels.model import PanelModel, corner_places, panel_model, used_layout
+
+LEVEL = 0.05  # of the tests: chance of any false alarm among all readings
+DECISIVE = 9.0  # difference of squared statistics below which two readings explain a conflict alike
+ROUNDS = 12  # of leaving out, one reading a corner at a time
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A reading that its neighbours contradict.
+
+    corner, panel, gauge, member, where   which
+    error    m, that explains it best (observed minus expected)
+    w        its test statistic
+    rivals   other readings of the corner that explain the conflict as well: "line 9, c_mm"
+    out      left out of the answer
+    """
+
+    corner: str
+    panel: str
+    gauge: str
+    member: str
+    where: str
+    error: float
+    w: float
+    rivals: tuple[str, ...]
+    out: bool
+
+
+@dataclass(frozen=True, eq=False)
+class PanelHeights:
+    """What a table of readings says; arrays (p, 4) are by panel and place of the layout used, m.
+
+    layout            panels that were read
+    readings, model, solution   how it came about
+    times             (p, 4) readings used at the corner; without one the rest is inferred, not read
+    departure         of the corner from design and map; u_departure its standard uncertainty
+    relative          departure less the mean of those read at the same corner, nan where fewer than two meet
+    u_relative        of it
+    conforms          probability that |relative| is within the goal
+    turns             clockwise above zero, that brings relative to zero; u_turns of them
+    actuator          (c,) m, mean departure read at a corner, which the actuator takes away with the opposite; nan
+    u_actuator        (c,)
+    fit               (p, 3) piston (m) and slopes (rad) of each panel's best fit along its x and y; u_fit
+    doubts            readings in doubt, of each corner the worst and what explains the conflict as well; worst first
+    variance_factor, degrees_of_freedom
+    """
+
+    layout: PanelLayout
+    sheet: PanelInstrument
+    readings: PanelReadings
+    model: PanelModel
+    solution: Solution
+    times: np.ndarray
+    departure: np.ndarray
+    u_departure: np.ndarray
+    relative: np.ndarray
+    u_relative: np.ndarray
+    conforms: np.ndarray
+    turns: np.ndarray
+    u_turns: np.ndarray
+    actuator: np.ndarray
+    u_actuator: np.ndarray
+    fit: np.ndarray
+    u_fit: np.ndarray
+    doubts: tuple[Doubt, ...]
+    variance_factor: float
+    degrees_of_freedom: float
+    surveyed: bool
+
+    @property
+    def known(self) -> np.ndarray:
+        """(p, 4) bool: a relative height was found."""
+        return np.isfinite(self.relative)
+
+    def value(self, parameter: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters and their standard uncertainties by column."""
+        return self.solution.x[parameter], np.sqrt(self.solution.q.diagonal()[parameter])
+
+
+def reduce_panels(
+    readings: PanelReadings,
+    layout: PanelLayout,
+    sheet: PanelInstrument,
+    *,
+    survey: PanelSurvey | None = None,
+    maps: Mapping[str, FittedMap] | None = None,
+    reject: bool = False,
+) -> PanelHeights:
+    """Heights and turns from a table of readings.
+
+    readings, layout, sheet   as read
+    survey   heights of shafts; without it heights of the whole surface hang on `u_set_um` alone, relative ones do not
+    maps     of panels by name
+    reject   leave out what the tests reject, both of two where nothing tells which is wrong
+
+    Raises InputError for readings that touch no panel, EstimationError where there is no answer.
+    """
+    used, _, corners = used_layout(readings, layout, sheet)
+    number = np.full(len(layout.corners), -1)
+    number[corners] = np.arange(len(corners))
+    seen = _renumbered(readings, number)
+    known = None if survey is None else _survey_of(survey, number)
+    model = panel_model(seen, used, sheet, survey=known, maps=maps)
+    active = [np.ones(len(g.observed), dtype=bool) for g in model.groups]
+    solution = _solved(model, active)
+    first = _doubts(model, seen, sheet, solution)
+    out: list[tuple[tuple[int, int], Doubt]] = []
+    for _ in range(ROUNDS if reject else 0):
+        found = _worst_of_corners(_doubts(model, seen, sheet, solution))
+        if not found:
+            break
+        for at, doubt in found:
+            active[at[0]][at[1]] = False
+            out.append((at, doubt))
+        solution = _solved(model, active)
+    named = [_left_out(d) for _, d in out] if reject else [d for _, d in _worst_of_corners(first)]
+    return _heights(
+        used, sheet, seen, model, solution, tuple(sorted(named, key=lambda d: -abs(d.w))), known is not None
+    )
+
+
+def _left_out(doubt: Doubt) -> Doubt:
+    return Doubt(**{**doubt.__dict__, "out": True})
+
+
+def _solved(model: PanelModel, active: list[np.ndarray]) -> Solution:
+    solution = adjust(np.zeros(model.columns.size), model.groups, active=active, iterations=5)
+    if not solution.solved:
+        raise EstimationError(f"panel corners: {solution.status}")
+    return solution.require_converged()
+
+
+def _renumbered(readings: PanelReadings, number: np.ndarray) -> PanelReadings:
+    corner = np.where(readings.corner < 0, -1, number[np.maximum(readings.corner, 0)])
+    return PanelReadings(**{**readings.__dict__, "corner": corner})
+
+
+def _survey_of(survey: PanelSurvey, number: np.ndarray) -> PanelSurvey:
+    here = number[survey.corner] >= 0
+    return PanelSurvey(number[survey.corner[here]], survey.height[here], survey.u[here], survey.digest)
+
+
+def _doubts(
+    model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, solution: Solution
+) -> list[tuple[tuple[int, int], Doubt, list[tuple[int, int]]]]:
+    """Readings that the tests reject: (group, row), what is said of each, and its rivals' (group, row)."""
+    fits = solution.fits[: len(model.blocks)]
+    tested = [f.active & checked(f) for f in fits]
+    many = int(sum(t.sum() for t in tested))
+    if not many:
+        return []
+    critical = w_critical(single_level(LEVEL, many))
+    found = []
+    for g, (fit, test, block) in enumerate(zip(fits, tested, model.blocks, strict=True)):
+        size = np.abs(np.where(test, fit.standardised, 0.0))
+        corner = model.tips.corner[block]
+        for k in np.flatnonzero(size > critical):
+            alike = np.flatnonzero((corner == corner[k]) & test & (size[k] ** 2 - size**2 < DECISIVE))
+            others = [int(j) for j in alike if j != k]
+            doubt = _doubt(model, readings, sheet, block[k], fit.estimated_error[k], fit.standardised[k])
+            rivals = tuple(_reading(model, readings, sheet, block[j]) for j in others)
+            found.append(((g, int(k)), Doubt(**{**doubt.__dict__, "rivals": rivals}), [(g, j) for j in others]))
+    return sorted(found, key=lambda item: -abs(item[1].w))
+
+
+def _worst_of_corners(
+    doubts: list[tuple[tuple[int, int], Doubt, list[tuple[int, int]]]],
+) -> list[tuple[tuple[int, int], Doubt]]:
+    """Of each corner the worst reading with its rivals."""
+    worst: dict[str, tuple[tuple[int, int], Doubt, list[tuple[int, int]]]] = {}
+    told = {at: d for at, d, _ in doubts}
+    for item in doubts:
+        worst.setdefault(item[1].corner, item)
+    found = []
+    for at, doubt, rivals in worst.values():
+        found.append((at, doubt))
+        found += [(other, told.get(other, doubt)) for other in rivals if other in told]
+    return found
+
+
+def _reading(model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, tip: int) -> str:
+    return f"{readings.where[model.tips.row[tip]]}, {sheet.gauge[model.tips.gauge[tip]].name}_mm"
+
+
+def _doubt(
+    model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, tip: int, error: float, w: float
+) -> Doubt:
+    told = model.tips
+    return Doubt(
+        corner=model.layout.corners[told.corner[tip]],
+        panel=model.layout.panels[told.panel[tip]],
+        gauge=sheet.gauge[told.gauge[tip]].name,
+        member=readings.member[told.row[tip]],
+        where=readings.where[told.row[tip]],
+        error=float(error),
+        w=float(w),
+        rivals=(),
+        out=False,
+    )
+
+
+def times_read(model: PanelModel, solution: Solution) -> np.ndarray:
+    """(p, 4) readings used that touched the panel at that corner of its own."""
+    times = np.zeros(model.target.shape, dtype=int)
+    for fit, block in zip(solution.fits, model.blocks, strict=False):
+        tip = block[fit.active]
+        panel, corner = model.tips.panel[tip], model.tips.corner[tip]
+        mine = model.layout.quad[panel] == corner[:, None]
+        row, place = np.nonzero(mine)
+        np.add.at(times, (panel[row], place), 1)
+    return times
+
+
+def meetings(layout: PanelLayout, taken: np.ndarray) -> np.ndarray:
+    """(c, 4) columns of the corner heights that meet at each corner and are taken (p, 4), -1 filling up."""
+    column = np.flatnonzero(taken.ravel())
+    corner = layout.quad.ravel()[column]
+    order = np.argsort(corner, kind="stable")
+    column, corner = column[order], corner[order]
+    rank = np.arange(len(corner)) - np.searchsorted(corner, corner)
+    meet = np.full((len(layout.corners), max(4, int(rank.max(initial=0)) + 1)), -1)
+    meet[corner, rank] = column
+    return meet
+
+
+def _heights(
+    layout: PanelLayout,
+    sheet: PanelInstrument,
+    readings: PanelReadings,
+    model: PanelModel,
+    solution: Solution,
+    doubts: tuple[Doubt, ...],
+    surveyed: bool,
+) -> PanelHeights:
+    shape = model.target.shape
+    many = model.target.size
+    departure = solution.x[:many].reshape(shape) - model.target
+    u_departure = np.hypot(np.sqrt(solution.q.diagonal()[:many].reshape(shape)), model.u_target)
+    times = times_read(model, solution)
+    meet = meetings(layout, times > 0)
+    on = meet >= 0
+    count = on.sum(axis=1)
+    flat, u_map = departure.ravel(), model.u_target.ravel()
+    share = np.where(on, 1.0 / np.maximum(count, 1)[:, None], 0.0)
+    mean = np.where(count > 0, np.sum(np.where(on, flat[meet], 0.0) * share, axis=1), np.nan)
+    maps = np.where(on, u_map[meet] ** 2, 0.0)
+
+    def variance(weight: np.ndarray) -> np.ndarray:
+        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
+        inside = solution.q.products(meet, weight)
+        return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
+
+    beside, u_beside = np.full(many, np.nan), np.full(many, np.nan)
+    several = count > 1
+    for k in range(meet.shape[1]):
+        mine = several & on[:, k]
+        weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
+        beside[meet[mine, k]] = flat[meet[mine, k]] - mean[mine]
+        u_beside[meet[mine, k]] = np.sqrt(variance(weight)[mine])
+    relative, u_relative = beside.reshape(shape), u_beside.reshape(shape)
+    goal, pitch = sheet.goal_um * 1e-6, sheet.screw.pitch_mm * MILLIMETRE
+    sense = 1.0 if sheet.screw.clockwise == "raises" else -1.0
+    fit, u_fit = panel_fits(layout, solution, departure, model.u_target)
+    factor, degrees = solution.variance_factor([f.name for f in solution.fits[: len(model.blocks)]])
+    return PanelHeights(
+        layout=layout,
+        sheet=sheet,
+        readings=readings,
+        model=model,
+        solution=solution,
+        times=times,
+        departure=departure,
+        u_departure=u_departure,
+        relative=relative,
+        u_relative=u_relative,
+        conforms=conformity(relative, u_relative, goal),
+        turns=-sense * relative / pitch,
+        u_turns=u_relative / pitch,
+        actuator=mean,
+        u_actuator=np.where(count > 0, np.sqrt(variance(share)), np.nan),
+        fit=fit,
+        u_fit=u_fit,
+        doubts=doubts,
+        variance_factor=factor,
+        degrees_of_freedom=degrees,
+        surveyed=surveyed,
+    )
+
+
+def conformity(value: np.ndarray, u: np.ndarray, goal: float) -> np.ndarray:
+    """Probability that the true value is within ± goal, after it was measured; nan where it was not.
+
+    value, u   (...) m
+    goal       m
+
+    Source: [JCGM106] clause 7, two-sided tolerance interval, normal law.
+
+    >>> round(float(conformity(np.array(25e-6), np.array(1e-6), 25e-6)), 3)
+    0.5
+    """
+    return ndtr((goal - value) / u) - ndtr((-goal - value) / u)
+
+
+def panel_fits(
+    layout: PanelLayout, solution: Solution, departure: np.ndarray, u_target: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Piston and slopes (p, 3) of the plane through each panel's four corners, and their u; m and rad."""
+    place = corner_places(layout)
+    design = np.concatenate([np.ones((*place.shape[:2], 1)), place], axis=2)
+    gain = np.linalg.pinv(design)  # (p, 3, 4)
+    at = np.arange(departure.size).reshape(-1, 4)
+    variance = np.stack(
+        [np.sum(solution.q.products(at, gain[:, k]) * gain[:, k] + (gain[:, k] * u_target) ** 2, axis=1)
+         for k in range(3)], axis=1,
+    )  # fmt: skip
+    return np.einsum("pkc,pc->pk", gain, departure), np.sqrt(variance)
+
+
+def surface_rms(found: PanelHeights, departure: np.ndarray) -> tuple[float, np.ndarray]:
+    """Rms (m) of departures (p, 4) about the rigid motion of the whole dish that fits them best, and what is left.
+
+    Shift and tilts only, five columns: normals, and arms × normals about x and y; a turn about the axis does nothing.
+    """
+    at = axes(found.layout.xy[found.layout.quad].reshape(-1, 2), found.layout.focal_length)
+    arm = np.cross(at.origin, at.z)
+    design = np.column_stack([at.z, arm[:, :2] / 50.0])
+    rest = departure.ravel() - design @ np.linalg.lstsq(design, departure.ravel(), rcond=1e-9)[0]
+    return float(np.sqrt(np.mean(rest**2))), rest.reshape(departure.shape)
+
+
+def weighed_squares(found: PanelHeights) -> tuple[np.ndarray, np.ndarray]:
+    """Of each tip: its part of v' C^-1 v and its redundancy; they add up to a variance factor of any set of readings.
+
+    Part is v (C^-1 v), exact in sum also with correlations; nan of readings left out.
+    """
+    part = np.full(len(found.model.tips.row), np.nan)
+    redundancy = np.full(len(part), np.nan)
+    for fit, block in zip(found.solution.fits, found.model.blocks, strict=False):
+        pv = fit.standardised * NONCENTRALITY / fit.detectable_error
+        part[block] = np.where(fit.active, fit.residual * pv, np.nan)
+        redundancy[block] = np.where(fit.active, fit.redundancy, np.nan)
+    return part, redundancy

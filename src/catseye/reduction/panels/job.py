@@ -1,0 +1,167 @@
+"""From the files of a crew to everything that is told of its work."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.errors import InputError
+from catseye.records.panel_instrument import PanelInstrument
+from catseye.records.panel_layout import PanelLayout
+from catseye.records.panel_readings import digest_of_maps, read_maps, read_panel_readings, read_survey
+from catseye.records.reading import read_record
+from catseye.reduction.panels.crew import SURE, Setting, setting
+from catseye.reduction.panels.heights import PanelHeights, conformity, reduce_panels
+from catseye.reduction.panels.maps import FittedMap, fitted_map
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class PanelFiles:
+    """What to read: readings, sheet, and where given survey, maps and the readings as left."""
+
+    readings: Path
+    sheet: Path
+    survey: Path | None = None
+    maps: Path | None = None
+    as_left: Path | None = None
+    survey_left: Path | None = None
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        given = (self.readings, self.sheet, self.survey, self.maps, self.as_left, self.survey_left)
+        return tuple(path for path in given if path is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class PanelWork:
+    """What was found, and what the screws did if there are readings as left.
+
+    layout    the whole one
+    found, left   heights as found and as left
+    setting   what turning did
+    maps      by panel
+    inputs    SHA-256 of each file read, by its name
+    notes     what a reader must know
+    """
+
+    layout: PanelLayout
+    sheet: PanelInstrument
+    found: PanelHeights
+    left: PanelHeights | None
+    setting: Setting | None
+    maps: dict[str, FittedMap]
+    inputs: dict[str, str]
+    notes: tuple[str, ...]
+
+    @property
+    def latest(self) -> PanelHeights:
+        """As left where known, else as found: what screws are turned from."""
+        return self.found if self.left is None else self.left
+
+
+def panel_work(
+    files: PanelFiles, layout: PanelLayout, *, reject: bool = False, progress: Progress | None = None
+) -> PanelWork:
+    """Everything from the files; InputError or EstimationError in one line.
+
+    files      paths
+    layout     all panels of the dish
+    reject     leave out readings that the tests reject
+    progress   told of each step
+    """
+
+    def say(what: str, done: int) -> None:
+        if progress is not None:
+            progress(what, done, 4)
+
+    say("reading", 0)
+    sheet = read_record(files.sheet, PanelInstrument)
+    names = [path.name for path in files.all]
+    if len(set(names)) != len(names):
+        double = next(n for n in names if names.count(n) > 1)
+        raise InputError(f"{double}: two inputs have this name (expected each its own, for the provenance)")
+    inputs = dict(layout.hashes) | {files.sheet.name: sha256(files.sheet.read_bytes()).hexdigest()}
+    survey = None if files.survey is None else read_survey(files.survey, layout)
+    later = survey if files.survey_left is None else read_survey(files.survey_left, layout)
+    maps: dict[str, FittedMap] = {}
+    if files.maps is not None:
+        raw = read_maps(files.maps, layout)
+        inputs[f"{files.maps.name}/ ({len(raw)} maps)"] = digest_of_maps(list(raw.values()))
+        say("maps", 1)
+        maps = {name: fitted_map(one) for name, one in raw.items()}
+    for path, one in ((files.survey, survey), (files.survey_left, later)):
+        if path is not None and one is not None:
+            inputs[path.name] = one.digest
+    readings = read_panel_readings(files.readings, layout, sheet)
+    inputs[readings.file] = readings.digest
+    say("solving as found", 2)
+    found = reduce_panels(readings, layout, sheet, survey=survey, maps=maps, reject=reject)
+    left = None
+    if files.as_left is not None:
+        again = read_panel_readings(files.as_left, layout, sheet)
+        inputs[again.file] = again.digest
+        say("solving as left", 3)
+        left = reduce_panels(again, layout, sheet, survey=later, maps=maps, reject=reject)
+    done = None if left is None else setting(found, left)
+    return PanelWork(layout, sheet, found, left, done, maps, inputs, tuple(_notes(files, layout, found, left, done)))
+
+
+def verdicts(found: PanelHeights) -> np.ndarray:
+    """(p, 4) words: "leave", "turn", "read" where no reading is used, "alone" where no other panel is beside it.
+
+    Left alone is what is within the goal with a probability of 0.95, and what a turn would not bring nearer to that by
+    0.05: after it a corner is known as well as now, and as well as a turn is made.
+    """
+    screw = found.sheet.screw
+    after = np.hypot(found.u_relative, screw.u_turn * screw.pitch_mm * MILLIMETRE)
+    gained = conformity(np.zeros_like(after), after, found.sheet.goal_um * 1e-6) - found.conforms
+    said = np.where((found.conforms >= SURE) | (gained < 1.0 - SURE), "leave", "turn")
+    return np.where(found.known, said, np.where(found.times > 0, "alone", "read"))
+
+
+def beyond_lean(found: PanelHeights) -> list[str]:
+    """Placements whose lean is over the sheet's limit."""
+    lean = np.hypot(*found.readings.lean.T) / ARCSECOND / 60.0
+    far = np.flatnonzero(np.nan_to_num(lean) > found.sheet.lean_limit_arcmin)
+    return [f"{found.readings.where[k]} ({lean[k]:.1f}′)" for k in far]
+
+
+def _notes(
+    files: PanelFiles, layout: PanelLayout, found: PanelHeights, left: PanelHeights | None, done: Setting | None
+) -> list[str]:
+    notes = []
+    if not found.surveyed:
+        notes.append(
+            "No survey of the actuators: heights of the whole surface hang on u_set_um alone, only relative heights "
+            "at a corner are measured; the gauges touch panels beside the corner, so that even these carry the "
+            "unknown slopes of panels."
+        )
+    if files.maps is None:
+        notes.append("No maps of panels: corners are set as if every panel had its design's shape.")
+    elif not found.model.mapped.all():
+        bare = [n for n, mapped in zip(found.layout.panels, found.model.mapped, strict=True) if not mapped]
+        notes.append(f"{len(bare)} of {len(found.layout.panels)} panels read have no map ({bare[0]} among them).")
+    if len(found.layout.panels) < len(layout.panels):
+        notes.append(f"{len(found.layout.panels)} of {len(layout.panels)} panels were read; the rest is not told of.")
+    if np.isnan(found.readings.lean[found.readings.corner >= 0, 0]).any():
+        notes.append("Where no lean was read, the shaft counts as upright within the sheet's limit over root three.")
+    for name, one in (("as found", found), ("as left", left)):
+        if one is None:
+            continue
+        far = beyond_lean(one)
+        if far:
+            notes.append(f"{name}: the shaft leans beyond the limit in {len(far)} placements, first {far[0]}.")
+        again = sorted({d.corner for d in one.doubts if d.rivals})
+        if again:
+            notes.append(
+                f"{name}: at {', '.join(again[:6])}{' ...' if len(again) > 6 else ''} nothing tells which of two "
+                "readings is wrong; a placement in another turn would."
+            )
+    if left is not None and done is None:
+        notes.append("As found and as left have fewer than three corners in common: nothing is said of the turns.")
+    return notes

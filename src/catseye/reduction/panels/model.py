@@ -1,0 +1,381 @@
+"""Readings of the panel setting instrument as observations of corner heights.
+
+reading = H(place) + D(place) - s + lean · place + zero + offset
+
+H   deviation of the panel's surface from the paraboloid at the gauge's tip: heights e of its four corners shared
+    bilinearly, and what a map knows of the surface between them
+D   rise of the paraboloid itself over the tangent plane at the corner: 28 to 47 µm at 106 mm
+s   where the shaft's shoulder stands; the same for all placements at the corner
+lean    of the tool's axis from the design normal, towards the tool's x and y: the base plane falls that way
+zero    of a gauge in a session; offset: sheet's corrections
+
+All is linear. What placements of one corner share without being a parameter (the lean where none was read, the local
+slope of each panel) makes their readings correlated: a block a corner.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.errors import InputError
+from catseye.estimation.observations.kind import Kind
+from catseye.geometry.panel_surface import axes, cosine_of_slope, panels_under, warps
+from catseye.geometry.panel_tool import turned
+from catseye.records.panel_instrument import PanelInstrument
+from catseye.records.panel_layout import PanelLayout
+from catseye.records.panel_readings import PanelReadings, PanelSurvey
+from catseye.records.refusal import refusal
+from catseye.reduction.panels.maps import FittedMap
+
+MICROMETRE = 1e-6
+GAUGES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class OwnColumns(Kind):
+    """observed = sum of coefficients times parameters, a few of each row's own; -1 stands for none.
+
+    coefficient   (m, w)
+    """
+
+    kind: ClassVar[str] = "linear"
+    unit: ClassVar[str] = "m"
+
+    name: str
+    observed: np.ndarray
+    covariance: np.ndarray
+    columns: np.ndarray
+    coefficient: np.ndarray
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) and Jacobian (m, w) at the parameters x."""
+        return np.sum(self.coefficient * np.where(self.columns < 0, 0.0, x[self.columns]), axis=1), self.coefficient
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Where parameters stand: corner heights (p, 4), shafts (c,), zeros (s, 4), levels (s, 2)."""
+
+    panels: int
+    corners: int
+    sessions: int
+
+    @property
+    def size(self) -> int:
+        return 4 * self.panels + self.corners + 6 * self.sessions
+
+    def height(self, panel: np.ndarray, place: np.ndarray) -> np.ndarray:
+        return 4 * panel + place
+
+    def shaft(self, corner: np.ndarray) -> np.ndarray:
+        return 4 * self.panels + corner
+
+    def zero(self, session: np.ndarray, gauge: np.ndarray) -> np.ndarray:
+        return 4 * self.panels + self.corners + 6 * session + gauge
+
+    def level(self, session: np.ndarray, axis: int) -> np.ndarray:
+        return 4 * self.panels + self.corners + 6 * session + 4 + axis
+
+
+@dataclass(frozen=True, eq=False)
+class Tips:
+    """Readings one by one: (n,) each, those of a corner together.
+
+    row, gauge    of the table
+    corner        number
+    panel         under the tip
+    share         (n, 4) of the panel's corners in the tip's height
+    tool, place   (n, 2) m, the tip in the tool's and in the corner's axes
+    at            (n, 3) m, the tip on the surface, reflector frame
+    rise          m, of the paraboloid
+    """
+
+    row: np.ndarray
+    gauge: np.ndarray
+    corner: np.ndarray
+    panel: np.ndarray
+    share: np.ndarray
+    tool: np.ndarray
+    place: np.ndarray
+    at: np.ndarray
+    rise: np.ndarray
+
+
+def tips(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument) -> Tips:
+    """What each reading touched; InputError for one where no panel is."""
+    on = np.isfinite(readings.reading) & (readings.corner >= 0)[:, None]
+    row, gauge = np.nonzero(on)
+    order = np.argsort(readings.corner[row], kind="stable")
+    row, gauge = row[order], gauge[order]
+    corner = readings.corner[row]
+    tool = (np.array([[g.x_mm, g.y_mm] for g in sheet.gauge]) * MILLIMETRE)[gauge]
+    place = turned(tool, readings.turn[row])
+    at, rise = axes(layout.xy[corner], layout.focal_length).places(place[:, 0], place[:, 1], layout.focal_length)
+    panel, share = panels_under(at[:, :2], layout.xy[layout.quad])
+    if np.any(panel < 0):
+        k = int(np.argmax(panel < 0))
+        raise refusal(
+            readings.file,
+            f"{readings.where[row[k]]}, {sheet.gauge[gauge[k]].name}_mm at {layout.corners[corner[k]]}, turn "
+            f"{readings.turn[row[k]]}, has no panel under it (expected a blank cell, or another turn)",
+        )
+    return Tips(row, gauge, corner, panel, share, tool, place, at, rise)
+
+
+def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, told: Tips) -> np.ndarray:
+    """(n,) m, readings without what the sheet knows of the gauges.
+
+    r + linearity, over 1 + scale, less zero per °C; a tip sags by sag · cos(slope) on the dish and by sag on the flat,
+    so that it reads sag (1 - cos) too low. Raises InputError where a correction needs a column that is not there.
+    """
+    raw = readings.reading[told.row, told.gauge]
+    result = gauge_corrected(raw, told.gauge, sheet)
+    warm = np.array([g.zero_um_per_c for g in sheet.gauge])[told.gauge] * MICROMETRE
+    sag = np.array([g.sag_um for g in sheet.gauge])[told.gauge] * MICROMETRE
+    for name, factor, values in (
+        ("temperature_c", warm, readings.temperature_c[told.row]),
+        ("elevation_deg", sag, readings.elevation[told.row]),
+    ):
+        missing = (factor != 0.0) & np.isnan(values)
+        if missing.any():
+            where = readings.where[told.row[int(np.argmax(missing))]]
+            raise refusal(readings.file, f"{where}, {name} is blank (expected a value: the sheet's gauges need it)")
+    warmer = np.nan_to_num(readings.temperature_c[told.row] - sheet.flat_temperature_c)
+    normal = axes(layout.xy[told.corner], layout.focal_length).z
+    upright = cosine_of_slope(normal, np.nan_to_num(readings.elevation[told.row], nan=np.pi / 2.0))
+    return result - warm * warmer + np.where(sag != 0.0, sag * (1.0 - upright), 0.0)
+
+
+def gauge_corrected(raw: np.ndarray, gauge: np.ndarray, sheet: PanelInstrument) -> np.ndarray:
+    """Readings (n,) m of gauges (n,) with linearity and scale taken out."""
+    result = np.array(raw)
+    for k, g in enumerate(sheet.gauge):
+        mine = gauge == k
+        if g.linearity:
+            at, correction = np.array(g.linearity).T
+            result[mine] += np.interp(result[mine], at * MILLIMETRE, correction * MICROMETRE)
+        result[mine] /= 1.0 + g.scale_ppm * 1e-6
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class PanelModel:
+    """Everything that is solved: observations, where parameters stand, what each row was.
+
+    groups     readings by block size first, then flat, priors, warps, survey
+    blocks     for each group of readings, (m,) numbers of its tips
+    target     (p, 4) m, height of each panel corner by design and map
+    u_target   (p, 4) m, of the map at that place; zero without one
+    """
+
+    layout: PanelLayout
+    columns: Columns
+    tips: Tips
+    groups: tuple[OwnColumns, ...]
+    blocks: tuple[np.ndarray, ...]
+    target: np.ndarray
+    u_target: np.ndarray
+    mapped: np.ndarray
+
+
+def panel_axes(layout: PanelLayout, panel: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Places (n, 3) on panels (n,) in the panels' own axes (n, 2), m: from the mean of the corners, x outwards."""
+    middle = layout.xy[layout.quad].mean(axis=1)[panel]
+    own = axes(middle, layout.focal_length)
+    arm = at - own.origin
+    return np.stack([np.sum(arm * own.x, axis=1), np.sum(arm * own.y, axis=1)], axis=1)
+
+
+def corner_places(layout: PanelLayout) -> np.ndarray:
+    """(p, 4, 2) m, the corners in their panels' axes."""
+    at = axes(layout.xy[layout.quad], layout.focal_length).origin
+    panel = np.repeat(np.arange(len(layout.panels)), 4)
+    return panel_axes(layout, panel, at.reshape(-1, 3)).reshape(-1, 4, 2)
+
+
+def panel_model(
+    readings: PanelReadings,
+    layout: PanelLayout,
+    sheet: PanelInstrument,
+    *,
+    survey: PanelSurvey | None = None,
+    maps: Mapping[str, FittedMap] | None = None,
+) -> PanelModel:
+    """The observations of a table of readings.
+
+    readings   as read
+    layout     every panel of it becomes a parameter: `used_layout` leaves those that a gauge touched
+    sheet      of the instrument
+    survey     heights of shafts
+    maps       by panel
+    """
+    told = tips(readings, layout, sheet)
+    columns = Columns(len(layout.panels), len(layout.corners), len(readings.sessions))
+    places = corner_places(layout)
+    shape, between = _mapped(layout, told, places, maps or {})
+    mapped = np.array([name in (maps or {}) for name in layout.panels])
+    observed = corrected(readings, layout, sheet, told) - told.rise - between
+    lean = readings.lean[told.row]
+    read = np.isfinite(lean[:, 0])
+    observed = observed - np.sum(np.nan_to_num(lean) * told.tool, axis=1)
+    names = np.array([-1])
+    level = [np.where(read, columns.level(readings.session[told.row], k), names) for k in (0, 1)]
+    at = np.column_stack(
+        [columns.height(told.panel[:, None], np.arange(4)), columns.shaft(told.corner),
+         columns.zero(readings.session[told.row], told.gauge), *level]
+    )  # fmt: skip
+    n = len(observed)
+    factor = np.column_stack([told.share, -np.ones(n), np.ones(n), np.where(read[:, None], -told.tool, 0.0)])
+    groups, blocks = _reading_groups(readings, layout, sheet, told, mapped, (observed, at, factor, read))
+    prior, target = sheet.panel, layout.offset + shape
+    u_target = np.where(mapped, prior.u_map_um * MICROMETRE, 0.0)[:, None] * np.ones(4)
+    more = [
+        *_flat(readings, sheet, columns),
+        _priors(sheet, columns, target),
+        _warps(layout, sheet, places, target, mapped),
+        _shafts(layout, sheet, columns, survey),
+    ]
+    return PanelModel(layout, columns, told, (*groups, *more), blocks, target, u_target, mapped)
+
+
+def _mapped(
+    layout: PanelLayout, told: Tips, places: np.ndarray, maps: Mapping[str, FittedMap]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shape of panels at their corners (p, 4), and at tips (n,) beside what the corners share out, m."""
+    shape, between = np.zeros((len(layout.panels), 4)), np.zeros(len(told.row))
+    own = panel_axes(layout, told.panel, told.at)
+    for p, name in enumerate(layout.panels):
+        if name in maps:
+            shape[p] = maps[name].at(places[p])
+            mine = np.flatnonzero(told.panel == p)
+            if len(mine):
+                between[mine] = maps[name].at(own[mine]) - told.share[mine] @ shape[p]
+    return shape, between
+
+
+def _reading_groups(
+    readings: PanelReadings,
+    layout: PanelLayout,
+    sheet: PanelInstrument,
+    told: Tips,
+    mapped: np.ndarray,
+    rows: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[list[OwnColumns], tuple[np.ndarray, ...]]:
+    """Blocks of one corner each, those of one size in a group."""
+    observed, at, factor, read = rows
+    prior = sheet.panel
+    single = (sheet.u_gauge_um**2 + sheet.resolution_um**2 / 12.0) * MICROMETRE**2
+    lean = (sheet.u_lean_arcsec * ARCSECOND) ** 2
+    free = (sheet.lean_limit_arcmin * 60.0 * ARCSECOND) ** 2 / 3.0
+    slope = np.where(mapped, prior.u_map_slope_urad, prior.u_slope_urad)[told.panel] * 1e-6
+    shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)[told.panel] * MICROMETRE
+    at_home = np.any(layout.quad[told.panel] == told.corner[:, None], axis=1)
+    shape = np.where(at_home, 0.0, shape)  # a panel without a corner here: its edge may lie off its corners' line
+    _, start, count = np.unique(told.corner, return_index=True, return_counts=True)
+    groups, blocks = [], []
+    for size in np.unique(count):
+        which = (start[count == size][:, None] + np.arange(size)).astype(int)  # (b, r)
+
+        def pairs(values: np.ndarray, which: np.ndarray = which) -> np.ndarray:
+            """(b, r, r) scalar products of the rows of a block."""
+            inside = values[which]
+            return inside @ np.swapaxes(inside, 1, 2) if values.ndim == 2 else inside[:, :, None] * inside[:, None, :]
+
+        def same(values: np.ndarray, which: np.ndarray = which) -> np.ndarray:
+            return values[which][:, :, None] == values[which][:, None, :]
+
+        weight = read.astype(float)
+        c = single * np.eye(size) + np.where(same(told.row), pairs(told.tool), 0.0) * pairs(weight) * lean
+        c = c + pairs(told.place) * pairs(1.0 - weight) * free
+        c = c + np.where(same(told.panel), pairs(told.place) * pairs(slope) + pairs(shape), 0.0)
+        flat = which.ravel()
+        groups.append(OwnColumns(f"readings of {size}", observed[flat], c, at[flat], factor[flat]))
+        blocks.append(flat)
+    return groups, tuple(blocks)
+
+
+def flat_means(readings: PanelReadings, sheet: PanelInstrument) -> tuple[np.ndarray, np.ndarray]:
+    """(s, 4) m mean reading of each gauge on the flat by session, and (s, 4) how many; nan where none."""
+    sessions = len(readings.sessions)
+    mean, many = np.full((sessions, GAUGES), np.nan), np.zeros((sessions, GAUGES), dtype=int)
+    warm = np.nan_to_num(readings.temperature_c - sheet.flat_temperature_c)
+    for s in range(sessions):
+        for g, gauge in enumerate(sheet.gauge):
+            mine = np.flatnonzero((readings.corner < 0) & (readings.session == s) & np.isfinite(readings.reading[:, g]))
+            many[s, g] = len(mine)
+            if len(mine):
+                value = gauge_corrected(readings.reading[mine, g], np.full(len(mine), g), sheet)
+                mean[s, g] = np.mean(value - gauge.zero_um_per_c * MICROMETRE * warm[mine])
+    return mean, many
+
+
+def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: Columns) -> list[OwnColumns]:
+    """Means on the flat observe the gauges' zeros; the flat's own unevenness is the same in all sessions."""
+    mean, many = flat_means(readings, sheet)
+    session, gauge = np.nonzero(many)
+    if not len(session):
+        return []
+    single = (sheet.u_gauge_um**2 + sheet.resolution_um**2 / 12.0) * MICROMETRE**2
+    c = np.diag(single / many[session, gauge])
+    c = c + np.where(gauge[:, None] == gauge, (sheet.u_flat_um * MICROMETRE) ** 2, 0.0)
+    at = columns.zero(session, gauge)[:, None]
+    return [OwnColumns("flat", mean[session, gauge], c, at, np.ones((len(at), 1)))]
+
+
+def _priors(sheet: PanelInstrument, columns: Columns, target: np.ndarray) -> OwnColumns:
+    """What is known before: heights near their targets, zeros and levels near zero."""
+    many = np.arange(columns.size)
+    first, last = 4 * columns.panels, columns.size - 6 * columns.sessions
+    at = np.concatenate([many[:first], many[last:]])
+    u = np.concatenate(
+        [np.full(first, sheet.panel.u_set_um * MICROMETRE),
+         np.tile([*[sheet.u_zero_um * MICROMETRE] * 4, *[sheet.u_level_arcsec * ARCSECOND] * 2], columns.sessions)]
+    )  # fmt: skip
+    observed = np.concatenate([target.ravel(), np.zeros(6 * columns.sessions)])
+    return OwnColumns("priors", observed, u**2, at[:, None], np.ones((len(at), 1)))
+
+
+def _warps(
+    layout: PanelLayout, sheet: PanelInstrument, places: np.ndarray, target: np.ndarray, mapped: np.ndarray
+) -> OwnColumns:
+    """A panel is stiff: its four corners lie as it was made, but for the twist that four screws force on it."""
+    null = warps(places)
+    prior = sheet.panel
+    made = np.where(mapped, prior.u_map_um, prior.u_shape_um)
+    u = np.sqrt(prior.u_twist_um**2 + made**2 * np.sum(null**2, axis=1)) * MICROMETRE
+    at = np.arange(4 * len(layout.panels)).reshape(-1, 4)
+    return OwnColumns("warps", np.sum(null * target, axis=1), u**2, at, null)
+
+
+def _shafts(layout: PanelLayout, sheet: PanelInstrument, columns: Columns, survey: PanelSurvey | None) -> OwnColumns:
+    """Where shafts stand: as the lasers found their prisms; those that they did not, as roughly as a panel is set."""
+    corners = np.arange(len(layout.corners))
+    height, u = np.zeros(len(corners)), np.full(len(corners), sheet.panel.u_set_um * MICROMETRE)
+    if survey is not None:
+        height[survey.corner] = survey.height
+        u[survey.corner] = np.hypot(survey.u, sheet.u_stand_um * MICROMETRE)
+    at = columns.shaft(corners)[:, None]
+    return OwnColumns("shafts", height, u**2, at, np.ones((len(at), 1)))
+
+
+def used_layout(
+    readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument
+) -> tuple[PanelLayout, np.ndarray, np.ndarray]:
+    """The panels that a gauge touched, and the numbers of panels and corners in the whole layout.
+
+    Raises InputError where nothing was read but the flat.
+    """
+    told = tips(readings, layout, sheet)
+    panels = np.unique(told.panel)
+    if not len(panels):
+        raise InputError(f"{readings.file}: holds no reading at a corner (expected placements beside {'FLAT'})")
+    corners = np.unique(layout.quad[panels])
+    lost = np.setdiff1d(told.corner, corners)
+    if len(lost):
+        raise InputError(
+            f"{readings.file}: at {layout.corners[lost[0]]} no panel with a corner there was read (expected one)"
+        )
+    return layout.only(panels), panels, corners

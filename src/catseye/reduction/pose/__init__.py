@@ -1,0 +1,1 @@
+"""Six degrees of freedom and pointing: from a pose or from stars."""

@@ -1,0 +1,200 @@
+"""Poses of the antenna's parts from solved points: between two epochs, or against the design in a site's records.
+
+Groups by name are what `reduction.live_bodies` says moves together: "dish" (prisms, triplets at the rim), "feed-arm"
+(its rangers, targets at the arm), "alidade"; "subreflector" are targets whose names begin with SUB. Any other group
+is a list of points. Every epoch is first brought into the axes that carry the group by its told posture, so that two
+epochs at different postures compare: what is left is how the real antenna departs from [PARKER04] eq. 2.44.
+
+Against the design a prism of the dish is known well along its normal alone, within the surface's own u, and only as
+well as it was mounted or typed across it: its design place goes in with that covariance, its foot on the paraboloid
+for a mean. Other points come with u_position of their records in every direction.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.errors import InputError
+from catseye.estimation.pose import Pose, fit_pose
+from catseye.estimation.rigid_body import turned_covariance
+from catseye.geometry.antenna import ground_from_alidade
+from catseye.geometry.frame import Transform
+from catseye.records.site_folder import SiteFolder
+from catseye.records.solved_points import SolvedPoints
+from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.site.bodies import bodies_of
+from catseye.reduction.site.places import Place, nominal_frame, places_of
+
+GROUPS = ("dish", "feed-arm", "alidade", "subreflector")
+FRAMES = ("ground", "alidade", "reflector")
+CARRIES = {"dish": "reflector", "feed-arm": "reflector", "alidade": "alidade", "subreflector": "reflector"}
+BODY = {"dish": "dish", "feed-arm": "arm", "alidade": "alidade"}
+SUBREFLECTOR = "SUB"  # how names of targets on the subreflector begin
+FEWEST = 3
+U_SURFACE = 0.3 * MILLIMETRE  # chosen: of a prism off the best paraboloid, along the normal, of a surface as set
+
+
+@dataclass(frozen=True, eq=False)
+class GroupPose:
+    """A pose with what it was made of.
+
+    group     "dish" and so on, or "points"
+    pose      in the frame asked for, about the pivot asked for
+    against   "design", or the name of the first epoch
+    places    (n, 3) m, first places of the points that count, in the pose's frame
+    missing   names of the group that one side does not have
+    epoch     the later one
+    """
+
+    group: str
+    pose: Pose
+    against: str
+    places: np.ndarray
+    missing: tuple[str, ...]
+    epoch: SolvedPoints
+
+
+def at_posture(site: SiteFolder, azimuth: float, elevation: float) -> SiteFolder:
+    """The same site with the telescope at another posture, rad."""
+    campaign = site.site.campaign.model_copy(
+        update={"azimuth_deg": azimuth / DEGREE, "elevation_deg": elevation / DEGREE}
+    )
+    return replace(site, site=site.site.model_copy(update={"campaign": campaign}))
+
+
+def group_names(group: str, site: SiteFolder) -> tuple[str, ...]:
+    """Names of the points that a group may have; InputError for an unknown or an empty one."""
+    if group not in GROUPS:
+        raise InputError(f"group {group!r} is none of {', '.join(GROUPS)} (expected one, or points by name)")
+    if group == "subreflector":
+        names = [n for n in site.targets if n.startswith(SUBREFLECTOR)]
+    else:
+        frames = {n: t.frame for n, t in site.targets.items()}
+        names = [n for n, body in bodies_of(site, frames).items() if body == BODY[group]]
+    if not names:
+        hint = f" (targets named {SUBREFLECTOR}...)" if group == "subreflector" else ""
+        raise InputError(f"the site {site.directory} has no points of the group {group!r}{hint}; name them by points")
+    return tuple(sorted(names))
+
+
+def frame_transform(frame: str, site: SiteFolder) -> Transform:
+    """Ground from one of FRAMES, at the site's posture."""
+    if frame == "reflector":
+        return nominal_frame(site)
+    if frame == "alidade":
+        return ground_from_alidade(site.site.campaign.azimuth_deg * DEGREE)
+    if frame == "ground":
+        return Transform("ground", "ground", np.eye(3), np.zeros(3))
+    raise InputError(f"frame {frame!r} is none of {', '.join(FRAMES)}")
+
+
+def default_pivot(group: str, frame: str, site: SiteFolder) -> np.ndarray | None:
+    """(3,) m in the frame: the vertex for the dish, the focus for arm and subreflector; None: the points' mean."""
+    focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
+    inside = {"dish": (0.0, 0.0, 0.0), "feed-arm": (0.0, 0.0, focal), "subreflector": (0.0, 0.0, focal)}
+    if group == "alidade":  # where its axis of azimuth meets the ground's z = 0
+        return np.zeros(3)
+    if group not in inside:
+        return None
+    ground = nominal_frame(site).points(inside[group])
+    return np.asarray(frame_transform(frame, site).inverse().points(ground))
+
+
+def pose_of_group(
+    later: SolvedPoints,
+    earlier: SolvedPoints | None,
+    site: SiteFolder,
+    *,
+    group: str | None = None,
+    points: Sequence[str] | None = None,
+    frame: str = "ground",
+    pivot: np.ndarray | None = None,
+    robust: str | None = None,
+) -> GroupPose:
+    """How a group of points moved from an earlier epoch, or from its design, to a later one.
+
+    later     epoch
+    earlier   epoch, or None: against the site's design
+    site      records; its posture is the later epoch's (`at_posture`)
+    group     one of GROUPS, or
+    points    names, three or more
+    frame     of the answer: one of FRAMES, at the later epoch's posture
+    pivot     (3,) m, in that frame; by default that of the group, or the points' mean
+    robust    as `estimation.pose.fit_pose`
+
+    Two epochs count as independent: what they share, such as the monuments' survey and a ranger's zero, makes a change
+    better known than this says. Raises InputError where points or postures are missing, EstimationError as `fit_pose`.
+    """
+    if (group is None) == (points is None):
+        raise InputError("a pose is of a group or of points by name (expected one of the two)")
+    names = tuple(points) if points is not None else group_names(str(group), site)
+    known = places_of(site)
+    have = [n for n in names if n in later.names and (n in known if earlier is None else n in earlier.names)]
+    missing = tuple(n for n in names if n not in have)
+    if points is not None and missing:
+        where = "the epoch and the design" if earlier is None else "both epochs"
+        raise InputError(f"point {missing[0]!r} is not in {where} (expected points of both)")
+    if len(have) < FEWEST:
+        raise InputError(f"{len(have)} points of {group or 'the list'} are in both (expected {FEWEST} or more)")
+    carrier = CARRIES[group] if group is not None else "ground"
+    there = frame_transform(carrier, site).inverse()
+    second, q_second = _into(there, later.places(have), later.block(have))
+    if earlier is None:
+        first, q_first = _design(have, known, site, there)
+    else:
+        before = frame_transform(carrier, _posture_of(earlier, site, carrier)).inverse()
+        first, q_first = _into(before, earlier.places(have), earlier.block(have))
+    pose = fit_pose(
+        have, first, second, frame=carrier, covariance_first=q_first, covariance_second=q_second, robust=robust
+    )
+    kept = np.array([n in set(pose.names) for n in have])
+    to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)
+    told = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
+    wanted = pivot if pivot is not None else default_pivot(group or "", frame, site)
+    told = told if wanted is None else told.about(wanted)
+    against = "design" if earlier is None else earlier.campaign or earlier.file
+    places = first[kept] if to_frame.to == to_frame.from_ else to_frame.points(first[kept])
+    return GroupPose(group or "points", told, against, places, missing, later)
+
+
+def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFolder:
+    """The site at an epoch's own posture; the ground needs none."""
+    if carrier == "ground":
+        return site
+    if epoch.posture is None:
+        raise InputError(
+            f"{epoch.file}: its posture is unknown (expected pose.json beside coordinates.json, or --earlier-posture)"
+        )
+    return at_posture(site, *epoch.posture)
+
+
+def _into(to_from: Transform, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    turn = to_from.rotation
+    return to_from.points(x), turned_covariance(turned_covariance(q, turn, columns=True), turn, columns=False)
+
+
+def _design(
+    names: Sequence[str], known: dict[str, Place], site: SiteFolder, to_from: Transform
+) -> tuple[np.ndarray, np.ndarray]:
+    """Design places (n, 3) and covariance (3n, 3n), independent from point to point, in the frame `to_from.to`."""
+    settings = Settings()
+    focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
+    on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
+    inside = nominal_frame(site)
+    x, q = np.zeros((len(names), 3)), np.zeros((3 * len(names), 3 * len(names)))
+    for k, name in enumerate(names):
+        place = known[name]
+        u = place.u_typed(settings.u_position) if place.typed else settings.u_position
+        spread, where = np.eye(3) * u**2, place.start
+        if name in on_dish:
+            local = inside.inverse().points(where)
+            foot = np.array([*local[:2], float(local[:2] @ local[:2]) / (4.0 * focal)])
+            normal = np.array([-local[0], -local[1], 2.0 * focal])
+            along = inside.directions(normal / np.linalg.norm(normal))
+            where = inside.points(foot)
+            spread = spread + (U_SURFACE**2 - u**2) * np.outer(along, along)
+        x[k] = to_from.points(where)
+        q[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = to_from.rotation @ spread @ to_from.rotation.T
+    return x, q

@@ -1,0 +1,192 @@
+"""How the alidade tilts as it goes round: track and azimuth bearing as a Fourier series of azimuth, with covariance.
+
+The tilt is told in the ground frame, as the turn of the alidade about east and north, from its nominal place:
+
+    tilt(A) = mean + sum over k of c_k cos kA + s_k sin kA,    each of mean, c_k, s_k with two components.
+
+Ranges see it in poses of the alidade, r = R tilt with R from the ground's axes to the alidade's; an inclinometer on the
+alidade sees r + zero. Its zero goes round with the telescope: it is a tilt with one wave a turn, so that inclinometers
+alone cannot tell it from the part (c_1, s_1) that does the same. Ranges can, coarsely; the inclinometers then give the
+shape. Both go into one least squares. The mean is the azimuth axis's lean: AN and AW of the pointing series.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import ARCSECOND
+from catseye.errors import EstimationError, FrameError
+from catseye.estimation.singular import best_linear_estimate
+from catseye.geometry.pointing_series import axis_terms
+from catseye.geometry.rotation import from_vector, rz
+from catseye.records.tilts import Tilts
+from catseye.reduction.pose.pose import GroupPose
+
+MOST_HARMONICS = 36
+
+
+@dataclass(frozen=True, eq=False)
+class TiltSeries:
+    """The tilt by azimuth.
+
+    harmonics    K
+    names        (4 K + 2) coefficients: "mean east", "mean north", "cos 1A east", ...
+    values       (4 K + 2,) rad, turns about east and north
+    covariance   (4 K + 2, 4 K + 2) rad^2
+    """
+
+    harmonics: int
+    names: tuple[str, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+
+    def at(self, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tilt (..., 2) rad about east and north at azimuths (...), and its covariance (..., 2, 2) rad^2."""
+        rows = _rows(np.asarray(azimuth, dtype=float), self.harmonics)
+        return rows @ self.values, rows @ self.covariance @ np.swapaxes(rows, -1, -2)
+
+    @property
+    def axis(self) -> tuple[np.ndarray, np.ndarray]:
+        """AN and AW (2,) rad of the mean tilt, and their covariance (2, 2)."""
+        turn = np.array([self.values[0], self.values[1], 0.0])
+        return axis_terms(turn), self.covariance[:2, :2]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackProfile:
+    """A tilt series fitted to poses and inclinometers.
+
+    series       see there
+    zero         (2,) rad, of the inclinometer about the alidade's x and y, with covariance (2, 2); None without one
+    azimuth      (n,) rad, of all observations, poses first
+    residual     (n, 2) rad, observed minus fitted, alidade's axes
+    w            (n, 2) standardised residuals; nan where nothing checks one
+    poses        how many of the n are poses
+    pvv, degrees_of_freedom, p   of the fit
+    """
+
+    series: TiltSeries
+    zero: tuple[np.ndarray, np.ndarray] | None
+    azimuth: np.ndarray
+    residual: np.ndarray
+    w: np.ndarray
+    poses: int
+    pvv: float
+    degrees_of_freedom: int
+    p: float
+
+
+def _rows(azimuth: np.ndarray, harmonics: int) -> np.ndarray:
+    """Derivatives (..., 2, 4 K + 2) of the tilt about east and north by the coefficients."""
+    waves = [np.ones_like(azimuth)]
+    for k in range(1, harmonics + 1):
+        waves += [np.cos(k * azimuth), np.sin(k * azimuth)]
+    base = np.stack(waves, axis=-1)
+    return np.asarray(np.einsum("...w,ij->...iwj", base, np.eye(2)).reshape((*azimuth.shape, 2, -1)))
+
+
+def coefficient_names(harmonics: int) -> tuple[str, ...]:
+    """Names of the coefficients in their order."""
+    waves = ["mean", *(f"{f} {k}A" for k in range(1, harmonics + 1) for f in ("cos", "sin"))]
+    return tuple(f"{wave} {axis}" for wave in waves for axis in ("east", "north"))
+
+
+def track_profile(
+    azimuth: np.ndarray,
+    turn: np.ndarray,
+    covariance: np.ndarray,
+    tilts: Tilts | None = None,
+    *,
+    harmonics: int = 2,
+    names: Sequence[str] | None = None,
+) -> TrackProfile:
+    """The tilt of the alidade by azimuth, from poses and inclinometers in one least squares.
+
+    azimuth      (m,) rad, of the poses; m may be 0 with tilts
+    turn         (m, 2) rad, rotation of the alidade about its own x and y axes, from design or a reference
+    covariance   (m, 2, 2) rad^2, of each, the poses independent of each other
+    tilts        readings of an inclinometer, or None
+    harmonics    K, waves a turn, 0 to 36
+    names        m, of the poses, for errors
+
+    Raises EstimationError naming the coefficients that nothing holds: too few azimuths, or an inclinometer alone.
+    """
+    if not 0 <= harmonics <= MOST_HARMONICS:
+        raise EstimationError(f"{harmonics} harmonics of a track profile (expected 0 to {MOST_HARMONICS})")
+    m, n = len(azimuth), 0 if tilts is None else len(tilts)
+    called = [*(names or [f"pose {k + 1}" for k in range(m)]), *(f"reading {k + 1}" for k in range(n))]
+    every = np.concatenate([np.asarray(azimuth, dtype=float), np.zeros(0) if tilts is None else tilts.azimuth])
+    if not len(every):
+        raise EstimationError("a track profile needs poses or inclinometer readings, none given")
+    own = np.swapaxes(rz(every)[..., :2, :2], -1, -2) @ _rows(every, harmonics)  # rz: ground from alidade
+    zero = np.zeros((m + n, 2, 2 if n else 0))
+    if n:
+        zero[m:] = np.eye(2)
+    design = np.concatenate([own, zero], axis=-1).reshape(2 * (m + n), -1)
+    read = np.zeros((0, 2)) if tilts is None else tilts.tilt
+    values = np.concatenate([np.asarray(turn, dtype=float).reshape(m, 2), read])
+    q = np.zeros((2 * (m + n), 2 * (m + n)))
+    for k in range(m):
+        q[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = covariance[k]
+    if tilts is not None:
+        q[2 * m :, 2 * m :] = np.diag(np.repeat(tilts.u**2, 2))
+    parameters = [*coefficient_names(harmonics), *(("zero x", "zero y") if n else ())]
+    found = best_linear_estimate(
+        design, values.ravel(), q, parameters=parameters, rows=[f"{c} {a}" for c in called for a in "xy"]
+    )
+    size = 4 * harmonics + 2
+    series = TiltSeries(harmonics, coefficient_names(harmonics), found.estimate[:size], found.covariance[:size, :size])
+    from scipy import special
+
+    free = found.degrees_of_freedom
+    weight = np.diag(found.weight)
+    good = weight > 1e-9 * float(weight.max(initial=0.0))
+    w = np.where(good, found.weighted_residual / np.sqrt(np.where(good, weight, 1.0)), np.nan)
+    return TrackProfile(
+        series=series,
+        zero=(found.estimate[size:], found.covariance[size:, size:]) if n else None,
+        azimuth=every,
+        residual=(values.ravel() - design @ found.estimate).reshape(-1, 2),
+        w=w.reshape(-1, 2),
+        poses=m,
+        pvv=found.pvv,
+        degrees_of_freedom=free,
+        p=float(special.chdtrc(free, found.pvv)) if free else float("nan"),
+    )
+
+
+def joined_tilt(
+    rotation: np.ndarray, covariance: np.ndarray, tilt: np.ndarray, u: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Six numbers of an alidade's pose (6,) with an inclinometer's reading joined, and their covariance (6, 6).
+
+    rotation     (6,) m and rad: translation and rotation in the alidade's axes, about its pivot, from the ranges
+    covariance   (6, 6)
+    tilt         (2,) rad, turns about x and y, the instrument's zero taken out
+    u            rad, of each, the zero's uncertainty included
+
+    One least squares of both: K = C B'(B C B' + u^2)^-1, B picking the two turns; translation follows by correlation.
+    """
+    if not u > 0.0:
+        raise EstimationError(f"inclinometer with u = {u / ARCSECOND:g} arcsec (expected above 0)")
+    pick = np.zeros((2, 6))
+    pick[0, 3] = pick[1, 4] = 1.0
+    gain = covariance @ pick.T @ np.linalg.inv(pick @ covariance @ pick.T + u**2 * np.eye(2))
+    left = np.eye(6) - gain @ pick
+    spread = left @ covariance @ left.T + u**2 * gain @ gain.T
+    return rotation + gain @ (np.asarray(tilt) - pick @ rotation), spread
+
+
+def pose_with_tilt(found: GroupPose, tilt: np.ndarray, u: float) -> GroupPose:
+    """An alidade's pose in its own frame with an inclinometer's reading joined, see `joined_tilt`.
+
+    The residuals of the points, their sum of squares and `gain` stay those of the ranges alone.
+    """
+    motion = found.pose.motion
+    if found.pose.frame != "alidade":
+        raise FrameError(f"pose in the frame '{found.pose.frame}', expected 'alidade', in which the inclinometer turns")
+    six = np.concatenate([motion.translation, motion.rotation])
+    six, covariance = joined_tilt(six, motion.covariance, tilt, u)
+    joined = replace(motion, translation=six[:3], matrix=from_vector(six[3:]), covariance=covariance)
+    return replace(found, pose=replace(found.pose, motion=joined))

@@ -1,0 +1,229 @@
+"""From records to stations, and to the counts of one mirror for given points: CAL.EQ."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import InputError
+from catseye.geometry.encoder import (
+    COUNTS_PER_TURN,
+    autocollimation_counts,
+    back_retro_counts,
+    prime_counts,
+    within,
+)
+from catseye.geometry.frame import Transform
+from catseye.geometry.imperfect import (
+    Imperfections,
+    imperfect_back_counts,
+    imperfect_counts,
+    imperfect_face_counts,
+)
+from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
+from catseye.records.mirror import MirrorGeometry
+from catseye.records.monument import MonumentGeometry
+from catseye.records.site_folder import SiteFolder
+from catseye.records.target import FeedArmRanger
+from catseye.reduction.site.places import nominal_frame
+
+FARTHEST = 1e12  # m, beyond the Sun; farther is a slip
+ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: nothing is known of an azimuth, uniform over a turn
+STEPS = {"axes": 1e-6, "tilts": 1e-7}  # m, rad, for derivatives
+AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
+TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
+
+
+def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> Station:
+    """The mirror on that monument.
+
+    Source: [PARKER04] Figures 2.2 and 2.4, transformations 1 to 6.
+    """
+    return Station(
+        np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE,
+        np.array([monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad]),
+        offset_of(mirror),
+        np.array([mirror.beta1_rad, mirror.beta2_rad]),
+        np.array([mirror.na0, mirror.ne0]),
+    )
+
+
+def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_reflector: Transform) -> Station:
+    """The mirror of a ranger on the feed arm, as the telescope stands.
+
+    ground_from_reflector    of that posture
+
+    Raises InputError where the record does not say how its mount is turned.
+
+    Source: [PARKER04] section 2.6.1: R_i and gamma are functions of the posture.
+    """
+    if ranger.mount_z is None or ranger.mount_y is None:
+        raise InputError(
+            f"feedarm.toml: ranger {ranger.name!r} has no mount_z, mount_y (expected unit vectors, reflector frame), "
+            "so that nothing says where its mirror points"
+        )
+    z = np.array(ranger.mount_z) / np.linalg.norm(ranger.mount_z)
+    y = np.array(ranger.mount_y) - z * (z @ np.array(ranger.mount_y))
+    y /= np.linalg.norm(y)
+    mount_from_reflector = np.stack([np.cross(y, z), y, z])
+    return Station.from_matrix(
+        ground_from_reflector.points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE),
+        mount_from_reflector @ ground_from_reflector.rotation.T,
+        offset=offset_of(mirror),
+        beta=np.array([mirror.beta1_rad, mirror.beta2_rad]),
+        zeros=np.array([mirror.na0, mirror.ne0]),
+    )
+
+
+def station_in(campaign: SiteFolder, name: str) -> Station | None:
+    """A campaign's ranger, the telescope in its nominal posture; None where no record says how its mount is turned."""
+    mirror = campaign.mirror_of(name)
+    if name in campaign.monuments:
+        return station_of(campaign.monuments[name], mirror)
+    ranger = next(r for r in campaign.feedarm.ranger if r.name == name)
+    return None if ranger.mount_z is None else feed_arm_station(ranger, mirror, nominal_frame(campaign))
+
+
+def offset_of(mirror: MirrorGeometry) -> np.ndarray:
+    """(3,) m, mount axes: from the fixed point to the scan point."""
+    return np.array([mirror.dx_mm, mirror.dy_mm, mirror.dz_mm]) * MILLIMETRE
+
+
+def imperfections_of(mirror: MirrorGeometry) -> Imperfections | None:
+    """What the record says of offsets, tilts and encoder errors; None where it knows of none."""
+    found = _imperfections(mirror)
+    return found if found.matter else None
+
+
+def _imperfections(mirror: MirrorGeometry) -> Imperfections:
+    return Imperfections(
+        axes=np.array([getattr(mirror, key) for key in AXES]) * MILLIMETRE,
+        tilts=np.array([getattr(mirror, key) for key in TILTS]),
+        azimuth_waves=np.array([mirror.azimuth_encoder_cosine_counts, mirror.azimuth_encoder_sine_counts]),
+        elevation_waves=np.array([mirror.elevation_encoder_cosine_counts, mirror.elevation_encoder_sine_counts]),
+    )
+
+
+def imperfections_variance(station: Station, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
+    """(n, 2), counts^2, of the direct pointing's counts for points (n, 3), m, by what the record says it does not know
+    of offsets, tilts and encoder errors; zero where it says nothing.
+
+    Each term is independent. A cosine and a sine term of one order, known to u each, give u^2 at any angle.
+
+    Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
+    """
+    whole = _imperfections(mirror)
+    answer = np.zeros((len(to), 2))
+    for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
+        if u == 0.0:
+            continue
+        values, step = getattr(whole, part), STEPS[part]
+        for away in step * np.eye(len(values)):
+            ahead, behind = (
+                imperfect_counts(station, replace(whole, **{part: values + sign * away}), to) for sign in (1, -1)
+            )
+            apart = ahead - behind
+            apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
+            answer += np.square(u * apart / (2.0 * step))
+    orders = np.array([whole.azimuth_waves.shape[1], whole.elevation_waves.shape[1]])
+    return answer + np.square(mirror.u_encoder_counts or 0.0) * orders
+
+
+def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(13, 13), of the station's parameters in their units, and the keys that the records lack: counted as known.
+
+    The records give one u each and no correlations.
+    """
+    lacking: list[str] = []
+
+    def u(record: object, key: str, factor: float = 1.0) -> float:
+        value = getattr(record, key)
+        if value is None:
+            lacking.append(key)
+            return 0.0
+        return float(value) * factor
+
+    place = [u(monument, f"u_{axis}_mm", MILLIMETRE) for axis in "xyz"]
+    turn = [u(monument, f"u_alpha{k}_rad") for k in (1, 2, 3)]
+    offset = [u(mirror, "u_offset_mm", MILLIMETRE)] * 3
+    beta = [u(mirror, "u_beta_rad")] * 2
+    zeros = [u(mirror, "u_zero_counts")] * 2
+    return np.diag(np.square([*place, *turn, *offset, *beta, *zeros])), tuple(lacking)
+
+
+@dataclass(frozen=True, eq=False)
+class Pointings:
+    """Where one mirror looks for n points, everything (n,) unless said otherwise; CAL.EQ's answer and more.
+
+    to                   (n, 3), m, ground
+    aim                  range, Theta, Phi and counts of the six transformations
+    counts               (n, 2) of the direct pointing, offsets, tilts and encoder errors of the record included
+    prime                (n, 2) of the prime pointing: half a turn up or down, whichever is allowed, up where neither is
+    autocollimation, back_retro   elevation counts at which the face, or the retroreflector behind it, looks there
+    allowed, prime_allowed        azimuth within the limits
+    u                    (n, 2), counts, of the direct pointing by the records; NaN where they do not say it all; of an
+                         azimuth at most that of any turn; of an elevation on the azimuth axis itself NaN
+    lacking              keys of uncertainties that the records lack
+    """
+
+    to: np.ndarray
+    aim: Aim
+    counts: np.ndarray
+    prime: np.ndarray
+    autocollimation: np.ndarray
+    back_retro: np.ndarray
+    allowed: np.ndarray
+    prime_allowed: np.ndarray
+    u: np.ndarray
+    lacking: tuple[str, ...]
+
+
+def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
+    """Encoder counts of one mirror for points (n, 3), m, ground.
+
+    Raises InputError for a point that has no direction, is farther than FARTHEST, or that the beam of this mirror does
+    not meet.
+
+    Source: [PARKER04] Figure 2.5 (CAL.EQ), eq. 2.12 to 2.26.
+    """
+    station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
+    for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
+        raise InputError(f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m)")
+    found = aim(station, to)
+    low, high = mirror.az_low_limit, mirror.az_high_limit
+    direct = np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+    if imperfections is None:
+        prime = np.stack(prime_counts(direct[:, 0], direct[:, 1], station.zeros[1]), axis=-1)
+        face = autocollimation_counts(found.phi, station.zeros[1])
+        back = back_retro_counts(found.phi, station.zeros[1])
+    else:
+        prime = imperfect_counts(station, imperfections, to, prime=True)
+        direct = imperfect_counts(station, imperfections, to)
+        both = imperfect_face_counts(station, imperfections, to)
+        face, back = both[:, 1], imperfect_back_counts(station, imperfections, both)
+    for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
+        raise InputError(
+            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {found.range[k]:.4g} m from the scan point of "
+            f"{mirror.zp} on {monument.monument}, {np.degrees(found.phi[k]):.4g} deg from its azimuth axis: no setting "
+            "of the mirror looks there"
+        )
+    lower = prime[:, 0] - COUNTS_PER_TURN
+    down = ~within(prime[:, 0], low, high) & within(lower, low, high)
+    prime = np.column_stack([np.where(down, lower, prime[:, 0]), prime[:, 1]])
+    covariance, lacking = station_covariance(monument, mirror)
+    spread = counts_covariance(station, to, of_station=covariance)
+    variance = np.diagonal(spread, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to)
+    u = np.sqrt(variance)
+    u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
+    return Pointings(
+        to=to,
+        aim=found,
+        counts=direct,
+        prime=prime,
+        autocollimation=face,
+        back_retro=back,
+        allowed=within(direct[:, 0], low, high),
+        prime_allowed=within(prime[:, 0], low, high),
+        u=np.full_like(u, np.nan) if lacking else u,
+        lacking=lacking,
+    )

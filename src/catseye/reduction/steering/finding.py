@@ -1,0 +1,236 @@
+"""Finding a target by its return: search until there is light, scan around it, fit the spot, say where it is.
+
+    find               the whole of it, from a predicted pointing and something that measures; the spot by `spot_fit`
+    found_point        the target's place, from the counts found and a known range
+    search_results     a table of what was found; adjustment_readings the one by which zeros and angles are adjusted
+
+A target that is not found is a status with what was searched, never an exception.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.pointing import Station, ray, ray_jacobian
+from catseye.geometry.search_pattern import (
+    LEAST_REACH,
+    Pattern,
+    count_size,
+    offsets_of_counts,
+    raster,
+    spiral,
+)
+from catseye.geometry.time_tag import TimeTag
+from catseye.optics.spot import reach
+from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
+
+Array = NDArray[np.float64]
+Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN where there is no reading
+Allowed = Callable[[Array, Array], bool]  # from counts (2,) to counts (2,), now
+
+WIDER = 1.6  # half a scan's width over the spot's radius
+RECENTRED = 3  # scans at most
+COLUMNS = (
+    "target",
+    "azimuth_counts",
+    "elevation_counts",
+    "u_azimuth_counts",
+    "u_elevation_counts",
+    "amplitude_volt",
+    "mjd",
+)
+
+
+def find(
+    predicted: ArrayLike,
+    head: Head,
+    measure: Measure,
+    *,
+    search_radius: float,
+    allowed: Allowed | None = None,
+    standing: ArrayLike | None = None,
+) -> Spot:
+    """The pointing at which a target returns most, searched for about a predicted one.
+
+    predicted       (2,) counts (Na, Ne), real, direct or prime
+    head            the ranger
+    measure         amplitude at (2,) whole counts
+    search_radius   rad on the sky, 0 or more
+    allowed         whether the mirror may go from counts to counts now (Sun, structure: `Guard.slew`); asked before
+                    every look, so that a long search meets no Sun that has come meanwhile; always if None
+    standing        (2,) counts where the mirror stands at first; at the first look if None
+
+    A spiral of looks, without gaps for a spot that falls to the threshold no sooner than to half its peak (a status
+    says so where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
+    until the spot's centre is well inside; then `fit_spot`. Light that turns out to be no spot (a spike, a reflection)
+    does not end the search: the spiral goes on.
+
+    Source: the notes' practice of searching at predicted counts; patterns in `geometry.search_pattern`.
+    """
+    looked: dict[tuple[float, ...], float] = {}
+    refused: set[tuple[float, ...]] = set()
+    here = None if standing is None else np.asarray(standing, dtype=float)
+
+    def look(at: Array) -> float:
+        nonlocal here
+        if tuple(at) in looked:
+            return looked[tuple(at)]
+        if allowed is not None and not allowed(at if here is None else here, at):
+            refused.add(tuple(at))
+            return np.nan
+        here = at
+        looked[tuple(at)] = float(measure(at))
+        return looked[tuple(at)]
+
+    within = max(float(reach(head.radius, 0.5)), LEAST_REACH)
+    pattern = spiral(predicted, head.zeros, search_radius, within, head.azimuth_limits)
+    spot, light = Spot(""), None
+    for at in pattern.counts:
+        before = tuple(at) in looked  # by a scan of light that was no spot
+        if look(at) > head.threshold_volt and not before:
+            spot, light = _centred(at, head, look, looked), at
+            if spot.found:
+                break
+    seen = list(looked.values())
+    status = spot.status
+    if light is None:
+        status = _nothing(pattern, len(refused), seen, predicted, head, search_radius)
+    elif not spot.found:
+        status = f"{status} (light of {np.nanmax(seen):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
+    return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(seen))
+
+
+def _centred(
+    hit: Array,
+    head: Head,
+    look: Measure,
+    looked: Mapping[tuple[float, ...], float],
+) -> Spot:
+    """The spot about a place with light: scanned, and scanned again until its centre is well inside."""
+    fine = float(max(0.5 * np.hypot(*count_size(hit, head.zeros)) * 1.001, 0.25 * head.radius))
+    centre, half = hit, WIDER * head.radius
+    spot = Spot("")
+    for _ in range(RECENTRED):
+        try:
+            scan = raster(centre, head.zeros, (half, half), fine, head.azimuth_limits)
+        except ValidityError:  # the azimuth axis lies within the scan: a raster has no rows there
+            scan = spiral(centre, head.zeros, half, max(fine, LEAST_REACH), head.azimuth_limits)
+        for at in scan.counts:
+            look(at)
+        places, values = np.array(list(looked)), np.array(list(looked.values()))
+        near = offsets_of_counts(centre, head.zeros, places)
+        use = np.hypot(near[:, 0], near[:, 1]) <= 2.0 * half
+        spot = fit_spot(places[use], values[use], head)
+        off = offsets_of_counts(centre, head.zeros, spot.counts[None])[0] if spot.found else np.zeros(2)
+        if not spot.found or np.hypot(*off) <= 0.5 * half:
+            break
+        centre = np.rint(spot.counts)
+    return spot
+
+
+def found_point(
+    station: Station, spot: Spot, distance: float, u_distance: float, *, of_station: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
+
+    station       the ranger
+    spot          found
+    distance      m from the scan point, above 0; u_distance m
+    of_station    (13, 13) covariance of the station's parameters; none if None
+
+    Raises ValidityError for a spot that was not found.
+
+    Source: [PARKER04] eqs. 2.12-2.22 turned round; [JCGM102] first order.
+    """
+    if not spot.found:
+        raise ValidityError(f"no point for a target that was {spot.status}")
+    if not (0.0 < distance < np.inf and 0.0 <= u_distance < np.inf):
+        raise ValidityError(f"distance {distance} m, u {u_distance} m: expected above 0, and 0 or more")
+    origin, direction = ray(station, spot.counts)
+    by_counts, turned, moved = ray_jacobian(station, spot.counts)
+    slope = distance * by_counts
+    covariance = slope @ spot.covariance @ slope.T + u_distance**2 * np.outer(direction, direction)
+    if of_station is not None:
+        whole = moved + distance * turned
+        covariance = covariance + whole @ np.asarray(of_station, dtype=float) @ whole.T
+    return origin + distance * direction, covariance
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """A target that was found: its name, the spot, and when."""
+
+    target: str
+    spot: Spot
+    when: TimeTag
+
+
+def search_results(results: Sequence[SearchResult]) -> str:
+    """CSV text of targets found: real counts with their standard uncertainties, V, and an MJD to the microsecond.
+
+    Those that were not found have no row: what has no counts adjusts nothing. Raises ValidityError where none was.
+    """
+    found = [result for result in results if result.spot.found]
+    if not found:
+        raise ValidityError(f"none of {len(results)} targets was found: there is no table of search results to write")
+    lines = [",".join(COLUMNS)]
+    _refuse_commas(found)
+    for result in found:
+        spot, u = result.spot, result.spot.u_counts
+        numbers = [*(f"{n:.3f}" for n in spot.counts), *(f"{v:.4f}" for v in u), f"{spot.amplitude:.4f}"]
+        lines.append(",".join([result.target, *numbers, result.when.text()]))
+    return "\n".join(lines) + "\n"
+
+
+def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, ArrayLike], ne0: float) -> str:
+    """CSV text of targets found, with where they are, as the calibration kind `search-results` reads it.
+
+    results    of one ranger; those not found have no row
+    places     target: (3,) m, ground
+    ne0        counts, elevation at Phi = 0: below it is the prime pointing
+
+    Raises ValidityError where none was found, or where a target that was has no place.
+    """
+    found = [result for result in results if result.spot.found]
+    missing = [result.target for result in found if result.target not in places]
+    if missing or not found:
+        what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
+        raise ValidityError(f"{what}: there is nothing to adjust by")
+    _refuse_commas(found)
+    lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,u_azimuth_counts,u_elevation_counts,pointing,mjd_utc"]
+    for result in found:
+        (na, ne), u = result.spot.counts, result.spot.u_counts
+        where = [f"{x:.5f}" for x in np.asarray(places[result.target], dtype=float)]
+        pointing = "prime" if ne < ne0 else "direct"
+        counts = (f"{na:.3f}", f"{ne:.3f}", f"{u[0]:.3g}", f"{u[1]:.3g}")
+        lines.append(",".join([result.target, *where, *counts, pointing, result.when.text()]))
+    return "\n".join(lines) + "\n"
+
+
+def _refuse_commas(results: Sequence[SearchResult]) -> None:
+    for result in results:
+        if not result.target or any(mark in result.target for mark in ',"\r\n'):
+            raise ValidityError(f"target {result.target!r} is no name for a table (expected no comma, quote, line end)")
+
+
+def _nothing(
+    pattern: Pattern, forbidden: int, seen: list[float], predicted: ArrayLike, head: Head, radius: float
+) -> str:
+    """The status of a search that saw no light."""
+    na, ne = np.asarray(predicted, dtype=float)
+    readings = [value for value in seen if np.isfinite(value)]
+    gaps = {
+        "beyond the stops": pattern.left_out,
+        "forbidden": forbidden,
+        "without a reading": len(seen) - len(readings),
+    }
+    left = ", ".join(f"{number} {what}" for what, number in gaps.items() if number)
+    narrow = "; the spot is narrower than whole counts surely meet" if reach(head.radius, 0.5) < LEAST_REACH else ""
+    most = f"; the largest was {max(readings):.3f} V" if readings else ""
+    return (
+        f"not found: nothing above {head.threshold_volt:g} V at {len(readings)} places within {1e3 * radius:.3g} mrad "
+        f"of {na:.1f}, {ne:.1f}{f' ({left})' if left else ''}{most}{narrow}"
+    )

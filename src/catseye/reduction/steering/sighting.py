@@ -1,0 +1,141 @@
+"""What stands in a beam's way: the Sun, boxes that must stay dark, solids; and whether a retroreflector looks back."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import DEGREE
+from catseye.errors import InputError
+from catseye.geometry.imperfect import imperfect_ray
+from catseye.geometry.pointing import Station, ray
+from catseye.geometry.slew import Pace
+from catseye.geometry.sun import altitude_azimuth
+from catseye.records.keep_out import KeepOut
+from catseye.records.mirror import MirrorGeometry
+from catseye.records.monument import MonumentGeometry
+from catseye.records.solids import Solids
+from catseye.reduction.site.earth_rotation import Place, standard_pressure_hpa, sun_at
+from catseye.reduction.site.stations import imperfections_of
+from catseye.reduction.steering.guard import Verdict, guard_of
+from catseye.reduction.steering.visibility import Retroreflectors, Visibility, frames_at, visibility
+
+STANDING = Pace((1.0, 1.0), (1.0, 1.0))  # a pointing asks nothing of the axes' speeds
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One beam at one time; None for what was not asked.
+
+    mjd                UTC
+    sun, keep_out      verdicts on the Sun's cone, and on the boxes
+    separation         rad, of the beam from the middle of the Sun
+    altitude, azimuth  rad, of the Sun; the azimuth clockwise from north
+    earth_rotation     where UT1 - UTC came from
+    """
+
+    mjd: float = np.nan
+    sun: Verdict | None = None
+    keep_out: Verdict | None = None
+    separation: float | None = None
+    altitude: float | None = None
+    azimuth: float | None = None
+    earth_rotation: str = ""
+
+
+def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None) -> Place:
+    """Where on Earth the site is: the options, else the monument's record; with standard air, which lifts the Sun.
+
+    Raises InputError where neither says it, and for one that is no place.
+    """
+    given = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
+    found = {key: getattr(monument, key) if value is None else value for key, value in given.items()}
+    for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
+        value = found[key]
+        if value is not None and not limits[0] <= value <= limits[1]:
+            raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
+        if value is None:
+            raise InputError(
+                f"the Sun's place needs {key}, which the record of {monument.monument} does not have (expected it "
+                f"there, or --{key.replace('_', '-')})"
+            )
+    height = monument.elevation_m or 0.0
+    latitude, longitude = float(found["latitude_deg"]) * DEGREE, float(found["longitude_deg"]) * DEGREE
+    return Place(latitude, longitude, height, standard_pressure_hpa(height))
+
+
+def sightings(
+    station: Station,
+    mirror: MirrorGeometry,
+    counts: np.ndarray,
+    *,
+    name: str,
+    mjd: float | None,
+    place: Place | None,
+    keep_out: KeepOut,
+) -> list[Sighting]:
+    """The Sun and the keep-out boxes for beams at counts (n, 2); the azimuth stops are not asked here.
+
+    mirror  its tilts and encoder errors widen every zone
+    name    of the ranger, for the answers
+    mjd     UTC; None: the Sun is not asked for, nor is `place`
+    """
+    whole = guard_of(name, station, mirror, keep_out=keep_out, place=place, pace=STANDING)
+    free = replace(whole, azimuth_limits=(-np.inf, np.inf))
+    under_sun = None if mjd is None else replace(free, boxes=())
+    boxed = replace(free, place=None) if keep_out.box else None
+    imperfections = imperfections_of(mirror)
+    sun = None if mjd is None or place is None else sun_at(mjd, place)
+    answer = []
+    for n in counts:
+        seen = Sighting(keep_out=None if boxed is None else boxed.pointing(mjd or 0.0, n))
+        if sun is not None and under_sun is not None and mjd is not None:
+            altitude, azimuth = altitude_azimuth(sun.direction)
+            beam = ray(station, n) if imperfections is None else imperfect_ray(station, imperfections, n)
+            across = np.linalg.norm(np.cross(beam.direction, sun.direction))
+            seen = replace(
+                seen,
+                mjd=mjd,
+                sun=under_sun.pointing(mjd, n),
+                separation=float(np.arctan2(across, beam.direction @ sun.direction)),
+                altitude=float(altitude),
+                azimuth=float(azimuth),
+                earth_rotation=str(sun.status),
+            )
+        answer.append(seen)
+    return answer
+
+
+def seen_from(
+    station: Station,
+    name: str,
+    to: np.ndarray,
+    *,
+    kind: str,
+    facing: np.ndarray | None,
+    solids: Solids,
+    posture: tuple[float, float] | None,
+    reachable: np.ndarray | None = None,
+) -> Visibility:
+    """Whether retroreflectors at points (n, 3), m, ground, serve one ranger.
+
+    kind      of retroreflector, a key of ACCEPTANCE
+    facing    (3,) of all of them, ground: outward normal; None: incidence is not judged
+    solids    that may stand in the way
+    posture   azimuth, elevation, rad, of the telescope that carries some of them
+    reachable (n,) bool: within the azimuth stops in one of the pointings
+
+    Raises InputError for a solid on the telescope without a posture.
+    """
+    aboard = next((solid for solid in solids.all if solid.frame != "ground"), None)
+    if posture is None and aboard is not None:
+        raise InputError(
+            f"solid {aboard.name!r} stands in the frame {aboard.frame}: nothing says where that is (expected --posture)"
+        )
+    axis = np.full(3, np.nan) if facing is None else facing
+    return visibility(
+        {name: station.scan_point},
+        Retroreflectors(("",) * len(to), (kind,) * len(to), to, np.broadcast_to(axis, to.shape)),
+        solids,
+        frames_at(*(posture or (0.0, 0.0))),
+        reachable=None if reachable is None else reachable[None],
+    )

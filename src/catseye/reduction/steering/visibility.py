@@ -1,0 +1,259 @@
+"""Which ranger can range to which retroreflector in a posture, and where it cannot, why not.
+
+How far off its axis each kind of retroreflector still serves stands in one table, `ACCEPTANCE`. A cube corner is used
+as long as `least_share` of its face sends light back (`optics.prism.clear_share`); what the polished faces of an
+uncoated prism let through beyond 20 deg on the side of an edge (`optics.solid_prism`) is not counted there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE
+from catseye.geometry.antenna import (
+    ELEVATION_AXIS_HEIGHT,
+    alidade_from_elevation,
+    ground_from_alidade,
+    ground_from_reflector,
+)
+from catseye.geometry.frame import Transform
+from catseye.geometry.visibility import first_obstruction, incidence, ranges
+from catseye.optics.prism import clear_share
+from catseye.records.campaign import Campaign
+from catseye.records.solids import Solids
+from catseye.reduction.site.places import places_of
+
+Array = NDArray[np.float64]
+CLEAR_START = 0.6  # m: the ranger's own head and mount
+CLEAR_END = 0.15  # m: the retroreflector's own seat, and a cat's-eye's other half
+BEAM_RADIUS = 0.0125  # m: the GBT's beam at 120 to 230 m, 1/e^2, and a little
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """How far off its axis a kind of retroreflector serves.
+
+    why            where the numbers come from
+    cone           rad: said outright; None where it follows from the face
+    aperture       m, radius of a cube corner's face; height m; index, phase, of what fills it
+    least_share    of its face that must send light back
+    """
+
+    why: str
+    cone: float | None = None
+    aperture: float = 25.4e-3
+    height: float = 38.1e-3
+    index: float = 1.0
+    least_share: float = 0.075
+
+    @property
+    def limit(self) -> float:
+        """rad: the largest incidence that serves."""
+        if self.cone is not None:
+            return self.cone
+        from scipy.optimize import brentq
+
+        def spare(angle: float) -> float:
+            face = {"aperture": self.aperture, "height": self.height, "index": self.index}
+            return float(clear_share(angle, **face)) - self.least_share
+
+        return float(brentq(spare, 0.0, 0.499 * np.pi))
+
+
+ACCEPTANCE: Mapping[str, Acceptance] = {
+    "prism": Acceptance("face of 2 inches, 1.5 inches high, BK 7, as GBT's; least share chosen: 45 deg", index=1.511),
+    "hollow": Acceptance("round face inscribed in the corner: sqrt 2 of its radius high; same share", height=35.9e-3),
+    "ball": Acceptance("beyond, the half-balls' common plane is in the way; chosen, not measured", cone=80.0 * DEGREE),
+}
+
+
+class Sight(IntEnum):
+    """What becomes of a pair."""
+
+    SEEN = 0
+    TOO_NEAR = 1
+    TOO_FAR = 2
+    INCIDENCE = 3
+    OBSTRUCTED = 4
+    BEYOND_STOPS = 5
+
+
+@dataclass(frozen=True)
+class RangeLimits:
+    """Ranges that a ranger can use, m; the far one is twice what the GBT asks."""
+
+    near: float = 2.0
+    far: float = 500.0
+
+
+@dataclass(frozen=True, eq=False)
+class Retroreflectors:
+    """Retroreflectors in the ground frame.
+
+    names    (t)
+    kinds    (t) keys of ACCEPTANCE
+    points   (t, 3) m
+    axes     (t, 3) outward axes; NaN where no record says: then incidence is not judged
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    points: Array
+    axes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """The answer for r rangers and t retroreflectors.
+
+    rangers, targets   names
+    code               (r, t) of Sight
+    range              (r, t) m
+    incidence          (r, t) rad, NaN where no axis is known
+    limit              (t,) rad
+    obstacle           (r, t) index into `solids`, -1 where clear
+    obstacle_at        (r, t) m from the ranger
+    solids             names
+    limits             of ranges
+    """
+
+    rangers: tuple[str, ...]
+    targets: tuple[str, ...]
+    code: NDArray[np.int64]
+    range: Array
+    incidence: Array
+    limit: Array
+    obstacle: NDArray[np.int64]
+    obstacle_at: Array
+    solids: tuple[str, ...]
+    limits: RangeLimits
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(r, t)."""
+        return self.code == Sight.SEEN
+
+    def reason(self, ranger: int, target: int) -> str:
+        """One line on a pair."""
+        code, distance = Sight(int(self.code[ranger, target])), self.range[ranger, target]
+        if code is Sight.TOO_NEAR:
+            return f"too near: {distance:.1f} m under {self.limits.near:g}"
+        if code is Sight.TOO_FAR:
+            return f"too far: {distance:.1f} m above {self.limits.far:g}"
+        if code is Sight.INCIDENCE:
+            angle = np.degrees(self.incidence[ranger, target])
+            return f"incidence {angle:.0f} deg above {np.degrees(self.limit[target]):.0f}"
+        if code is Sight.OBSTRUCTED:
+            name = self.solids[self.obstacle[ranger, target]]
+            return f"obstructed by {name!r} at {self.obstacle_at[ranger, target]:.1f} m"
+        return "beyond the azimuth stops" if code is Sight.BEYOND_STOPS else "seen"
+
+
+def visibility(
+    rangers: Mapping[str, Array],
+    targets: Retroreflectors,
+    solids: Solids,
+    frames: Mapping[str, Transform],
+    *,
+    limits: RangeLimits | None = None,
+    reachable: NDArray[np.bool_] | None = None,
+    acceptance: Mapping[str, Acceptance] = ACCEPTANCE,
+    beam_radius: float = BEAM_RADIUS,
+) -> Visibility:
+    """Every pair of ranger and retroreflector: seen, or the first reason why not.
+
+    rangers       name: scan point (3,) m, ground
+    targets       t of them
+    solids        what may stand in the way
+    frames        name: ground from that frame, for each frame of a solid, see `frames_at`
+    limits        of ranges
+    reachable     (r, t) bool: within the azimuth stops, where that is known
+    acceptance    of each kind of retroreflector
+    beam_radius   m, by which solids are grown
+
+    Reasons are judged in the order range, incidence, obstruction, stops.
+
+    Source: geometry of rays; see `geometry.solids`.
+    """
+    limits = limits or RangeLimits()
+    stand = np.array(list(rangers.values()), dtype=float).reshape(-1, 3)
+    distance = ranges(stand, targets.points)
+    angle = incidence(stand, targets.points, targets.axes)
+    limit = np.array([acceptance[kind].limit for kind in targets.kinds])
+    which, at, names = _obstructions(stand, targets.points, solids, frames, beam_radius)
+    code = np.full(distance.shape, Sight.SEEN, dtype=np.int64)
+    with np.errstate(invalid="ignore"):
+        oblique = angle > limit
+    beyond = np.zeros(distance.shape, dtype=bool) if reachable is None else ~np.asarray(reachable, dtype=bool)
+    for reason, there in (
+        (Sight.BEYOND_STOPS, beyond),
+        (Sight.OBSTRUCTED, which >= 0),
+        (Sight.INCIDENCE, oblique),
+        (Sight.TOO_FAR, distance > limits.far),
+        (Sight.TOO_NEAR, distance < limits.near),
+    ):
+        code[there] = reason
+    return Visibility(tuple(rangers), targets.names, code, distance, angle, limit, which, at, names, limits)
+
+
+def frames_at(azimuth: float, elevation: float, reflector: Transform | None = None) -> dict[str, Transform]:
+    """Ground from each frame in which solids stand, at a posture.
+
+    azimuth      rad, clockwise from north; elevation rad
+    reflector    ground from reflector where it is better known than nominal
+
+    Source: [PARKER04] eqs. 2.40-2.44.
+    """
+    alidade = ground_from_alidade(azimuth)
+    return {
+        "ground": Transform("ground", "ground", np.eye(3), np.zeros(3)),
+        "alidade": alidade,
+        "elevation": alidade @ alidade_from_elevation(elevation, elevation_axis_height=ELEVATION_AXIS_HEIGHT),
+        "reflector": reflector or ground_from_reflector(azimuth, elevation),
+    }
+
+
+def retroreflectors_of(campaign: Campaign) -> Retroreflectors:
+    """Prisms, hollow cubes and balls of a campaign, where they nominally stand in its posture.
+
+    A ball looks the other way than its triplet's normal, which points to the prisms' side. No record says how a hollow
+    cube is turned: its incidence is not judged.
+
+    Source: `places_of`; [GOLDMAN00] figure 10.
+    """
+    places = {name: place for name, place in places_of(campaign).items() if place.kind != "ranger"}
+    balls = {triplet.ball.target: places[triplet.left_prism.target].normal for triplet in campaign.triplets.values()}
+    axes = []
+    for name, place in places.items():
+        normal = place.normal if place.normal is not None else balls.get(name)
+        sign = -1.0 if name in balls else 1.0
+        axes.append(np.full(3, np.nan) if normal is None else sign * normal)
+    return Retroreflectors(
+        tuple(places),
+        tuple(place.kind for place in places.values()),
+        np.array([place.start for place in places.values()]),
+        np.array(axes),
+    )
+
+
+def _obstructions(
+    stand: Array, points: Array, solids: Solids, frames: Mapping[str, Transform], beam_radius: float
+) -> tuple[NDArray[np.int64], Array, tuple[str, ...]]:
+    """First solid in each path, where, and the names of all solids."""
+    names: list[str] = []
+    best = np.full((len(stand), len(points)), np.inf)
+    which = np.full(best.shape, -1, dtype=np.int64)
+    for frame in dict.fromkeys(solid.frame for solid in solids.all):
+        own = [solid for solid in solids.all if solid.frame == frame]
+        to_frame = frames[frame].inverse()
+        grown = [solid.solid().grown(beam_radius) for solid in own]
+        index, at = first_obstruction(
+            to_frame.points(stand), to_frame.points(points), grown, clear_start=CLEAR_START, clear_end=CLEAR_END
+        )
+        nearer = at < best
+        best, which = np.where(nearer, at, best), np.where(nearer, index + len(names), which)
+        names += [solid.name for solid in own]
+    return which, best, tuple(names)

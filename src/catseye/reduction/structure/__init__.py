@@ -1,0 +1,1 @@
+"""A flexible telescope: its model, its fit to many epochs, its vibration."""

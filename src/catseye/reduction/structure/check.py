@@ -1,0 +1,115 @@
+"""Whether a structure's model foretells what it was not shown: epochs left out, predicted less measured."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.errors import EstimationError, InputError
+from catseye.reduction.structure.series import GroupSeries, Scatter, SeriesModel, StructureFit, fit_structure, widened
+
+Array = NDArray[np.float64]
+FOLDS = 5
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveOut:
+    """What was foretold of epochs that a fit did not see.
+
+    residual       (T, n, 3) m, measured less foretold; NaN where not measured
+    covariance     (T, n, 3, 3) m^2, claimed: of the foretelling, of what is new in an epoch, of the measurement
+    fold           (T,) in which each epoch was left out
+    extrapolated   (T,) whether its elevation or temperature lay outside the epochs that were fitted
+    """
+
+    residual: Array
+    covariance: Array
+    fold: NDArray[np.intp]
+    extrapolated: NDArray[np.bool_]
+
+    @property
+    def normalised(self) -> Array:
+        """(T, n) squares of residuals over their covariance, expectation 3; NaN where not measured."""
+        weighted = np.linalg.solve(self.covariance, self.residual[..., None])[..., 0]
+        return np.einsum("tni,tni->tn", self.residual, weighted)
+
+    @property
+    def ratio(self) -> float:
+        """Rms of the residuals over the claimed uncertainty, expectation 1: above it too little was claimed."""
+        return float(np.sqrt(np.nanmean(self.normalised) / 3.0))
+
+    @property
+    def rms(self) -> float:
+        """m, of the coordinates."""
+        return float(np.sqrt(np.nanmean(self.residual**2)))
+
+
+def left_out(
+    series: GroupSeries, model: SeriesModel | None = None, *, folds: int = FOLDS, progress: Progress | None = None
+) -> LeaveOut:
+    """Each epoch foretold by a fit that did not see it: the series in `folds` stretches of time, one left out in turn.
+
+    series     epochs, in order of time
+    model      as for `fit_structure`
+    folds      2 up, at most as many as epochs
+
+    Stretches, not single epochs: what neighbours in time share would else foretell itself. Raises EstimationError
+    where the rest of the epochs no longer carries the model, with the stretch.
+    """
+    what = model or SeriesModel()
+    if not 2 <= folds <= len(series):
+        raise InputError(f"{folds} stretches of {len(series)} epochs (expected 2 to {len(series)})")
+    fold = np.arange(len(series)) * folds // len(series)
+    residual = np.full(series.places.shape, np.nan)
+    covariance = np.full((*series.places.shape, 3), np.nan)
+    extrapolated = np.zeros(len(series), dtype=bool)
+    for k in range(folds):
+        if progress is not None:
+            progress("leaving out", k, folds)
+        out = np.flatnonzero(fold == k)
+        try:
+            found = fit_structure(series.part(np.flatnonzero(fold != k)), what)
+        except EstimationError as problem:
+            first, last = (series.labels[i] if series.labels else str(i) for i in (out[0], out[-1]))
+            raise EstimationError(f"without epochs {first} to {last}: {problem}") from problem
+        at = np.array([series.names.index(name) for name in found.series.names])
+        _foretell(found, series, out, at, residual, covariance, extrapolated)
+    return LeaveOut(residual, covariance, fold, extrapolated)
+
+
+def _foretell(
+    found: StructureFit,
+    series: GroupSeries,
+    out: NDArray[np.intp],
+    at: NDArray[np.intp],
+    residual: Array,
+    covariance: Array,
+    beyond: NDArray[np.bool_],
+) -> None:
+    """Residuals and claimed covariances of the epochs left out, into their places."""
+    e = np.asarray(series.posture.elevation)[out]
+    warm = np.asarray(series.posture.temperature_c)[out] if found.model.temperature else None
+    told = found.predict(e, temperature_c=warm, way=series.way[out])
+    residual[np.ix_(out, at)] = series.places[np.ix_(out, at)] - told.place
+    covariance[np.ix_(out, at)] = told.covariance + of_points(series)[np.ix_(out, at)]
+    for i, epoch in enumerate(out):
+        single = found.predict(e[i : i + 1], temperature_c=None if warm is None else warm[i : i + 1])
+        beyond[epoch] = bool(single.outside)
+
+
+def of_points(series: GroupSeries, scatter: Scatter | None = None) -> Array:
+    """Covariance (T, n, 3, 3) m^2 of each place by itself, with what is new in an epoch where it is given."""
+    arms = np.nanmean(series.places, axis=0) - series.pivot
+    spread = series.spread if scatter is None else widened(series.spread, arms, scatter)
+    shape = (*series.places.shape, 3)
+    if spread.full is not None:
+        n = shape[1]
+        blocks = spread.full.reshape(-1, n, 3, n, 3)[:, np.arange(n), :, np.arange(n)]  # (n, T, 3, 3)
+        return np.broadcast_to(np.swapaxes(blocks, 0, 1), shape)
+    assert spread.points is not None  # a spread has one of both
+    found = np.broadcast_to(spread.points, shape)
+    if spread.shared is not None:
+        found = found + np.einsum("tniq,tnlq->tnil", spread.shared, spread.shared)
+    return found

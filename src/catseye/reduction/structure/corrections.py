@@ -1,0 +1,275 @@
+"""The third order in one posture: what measured targets say on top of the structural model.
+
+    frame_motion      shift and turn of one frame from three targets or more, without regard to the model's own
+    correct_posture   corrections to all frames that carry measured targets, the model's uncertainty as their prior
+
+Measured coordinates come with their full covariance, as `coordinates.json` has it; targets' places in their frames
+(the sheet) are uncertain too. Many postures together change the model itself: `structure_fit`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.rigid_body import fit_transformation
+from catseye.geometry.deformation import Posture
+from catseye.geometry.frame import Transforms
+from catseye.geometry.rotation import to_vector
+from catseye.reduction.structure.antenna import Added, Antenna, SubreflectorPosition
+
+ITERATIONS = 20  # of Gauss and Newton; two or three are taken
+SETTLED = 1e-9  # m: largest change of a predicted coordinate in the last step
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Targets as measured in one posture.
+
+    names         n, points of the model's groups
+    coordinates   (n, 3) m, ground frame
+    covariance    (3n, 3n) m^2
+    posture       a single one
+    subreflector  its commanded position then, if any
+    """
+
+    names: tuple[str, ...]
+    coordinates: np.ndarray
+    covariance: np.ndarray
+    posture: Posture
+    subreflector: SubreflectorPosition | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMotion:
+    """Shift and turn of one frame, in its own nominal axes, about its motion's pivot.
+
+    frame        its name
+    names        targets
+    six          (6,) m and rad, of the frame altogether
+    correction   (6,) m and rad: six less the model's
+    covariance   (6, 6) of either, by targets and sheet alone: the frames it stands on are taken to be where they are
+                 told; its turn is a further small one: apart by half the turn itself, 1e-3 or less
+    residual     (n, 3) m, frame axes: measured less where the frame's motion takes the sheet's place
+    pvv          weighted sum of squares
+    degrees_of_freedom
+    """
+
+    frame: str
+    names: tuple[str, ...]
+    six: np.ndarray
+    correction: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+    pvv: float
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True, eq=False)
+class Corrections:
+    """What one posture's targets say on top of the model.
+
+    frames               F frames and groups, in the order of the covariance
+    six                  frame: (6,) m and rad, to be added to the model's shift and turn
+    covariance           (6F, 6F)
+    names                targets
+    residual             (n, 3) m, ground axes: observed less predicted with the corrections
+    standardised         (n, 3) residual over its own standard uncertainty
+    pvv                  weighted squares of residuals and of corrections over their priors
+    degrees_of_freedom   3 n: each correction brings its prior
+    """
+
+    frames: tuple[str, ...]
+    six: dict[str, np.ndarray]
+    covariance: np.ndarray
+    names: tuple[str, ...]
+    residual: np.ndarray
+    standardised: np.ndarray
+    pvv: float
+    degrees_of_freedom: int
+
+
+def measured_of(
+    document: Mapping[str, Any],
+    antenna: Antenna,
+    posture: Posture,
+    *,
+    subreflector: SubreflectorPosition | None = None,
+) -> Measured:
+    """The model's targets among the points of a `coordinates.json`, with their covariance.
+
+    document       the file as read: points, covariance_order, covariance
+    antenna        the structural model
+    posture        in which they were measured; a coordinates.json does not say the temperature
+    subreflector   its commanded position
+
+    Raises InputError where keys or numbers are missing, or no point is the model's.
+    """
+    for key in ("points", "covariance_order", "covariance"):
+        if key not in document:
+            raise InputError(f"coordinates: {key!r} is missing (expected a coordinates.json of `catseye reduce`)")
+    names = tuple(name for group in antenna.groups.values() for name in group.names if name in document["points"])
+    if not names:
+        raise InputError("coordinates: none of their points is in a group of the structural model")
+    order = {label: i for i, label in enumerate(document["covariance_order"])}
+    labels = [f"{name} {axis}" for name in names for axis in "xyz"]
+    lost = [label for label in labels if label not in order]
+    if lost:
+        raise InputError(f"coordinates: covariance_order has no {lost[0]!r} (expected x, y, z of each point)")
+    at = [order[label] for label in labels]
+    whole = np.array(document["covariance"], dtype=float)
+    if whole.shape != (len(order), len(order)):
+        raise InputError(f"coordinates: covariance has shape {whole.shape} (expected {len(order)} by {len(order)})")
+    covariance = whole[np.ix_(at, at)]
+    coordinates = np.array([[document["points"][name].get(axis) for axis in "xyz"] for name in names], dtype=float)
+    for name, row in zip(names, np.isfinite(coordinates).all(axis=1), strict=True):
+        if not row:
+            raise InputError(f"coordinates: {name} has no x, y and z (expected three numbers)")
+    return Measured(names, coordinates, covariance, posture, subreflector)
+
+
+def frame_motion(antenna: Antenna, measured: Measured, frame: str, *, added: Added | None = None) -> FrameMotion:
+    """Shift and turn of one frame from the targets it carries, its parents where the model and `added` have them.
+
+    antenna    the structural model
+    measured   three targets or more in the groups of this frame, not on one line
+    frame      its name
+    added      frame: (6,) m and rad on top of the model's, of the frames that this one stands on
+
+    Raises EstimationError with fewer targets, or on one line.
+
+    Source: [KABSCH76], [POPE72], as `estimation.rigid_body`.
+    """
+    chosen = [i for i, name in enumerate(measured.names) if antenna.groups[group_of(antenna, name)].frame == frame]
+    names = tuple(measured.names[i] for i in chosen)
+    posture = measured.posture
+    above = {name: six for name, six in (added or {}).items() if name != frame}
+    nominal = antenna.nominal(frame, posture, measured.subreflector)
+    if antenna.parents[frame] != "ground":
+        parent = antenna.parents[frame]
+        nominal = antenna.ground_from(parent, posture, added=above, subreflector=measured.subreflector) @ nominal
+    place, u = _places(antenna, names, posture, above)
+    rows = np.concatenate([3 * i + np.arange(3) for i in chosen]) if chosen else np.zeros(0, dtype=int)
+    turn = np.kron(np.eye(len(names)), nominal.rotation.T)
+    fit = fit_transformation(
+        place,
+        nominal.inverse().points(measured.coordinates[chosen]),
+        covariance_first=np.diag(np.repeat(u**2, 3)),
+        covariance_second=turn @ measured.covariance[np.ix_(rows, rows)] @ turn.T,
+        pivot=antenna.pivot(frame),
+        names=names,
+    ).require_converged()
+    vector = to_vector(fit.matrix)
+    six = np.concatenate([fit.translation, vector])
+    correction = six - antenna.six(frame, posture)
+    return FrameMotion(frame, names, six, correction, fit.covariance, fit.residual, fit.pvv, fit.degrees_of_freedom)
+
+
+def correct_posture(antenna: Antenna, measured: Measured) -> Corrections:
+    """Corrections to all frames on which measured targets stand, from one posture, the model's u as their prior.
+
+    antenna    the structural model
+    measured   one target or more
+
+    Frames that few targets hold stay near the model, and their uncertainty says so. Least squares with priors, derived
+    in closed form; repeated until the predictions stand still. Raises EstimationError where they do not.
+
+    Source: [JCGM102] section 6.2 (propagation), least squares with the corrections as observed unknowns.
+    """
+    if not measured.names:
+        raise EstimationError("no target was measured: there is nothing to correct by")
+    frames = _frames_of(antenna, measured.names)
+    prior = np.zeros((6 * len(frames), 6 * len(frames)))
+    for i, name in enumerate(frames):
+        prior[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = antenna.motions[name].six_covariance(measured.posture)
+    theta = np.zeros(len(prior))
+    u = np.concatenate([_places(antenna, (name,), measured.posture, {})[1] for name in measured.names])
+    noise = measured.covariance + np.diag(np.repeat(u**2, 3))
+    for _ in range(ITERATIONS):
+        added = {name: theta[6 * i : 6 * i + 6] for i, name in enumerate(frames)}
+        predicted, slopes = predicted_points(antenna, measured, added)
+        design = np.concatenate([slopes.get(name, np.zeros((len(noise), 6))) for name in frames], axis=1)
+        misfit = (measured.coordinates - predicted).ravel() + design @ theta
+        spread = design @ prior @ design.T + noise
+        gain = np.linalg.solve(spread, design @ prior).T
+        step = gain @ misfit - theta
+        theta = theta + step
+        if np.max(np.abs(design @ step), initial=0.0) < SETTLED:
+            break
+    else:
+        raise EstimationError(f"corrections did not settle in {ITERATIONS} steps: a target is measured far off")
+    left = np.eye(len(theta)) - gain @ design
+    covariance = left @ prior @ left.T + gain @ noise @ gain.T
+    residual = misfit - design @ theta
+    standardised = residual / np.sqrt(np.diag(noise @ np.linalg.solve(spread, noise)))
+    pvv = float(misfit @ np.linalg.solve(spread, misfit))
+    six = {name: theta[6 * i : 6 * i + 6] for i, name in enumerate(frames)}
+    shape = (-1, 3)
+    return Corrections(
+        frames, six, covariance, measured.names, residual.reshape(shape), standardised.reshape(shape), pvv, len(misfit)
+    )
+
+
+def group_of(antenna: Antenna, target: str) -> str:
+    for group in antenna.groups.values():
+        if target in group.names:
+            return group.group
+    raise InputError(f"target {target!r} is in no group of the structural model")
+
+
+def u_sheet(antenna: Antenna, target: str) -> float:
+    """m, standard uncertainty of each coordinate of a target's place in its frame."""
+    group = antenna.groups[group_of(antenna, target)]
+    return float(group.u[group.names.index(target)])
+
+
+def _places(antenna: Antenna, names: Sequence[str], posture: Posture, added: Added) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 3) in the axes of the targets' frames, and their u (n,) in one posture."""
+    place, u = [], []
+    for name in names:
+        group = group_of(antenna, name)
+        row = antenna.groups[group].names.index(name)
+        place.append(antenna.in_frame(group, posture, added=added)[row])
+        u.append(antenna.u_points(group)[row])
+    return np.array(place).reshape(-1, 3), np.array(u)
+
+
+def _frames_of(antenna: Antenna, names: Sequence[str]) -> tuple[str, ...]:
+    """Frames with a motion on which the targets stand, from the ground up, then groups with one."""
+    groups = list(dict.fromkeys(group_of(antenna, name) for name in names))
+    frames = {frame: None for group in groups for frame in antenna.chain(antenna.groups[group].frame)}
+    return tuple(name for name in [*frames, *groups] if name in antenna.motions)
+
+
+def predicted_points(
+    antenna: Antenna, measured: Measured, added: Added, places: Mapping[str, np.ndarray] | None = None
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Coordinates (n, 3) of the targets, and derivatives (3n, 6) by the shift and turn of each frame and group."""
+    n = len(measured.names)
+    predicted = np.zeros((n, 3))
+    by_frame: dict[str, np.ndarray] = {}
+    owners = [group_of(antenna, name) for name in measured.names]
+    told = measured.subreflector
+    for group in dict.fromkeys(owners):
+        mine = [i for i, owner in enumerate(owners) if owner == group]
+        points = antenna.groups[group]
+        rows = [points.names.index(measured.names[i]) for i in mine]
+        at = antenna.in_frame(group, measured.posture, added=added)[rows]
+        if places is not None:
+            at = at + np.array([places[measured.names[i]] for i in mine])
+        predicted[mine] = ground_from_group(antenna, measured, group, added).points(at)
+        found = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=told)
+        if group in antenna.motions:
+            found[group] = antenna.group_derivatives(group, measured.posture, added=added, subreflector=told)[group][
+                rows
+            ]
+        for frame, slope in found.items():
+            by_frame.setdefault(frame, np.zeros((n, 3, 6)))[mine] = slope
+    return predicted, {frame: slope.reshape(3 * n, 6) for frame, slope in by_frame.items()}
+
+
+def ground_from_group(antenna: Antenna, measured: Measured, group: str, added: Added) -> Transforms:
+    frame = antenna.groups[group].frame
+    return antenna.ground_from(frame, measured.posture, added=added, subreflector=measured.subreflector)

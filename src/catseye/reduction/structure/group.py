@@ -1,0 +1,161 @@
+"""Points as measured in many postures, taken into the axes of the frame that carries them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE
+from catseye.errors import InputError
+from catseye.estimation.harmonic_series import Spread
+from catseye.geometry.antenna import (
+    ELEVATION_AXIS_HEIGHT,
+    REFLECTOR_TO_ELEVATION,
+    ground_from_alidade_at,
+    ground_from_reflector_at,
+)
+from catseye.geometry.deformation import Posture
+from catseye.geometry.frame import Transforms
+from catseye.reduction.structure.series import GroupSeries
+
+Array = NDArray[np.float64]
+FRAMES = ("ground", "alidade", "reflector")
+MOST = 2e8  # numbers of all covariances: 1.6 GB
+MOVED = 0.05 * DEGREE  # of elevation: less is no move, and the way of the last one lasts
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A rigid telescope: m, as `geometry.antenna` has them."""
+
+    elevation_axis_height: float = ELEVATION_AXIS_HEIGHT
+    reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION
+
+
+@dataclass(frozen=True, eq=False)
+class PlacesEpoch:
+    """Points of one epoch.
+
+    label          for messages: a folder, an epoch's number
+    mjd            UTC; NaN where unknown
+    azimuth, elevation   rad
+    temperature_c  of the structure, degrees C; NaN where unknown
+    names          n
+    coordinates    (n, 3) m, ground frame
+    covariance     (3n, 3n) m^2
+    """
+
+    label: str
+    mjd: float
+    azimuth: float
+    elevation: float
+    temperature_c: float
+    names: tuple[str, ...]
+    coordinates: Array
+    covariance: Array
+
+
+def group_series(
+    epochs: Sequence[PlacesEpoch],
+    points: Sequence[str],
+    *,
+    group: str = "group",
+    frame: str = "reflector",
+    pivot: Array | None = None,
+    nominal: Nominal | None = None,
+    correlated: bool = True,
+) -> GroupSeries:
+    """A group's points through the epochs, in order of time.
+
+    epochs    one up; those without any of the points are left out
+    points    names, or patterns such as "ZEG*"
+    group     its name
+    frame     that carries it: "ground", "alidade" or "reflector"
+    pivot     (3,) m in the frame, of turns; the middle of the points where it is None
+    nominal   the rigid telescope
+    correlated   False takes the points of an epoch as independent, each with its own covariance: for thousands
+
+    Raises InputError for too many points, an unknown frame, points that no epoch has, epochs of one name.
+    """
+    if frame not in FRAMES:
+        raise InputError(f"frame {frame!r} (expected {', '.join(FRAMES)})")
+    found = sorted({name for epoch in epochs for name in epoch.names})
+    names = tuple(name for name in found if any(fnmatchcase(name, pattern) for pattern in points))
+    for pattern in points:
+        if not any(fnmatchcase(name, pattern) for name in found):
+            some = ", ".join(found[:8]) + (", ..." if len(found) > 8 else "")
+            raise InputError(f"no epoch has a point {pattern!r} (they have {some})")
+    kept = [epoch for epoch in epochs if set(epoch.names) & set(names)]
+    labels = [epoch.label for epoch in kept]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise InputError(f"epoch {twice!r} is given twice (expected each once)")
+    kept.sort(key=lambda epoch: (np.isnan(epoch.mjd), epoch.mjd))
+    if correlated and len(kept) * (3 * len(names)) ** 2 > MOST:
+        raise InputError(
+            f"{len(names)} points in {len(kept)} epochs with a covariance of all in each are too many (expected "
+            f"{MOST:.0e} numbers at most): name fewer, or take them as independent (--independent)"
+        )
+    places = np.full((len(kept), len(names), 3), np.nan)
+    # of points that are not there: ones, never used
+    full = np.tile(np.eye(3 * len(names)), (len(kept), 1, 1)) if correlated else np.zeros((0, 0, 0))
+    alone = np.tile(np.eye(3), (len(kept), len(names), 1, 1))
+    for t, epoch in enumerate(kept):
+        own = [i for i, name in enumerate(epoch.names) if name in names]
+        at = np.array([names.index(epoch.names[i]) for i in own])
+        carrier = carrier_of(frame, epoch.azimuth, epoch.elevation, nominal or Nominal())
+        places[t, at] = (epoch.coordinates[own] - carrier.translation) @ carrier.rotation
+        rows = (3 * np.array(own)[:, None] + np.arange(3)).ravel()
+        into = (3 * at[:, None] + np.arange(3)).ravel()
+        if not correlated:
+            each = 3 * np.array(own)[:, None] + np.arange(3)
+            blocks = epoch.covariance[each[:, :, None], each[:, None, :]]
+            alone[t, at] = carrier.rotation.T @ blocks @ carrier.rotation
+            continue
+        turn = np.kron(np.eye(len(own)), carrier.rotation.T)
+        full[t][np.ix_(into, into)] = turn @ epoch.covariance[np.ix_(rows, rows)] @ turn.T
+    e = np.array([epoch.elevation for epoch in kept])
+    posture = Posture(np.array([epoch.azimuth for epoch in kept]), e, np.array([epoch.temperature_c for epoch in kept]))
+    middle = np.nanmean(places, axis=(0, 1)) if pivot is None else np.asarray(pivot, dtype=float)
+    mjd = np.array([epoch.mjd for epoch in kept])
+    told = tuple(epoch.label for epoch in kept)
+    spread = Spread(full=full) if correlated else Spread(points=alone)
+    return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, told)
+
+
+def carrier_of(frame: str, azimuth: float, elevation: float, nominal: Nominal) -> Transforms:
+    """Points of a frame into the ground, at one posture of the rigid telescope.
+
+    frame                "ground", "alidade" or "reflector"
+    azimuth, elevation   rad
+
+    Source: [PARKER04] eq. 2.40-2.44.
+    """
+    if frame == "ground":
+        return Transforms("ground", "ground", np.eye(3), np.zeros(3))
+    if frame == "alidade":
+        return ground_from_alidade_at(azimuth)
+    return ground_from_reflector_at(
+        azimuth,
+        elevation,
+        elevation_axis_height=nominal.elevation_axis_height,
+        reflector_to_elevation=nominal.reflector_to_elevation,
+    )
+
+
+def ways(elevation: Array) -> Array:
+    """Way of the last elevation move before each epoch: 1 rose, -1 fell, 0 unknown.
+
+    elevation   (T,) rad, in order of time
+
+    >>> ways(np.radians([10.0, 20.0, 20.01, 15.0])).tolist()
+    [0.0, 1.0, 1.0, -1.0]
+    """
+    found, last = np.zeros(len(elevation)), 0.0
+    for t in range(1, len(elevation)):
+        step = elevation[t] - elevation[t - 1]
+        last = float(np.sign(step)) if abs(step) > MOVED else last
+        found[t] = last
+    return found

@@ -1,0 +1,199 @@
+"""What every actuator has to do, from the prisms that were measured: interpolation with its uncertainty, limits.
+
+An actuator whose travel is along the unit vector m raises the surface at its place by m . n of its travel, n the
+surface's normal; a correction that brings a deviation d to zero is -d / (m . n). Along the normal it is -d.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.paraboloid import cosine, design_rows
+from catseye.estimation.surface_field import Foretold, Roughness, find_roughness, foretell
+from catseye.optics.zernike import terms, zernike
+from catseye.records.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
+from catseye.records.refusal import shown
+from catseye.records.site_folder import SiteFolder
+from catseye.reduction.surface.shape import Aperture, Shape
+
+NEAR = 1e-9  # of a trend's columns: what is left of one beside the others
+TREND_TERMS = 10  # Zernike terms to the third order
+SUPPORTS = 3
+
+Travel = Literal["normal", "axis"]
+
+
+@dataclass(frozen=True, eq=False)
+class Actuators:
+    """Corrections of m actuators.
+
+    names, places     (m, 3) m, reflector frame, on the design paraboloid
+    deviation         (m,) m, along the normal, against the fitted paraboloid
+    covariance        (m, m) m^2, of foretold less true
+    correction        (m,) m, of the travel
+    u_correction      (m,) m
+    position          (m,) m, travel before
+    weights           (m, k) of the measured prisms
+    prisms            k names
+    measured          (m,) whether the actuator's own prism was
+    roughness         of the surface beside its trend
+    """
+
+    names: tuple[str, ...]
+    places: np.ndarray
+    deviation: np.ndarray
+    covariance: np.ndarray
+    correction: np.ndarray
+    u_correction: np.ndarray
+    position: np.ndarray
+    weights: np.ndarray
+    prisms: tuple[str, ...]
+    measured: np.ndarray
+    roughness: Roughness
+
+    @property
+    def within(self) -> np.ndarray:
+        """(m,) whether each target lies within the actuator's limits; nothing is cut to them."""
+        return np.abs(self.position + self.correction) <= LIMIT_MM * MILLIMETRE
+
+
+def actuators_of(site: SiteFolder) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and design places (m, 3) m of a site's actuators: one under each prism of the reflector frame.
+
+    Raises InputError for a site without any.
+    """
+    found = {n: t for n, t in sorted(site.targets.items()) if t.type == "prism" and t.frame == "reflector"}
+    if not found:
+        raise InputError(f"{site.directory}: targets.toml has no prism in the reflector frame, so no actuator")
+    return tuple(found), np.array([t.position_mm for t in found.values()]) * MILLIMETRE
+
+
+def corrections(
+    shape: Shape,
+    names: tuple[str, ...],
+    places: np.ndarray,
+    *,
+    positions: Mapping[str, float] | None = None,
+    travel: Travel = "normal",
+    roughness: Roughness | None = None,
+) -> Actuators:
+    """Corrections that bring every actuator onto the fitted paraboloid.
+
+    shape       one epoch's surface
+    names       of m actuators; one of a prism's name has that prism
+    places      (m, 3) m, reflector frame
+    positions   travel of each before, mm, by name; the middle where none are known
+    travel      along the surface's "normal" or the paraboloid's "axis"
+    roughness   of the surface; found from the prisms without
+
+    The model: ten Zernike terms and the paraboloid's own parameters, free; a smooth part and a part of each point's own
+    beside them (`surface_field`). Raises InputError for a position without its actuator, EstimationError where the
+    prisms are too few.
+    """
+    own_place = {name: row for row, name in enumerate(shape.prisms.names)}
+    same = np.array([own_place.get(name, -1) for name in names])
+    seen, wanted = shape.fit.local[:, :2], places[:, :2]
+    trend, wanted_trend = _trend(shape, seen, wanted)
+    values, noise = shape.fit.deviation, shape.fit.along
+    rough = roughness or find_roughness(seen, values, noise, trend)
+    nominal_design = _parameter_rows(shape, wanted)
+    told: Foretold = foretell(
+        seen,
+        values,
+        noise,
+        trend,
+        wanted,
+        wanted_trend,
+        roughness=rough,
+        same=same,
+        design=shape.fit.design,
+        gain=shape.fit.gain,
+        wanted_design=nominal_design,
+    )
+    lean = np.ones(len(names)) if travel == "normal" else cosine(places, shape.fit.focal_length)
+    return Actuators(
+        names,
+        places,
+        told.value,
+        told.covariance,
+        -told.value / lean,
+        np.sqrt(np.diag(told.covariance)) / lean,
+        _positions(names, positions or {}),
+        told.weights,
+        shape.prisms.names,
+        same >= 0,
+        rough,
+    )
+
+
+def rows_of(found: Actuators) -> list[ActuatorCorrection]:
+    """The table, a record an actuator, in mm; EstimationError for a number that no actuator's table can hold."""
+    made = []
+    u = np.sqrt(np.diag(found.covariance))
+    within = found.within
+    for row, name in enumerate(found.names):
+        size = np.abs(found.weights[row])
+        most = np.argsort(size)[::-1][:SUPPORTS]
+        correction = float(found.correction[row] / MILLIMETRE)
+        if not abs(correction) < 1000.0:
+            raise EstimationError(f"actuator {name}: a correction of {correction:.4g} mm (expected below 1000)")
+        steps = round(correction / STEP_MM)
+        position = float(found.position[row] / MILLIMETRE)
+        x, y, z = (round(float(v), 9) for v in found.places[row])
+        made.append(
+            ActuatorCorrection(
+                actuator=name,
+                x_m=x,
+                y_m=y,
+                z_m=z,
+                deviation_mm=float(found.deviation[row] / MILLIMETRE),
+                u_deviation_mm=float(u[row] / MILLIMETRE),
+                correction_mm=correction,
+                u_correction_mm=float(found.u_correction[row] / MILLIMETRE),
+                steps=steps,
+                left_mm=correction - steps * STEP_MM,
+                position_mm=position,
+                target_mm=position + correction,
+                within_limits="yes" if within[row] else "no",
+                how="measured" if found.measured[row] else "foretold",
+                prisms=" ".join(found.prisms[k] for k in most),
+                weight=float(size[most].sum() / size.sum()),
+            )
+        )
+    return made
+
+
+def _trend(shape: Shape, seen: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Columns that span the Zernike terms and the paraboloid's parameters, at prisms and at actuators."""
+    aperture: Aperture = shape.aperture
+    low = terms(TREND_TERMS, "noll")
+    here, there = aperture.unit(seen), aperture.unit(wanted)
+    one = np.column_stack([shape.fit.design, zernike(low, here[:, 0], here[:, 1])])
+    two = np.column_stack([_parameter_rows(shape, wanted), zernike(low, there[:, 0], there[:, 1])])
+    size = np.linalg.norm(one, axis=0)
+    orthogonal, triangle = np.linalg.qr(one / size)
+    kept = np.abs(np.diag(triangle)) > NEAR
+    if kept.all():
+        return orthogonal, np.linalg.solve(triangle.T, (two / size).T).T
+    return _trimmed(one / size, two / size, kept)
+
+
+def _trimmed(one: np.ndarray, two: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    orthogonal, triangle = np.linalg.qr(one[:, kept])
+    return orthogonal, np.linalg.solve(triangle.T, two[:, kept].T).T
+
+
+def _parameter_rows(shape: Shape, wanted: np.ndarray) -> np.ndarray:
+    """(m, p) of `ParaboloidFit.design` at other places of the fitted surface."""
+    return design_rows(shape.fit, wanted, shape.prisms.nominal)
+
+
+def _positions(names: tuple[str, ...], given: Mapping[str, float]) -> np.ndarray:
+    for name in given:
+        if name not in names:
+            raise InputError(f"actuator = {shown(name)} of the positions is none of this site's")
+    return np.array([given.get(name, 0.0) for name in names]) * MILLIMETRE

@@ -1,0 +1,221 @@
+"""How a surface's Zernike terms go with elevation, temperature and the way it came: a look-up table.
+
+    coefficient(E) = constant + gravity_sin sin E + gravity_cos cos E + thermal (T - mean T) ± hysteresis / 2
+
+A linear elastic structure turned in gravity deforms by sin E and cos E and nothing else: gravity's components along its
+own axes. Hysteresis is what a term is more when elevation rises than when it falls.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import DEGREE
+from catseye.errors import EstimationError
+from catseye.optics.zernike import Term
+from catseye.reduction.surface.shape import Shape
+
+APART_DEG = 1.0  # elevations nearer than this count as one
+APART_C = 0.5  # temperatures that differ by less say nothing of a thermal term
+STEP_DEG = 5.0  # of the table
+CONSTANT, SIN, COS, THERMAL, HYSTERESIS = "constant", "gravity_sin", "gravity_cos", "thermal", "hysteresis"
+
+
+@dataclass(frozen=True, eq=False)
+class TermModel:
+    """One Zernike term's way with elevation.
+
+    value, covariance   (p,) m (thermal m/°C), (p, p), as measured by the epochs' covariances
+    residual            (T,) m, observed minus predicted
+    standardised        (T,) over the residual's own standard uncertainty
+    variance_factor     [pvv] / degrees of freedom, expectation 1; nan without redundancy
+    """
+
+    term: Term
+    value: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+    standardised: np.ndarray
+    variance_factor: float
+
+    @property
+    def raised(self) -> float:
+        """By what standard uncertainties are multiplied: root of the variance factor where the epochs scatter more."""
+        return float(np.sqrt(max(1.0, self.variance_factor))) if np.isfinite(self.variance_factor) else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Lookup:
+    """A look-up table of the terms.
+
+    columns        of the model, in their order
+    left_out       column: why it is not in the model
+    elevation_deg  (T,) of the epochs, in the order they were given
+    rising         (T,) +1 where elevation rose to the epoch, -1 where it fell
+    temperature_c  (T,), or None
+    measured       (T, t) m
+    u_measured     (T, t) m
+    models         t
+    table_deg      (e,) elevations of the table
+    table          (e, t, 3) m: rising, mean, falling
+    u_table        (e, t, 3) m
+    """
+
+    shapes: tuple[Shape, ...]
+    columns: tuple[str, ...]
+    left_out: dict[str, str]
+    elevation_deg: np.ndarray
+    rising: np.ndarray
+    temperature_c: np.ndarray | None
+    measured: np.ndarray
+    u_measured: np.ndarray
+    models: tuple[TermModel, ...]
+    table_deg: np.ndarray
+    table: np.ndarray
+    u_table: np.ndarray
+
+
+def lookup_of(shapes: Sequence[Shape]) -> Lookup:
+    """The look-up table of several epochs, in the order in which the telescope came to them.
+
+    shapes   two epochs or more, each with its elevation; all with the same terms and the same free parts
+
+    Each term for itself, least squares weighted by the epochs' uncertainties. Nothing is foretold beyond the
+    elevations that were seen. Raises EstimationError for fewer epochs and for one without an elevation.
+    """
+    elevation = _elevations(shapes)
+    rising = directions(elevation)
+    temperature = _temperatures(shapes)
+    columns, left_out = _columns(elevation, rising, temperature)
+    design = _design(columns, elevation, rising, temperature, None)
+    measured = np.array([shape.expansion.value for shape in shapes])
+    u = np.array([np.sqrt(np.diag(shape.expansion.covariance)) for shape in shapes])
+    if not (u > 0.0).all():
+        raise EstimationError("a Zernike term of an epoch has no uncertainty; give the prisms' coordinates theirs")
+    models = tuple(_model(term, design, measured[:, k], u[:, k]) for k, term in enumerate(shapes[0].expansion.terms))
+    low, high = elevation.min(), elevation.max()
+    inner = np.arange(np.ceil(low / STEP_DEG), np.floor(high / STEP_DEG) + 0.5) * STEP_DEG
+    table_deg = np.unique(np.concatenate([[low], inner, [high]]).round(9))
+    ways = (1.0, 0.0, -1.0) if HYSTERESIS in columns else (0.0, 0.0, 0.0)
+    table = np.empty((len(table_deg), len(models), 3))
+    u_table = np.empty_like(table)
+    for way, direction in enumerate(ways):
+        rows = _design(columns, table_deg, np.full(len(table_deg), direction), None, temperature)
+        for k, model in enumerate(models):
+            table[:, k, way] = rows @ model.value
+            variance = np.einsum("ea,ab,eb->e", rows, model.covariance, rows)
+            u_table[:, k, way] = model.raised * np.sqrt(variance)
+    return Lookup(
+        tuple(shapes),
+        columns,
+        left_out,
+        elevation,
+        rising,
+        temperature,
+        measured,
+        u,
+        models,
+        table_deg,
+        table,
+        u_table,
+    )
+
+
+def directions(elevation_deg: np.ndarray) -> np.ndarray:
+    """(T,) +1 where elevation rose to an epoch, -1 where it fell; the first is on its way to the second.
+
+    elevation_deg   (T,), T at least 2
+
+    A repeat keeps the direction in which it was reached.
+
+    >>> directions(np.array([10.0, 50.0, 80.0, 80.0, 40.0])).tolist()
+    [1.0, 1.0, 1.0, 1.0, -1.0]
+    """
+    made = np.sign(np.diff(elevation_deg))
+    made = np.concatenate([made[:1], made])
+    known = np.flatnonzero(made)
+    if not len(known):
+        return np.ones(len(elevation_deg))
+    made[: known[0]] = made[known[0]]
+    for k in range(1, len(made)):
+        if made[k] == 0.0:
+            made[k] = made[k - 1]
+    return made
+
+
+def _elevations(shapes: Sequence[Shape]) -> np.ndarray:
+    if len(shapes) < 2:
+        raise EstimationError(f"a look-up table needs 2 epochs at least, {len(shapes)} given")
+    given: list[float] = []
+    for shape in shapes:
+        if shape.prisms.elevation_deg is None:
+            raise EstimationError(f"{shape.prisms.source}: no elevation is known; say it by --elevation-deg")
+        given.append(shape.prisms.elevation_deg)
+    return np.array(given)
+
+
+def _temperatures(shapes: Sequence[Shape]) -> np.ndarray | None:
+    given = [shape.prisms.temperature_c for shape in shapes if shape.prisms.temperature_c is not None]
+    return np.array(given) if len(given) == len(shapes) else None
+
+
+def _columns(
+    elevation: np.ndarray, rising: np.ndarray, temperature: np.ndarray | None
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """What these epochs can tell, and why the rest not."""
+    places = 1 + int(np.count_nonzero(np.diff(np.sort(elevation)) > APART_DEG))
+    columns = [CONSTANT]
+    left_out: dict[str, str] = {}
+    if places >= 3:
+        columns += [SIN, COS]
+    else:
+        left_out |= dict.fromkeys((SIN, COS), f"{places} elevations more than {APART_DEG:g}° apart (3 are needed)")
+    if temperature is None:
+        left_out[THERMAL] = "not every epoch's temperature is known"
+    elif np.ptp(temperature) < APART_C:
+        left_out[THERMAL] = f"temperatures within {np.ptp(temperature):.2f} °C"
+    else:
+        columns.append(THERMAL)
+    if len(set(rising.tolist())) < 2:
+        left_out[HYSTERESIS] = "elevation went one way only"
+    else:
+        columns.append(HYSTERESIS)
+    while len(columns) > len(elevation) or _loose(columns, elevation, rising, temperature):
+        last = columns.pop()
+        left_out[last] = f"{len(elevation)} epochs do not hold it beside {', '.join(columns)}"
+    return tuple(columns), left_out
+
+
+def _loose(columns: list[str], elevation: np.ndarray, rising: np.ndarray, temperature: np.ndarray | None) -> bool:
+    design = _design(tuple(columns), elevation, rising, temperature, None)
+    return bool(np.linalg.cond(design / np.linalg.norm(design, axis=0)) > 1e6)
+
+
+def _design(
+    columns: tuple[str, ...],
+    elevation_deg: np.ndarray,
+    rising: np.ndarray,
+    temperature: np.ndarray | None,
+    mean_of: np.ndarray | None,
+) -> np.ndarray:
+    """(T, p); a table, which tells no temperature, holds at the mean of `mean_of`."""
+    e = elevation_deg * DEGREE
+    thermal = np.zeros(len(e)) if temperature is None or mean_of is not None else temperature - temperature.mean()
+    values = {CONSTANT: np.ones(len(e)), SIN: np.sin(e), COS: np.cos(e), THERMAL: thermal, HYSTERESIS: rising / 2.0}
+    return np.column_stack([values[name] for name in columns])
+
+
+def _model(term: Term, design: np.ndarray, measured: np.ndarray, u: np.ndarray) -> TermModel:
+    rows = design / u[:, None]
+    size = np.linalg.norm(rows, axis=0)
+    gain = np.linalg.pinv(rows / size) / size[:, None]
+    value = gain @ (measured / u)
+    residual = measured - design @ value
+    covariance = gain @ gain.T
+    own = u**2 - np.einsum("ta,ab,tb->t", design, covariance, design)
+    freedom = len(u) - design.shape[1]
+    checked = own > 1e-9 * u**2
+    standardised = np.where(checked, residual / np.sqrt(np.where(checked, own, 1.0)), np.nan)
+    factor = float(np.sum((residual / u) ** 2) / freedom) if freedom else float("nan")
+    return TermModel(term, value, covariance, residual, standardised, factor)

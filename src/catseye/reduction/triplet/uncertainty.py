@@ -1,0 +1,159 @@
+"""How uncertain each placement of a triplet's calibration is, and what the placements share.
+
+Each input is moved by its standard uncertainty up and down; half the change is its share ([JCGM100] 5.1.4, note 2). An
+input that several placements use is moved once, in all of them: heights, sizes of the glass, index ratio, fixture, a
+phase that was read once and written down for several flips.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.atmosphere.air import air
+from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings, triplet_lengths
+
+Array = NDArray[np.float64]
+Moves = dict[str, Array]
+FEW = 0.1  # of u_phase: in steps coarser than that two readings agree to the last digit more often than one in 35
+
+
+@dataclass(frozen=True, eq=False)
+class TripletShares:
+    """Shares of q inputs in the outputs of k placements, m, one standard uncertainty each.
+
+    groups    (q,) what kind of input
+    h_corr    (q, k)
+    depth     (q, k) of the mid-point below the scan point
+    l_mpbc    (q,)
+    """
+
+    groups: tuple[str, ...]
+    h_corr: Array
+    depth: Array
+    l_mpbc: Array
+
+
+def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, cycles: TripletCycles) -> TripletShares:
+    """Every input's share in every placement.
+
+    measurement   a measured unit
+    readings      its readings
+    cycles        whole half wavelengths, held
+
+    Source: [JCGM100] 5.1.4 note 2 and eq. F.2.
+    """
+    inputs = list(_inputs(measurement, readings))
+    count = len(measurement.placement)
+    names = {name for _, moves in inputs for name in moves}
+    stacked = {name: np.zeros((2 * len(inputs), count)) for name in names}
+    for row, (_, moves) in enumerate(inputs):
+        for name, move in moves.items():
+            stacked[name][2 * row] += move
+            stacked[name][2 * row + 1] -= move
+    found: TripletLengths = triplet_lengths(readings.moved(stacked), cycles)
+
+    def half(values: Array) -> Array:
+        values = np.broadcast_to(values, (2 * len(inputs), count))
+        return 0.5 * (values[0::2] - values[1::2])
+
+    return TripletShares(
+        groups=tuple(group for group, _ in inputs),
+        h_corr=half(found.h_corr),
+        depth=half(found.depth_mp),
+        l_mpbc=half(found.l_mpbc)[:, 0],
+    )
+
+
+def _inputs(measurement: TripletMeasurement, r: TripletReadings) -> Iterator[tuple[str, Moves]]:
+    """(group, what moves together by one standard uncertainty), every input once."""
+    yield from _phases(measurement)
+    yield from _air(measurement)
+    one = np.ones(len(measurement.placement))
+    plate, ball, n = measurement.surface_plate, measurement.ball, measurement.bk7_to_air_group_index_ratio
+    for name in ("l_1", "l_2", "l_bt"):
+        yield "heights", {name: one * plate.u_height_mm * 1e-3}
+    yield "l_post", {"l_post": one * plate.u_l_post_mm * 1e-3}
+    yield "d_12", {"d_12": one * measurement.u_d12_mm * 1e-3}
+    for side, prism in enumerate(measurement.prisms, start=1):
+        u = one * prism.u_height_mm * 1e-3
+        yield "glass sizes", {f"height_{side}": u, f"hrp_{side}": u / n, f"pc_{side}": -(n - 1.0 / n) * u}
+    u = one * ball.u_r_mm * 1e-3
+    yield "glass sizes", {"r_1": u, "pc_b": -(n - 1.0) * u}
+    yield "glass sizes", {"pc_b": -n * u}
+    u = one * measurement.u_bk7_to_air_group_index_ratio
+    moves = {"n": u, "pc_b": -(ball.r1_mm + ball.r2_mm) * 1e-3 * u}
+    for side, prism in enumerate(measurement.prisms, start=1):
+        height = prism.height_mm * 1e-3
+        moves |= {f"hrp_{side}": -height / n**2 * u, f"pc_{side}": -(1.0 + 1.0 / n**2) * height * u}
+    yield "index ratio", moves
+    for name in ("ball_along", "ball_up"):
+        yield "ball in the plate", {name: one * measurement.u_lateral_mm * 1e-3}
+
+
+def _phases(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
+    """Each phase that was read, once, wherever it is written.
+
+    Equal digits are one reading, unless they are so few that a second reading would often show the same: there one that
+    is written at the flip counts as read again.
+    """
+    count = len(measurement.placement)
+    step = written_step(measurement)
+    read: dict[tuple[object, ...], Moves] = {}
+
+    def again(k: int, quantity: str) -> tuple[object, ...]:
+        each = measurement.placement[k]
+        coarse = step > FEW * each.u_phase_rad
+        return ("again", k) if coarse and getattr(each, f"{quantity}_flipped_rad") is not None else ()
+
+    for k, each in enumerate(measurement.placement):
+        place = (each.spacer_mm, each.d_toppl_mm)
+        written = [
+            ("phi_1", (*place, 1, each.phi_1_rad)),
+            ("phi_2", (*place, 2, each.phi_2_rad)),
+            ("phi_bcfp", (*place, 3, each.phi_bcfp_rad)),
+            ("phi_zrg", ("reference", each.phi_zrg_rad)),
+            ("phi_zrg_fp", ("reference", *again(k, "phi_zrg"), each.flipped("phi_zrg", "rad"))),
+            ("phi_cal", ("calibration", each.phi_cal_rad)),
+            ("phi_cal_fp", ("calibration", *again(k, "phi_cal"), each.flipped("phi_cal", "rad"))),
+        ]
+        for name, key in written:
+            moves = read.setdefault((*key, each.u_phase_rad), {})
+            moves.setdefault(name, np.zeros(count))[k] = each.u_phase_rad
+    for moves in read.values():
+        yield "phases", moves
+
+
+def written_step(measurement: TripletMeasurement) -> float:
+    """The last digit to which the sheet's measured phases are written, rad: of the finest of them.
+
+    measurement   a measured unit
+    """
+    names = ("phi_1_rad", "phi_2_rad", "phi_bcfp_rad")
+    finest = min(Decimal(repr(getattr(p, name))).as_tuple().exponent for p in measurement.placement for name in names)
+    return float(10.0 ** int(finest))
+
+
+def _air(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
+    """What the readings of the weather add, each time they were needed; a common offset cancels."""
+    common = {"wavelength_um": measurement.wavelength_um, "model": measurement.air_model}
+    count = len(measurement.placement)
+    for k, each in enumerate(measurement.placement):
+        before = (each.temperature_c, each.pressure_hpa, each.humidity_percent)
+        after = (
+            each.flipped("temperature", "c"),
+            each.flipped("pressure", "hpa"),
+            each.flipped("humidity", "percent"),
+        )
+        for name, weather in (("eta_a", before), ("eta_a_fp", after)):
+            slope = air(*weather, **common).sensitivity
+            move = np.zeros(count)
+            move[k] = np.sqrt(
+                (slope.temperature_c * measurement.u_temperature_c) ** 2
+                + (slope.pressure_hpa * measurement.u_pressure_hpa) ** 2
+                + (slope.humidity_percent * measurement.u_humidity_percent) ** 2
+            )
+            yield "air", {name: move}

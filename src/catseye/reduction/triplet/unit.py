@@ -1,0 +1,277 @@
+"""A triplet unit's calibration: from its sheet to one H_corr with uncertainty, and whether the unit is accepted."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.atmosphere.air import group_refractivity
+from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.reduction.triplet.geometry import (
+    TripletCycles,
+    TripletLengths,
+    TripletReadings,
+    triplet_cycles,
+    triplet_lengths,
+)
+from catseye.reduction.triplet.memo import memo_numbers
+from catseye.reduction.triplet.notes import triplet_notes
+from catseye.reduction.triplet.plate import plate_points
+from catseye.reduction.triplet.result import TOLERANCE, Array, TripletReduction, conformity_probability
+from catseye.reduction.triplet.uncertainty import TripletShares, triplet_shares
+
+LEVEL = 0.05  # of the tests of consistency and of single placements together
+SIGMAS = 5.0  # of D_TOPPL that the margin of the whole cycles must hold
+FAR = 10e-3  # m: ranging and plate differ by more than any triplet's parts could, a tenth of a slip
+REFERENCE_AIR = (20.0, 933.0, 50.0)  # deg C, hPa, %: of the memo's index ratio 1.527077
+FLOOR = 1e-9  # m, added to each placement: below what phases are written to; keeps repeated ones apart
+GOOD, THIN, SUSPECT, NOT_A_TRIANGLE, SLIPPED = (
+    "good", "thin margin", "suspect", "no triangle: left out", "whole cycles doubtful",
+)  # fmt: skip
+
+
+def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
+    """The whole reduction of one sheet.
+
+    measurement   a measured unit
+
+    A placement whose ranges make no triangle is left out with its status; with none left the answer is NaN and the unit
+    is not accepted. Nothing else is left out.
+
+    Source: [GOLDMAN00] sections 3.1 and 3.2; combination of placements by generalised least squares.
+    """
+    readings = triplet_readings(measurement)
+    cycles = triplet_cycles(readings)
+    lengths = triplet_lengths(readings, cycles)
+    shares = triplet_shares(measurement, readings, cycles)
+    covariance = shares.h_corr.T @ shares.h_corr
+    used = np.flatnonzero(np.isfinite(np.diagonal(covariance)) & np.isfinite(lengths.h_corr))
+    best = combined(lengths.h_corr, covariance, used)
+    l_mpbc = float(np.ravel(lengths.l_mpbc)[0])
+    # shares of each input in the best h_corr: placements that are left out weigh nothing, whatever their NaN
+    share = shares.h_corr[:, used] @ best.weights[used]
+    valid = len(used) > 0
+    u_h = float(np.linalg.norm(share)) if valid else math.nan
+    difference = best.value - l_mpbc
+    u_difference = float(np.linalg.norm(share - shares.l_mpbc)) if valid else math.nan
+    others = np.setdiff1d(used, best.suspects)
+    slope = 0.5 * sum(p.height_mm for p in measurement.prisms) - measurement.ball.r1_mm - measurement.ball.r2_mm
+    by_sizes = np.array([group != "index ratio" for group in shares.groups])
+    steps, u_steps = _steps(measurement, lengths, shares)
+    status = tuple(_status(measurement, k, lengths, cycles, best.suspects) for k in range(len(measurement.placement)))
+    memo = memo_numbers(readings, cycles, lengths)
+    found = TripletReduction(
+        measurement=measurement,
+        readings=readings,
+        cycles=cycles,
+        lengths=lengths,
+        memo=memo,
+        plate=plate_points(measurement),
+        h=lengths.h_corr,
+        u=np.sqrt(np.diagonal(covariance)),
+        covariance=covariance,
+        weights=best.weights,
+        h_corr=best.value,
+        u_h_corr=u_h,
+        l_mpbc=l_mpbc,
+        u_l_mpbc=float(np.linalg.norm(shares.l_mpbc)),
+        difference=difference,
+        u_difference=u_difference,
+        accepted=bool(abs(difference) <= TOLERANCE),
+        conformity_probability=conformity_probability(difference, u_difference),
+        residuals=best.residuals,
+        statistics=best.statistics,
+        chi_square=best.chi_square,
+        degrees_of_freedom=best.degrees_of_freedom,
+        p=best.p,
+        suspects=best.suspects,
+        h_corr_without_suspects=(
+            combined(lengths.h_corr, covariance, others).value if best.suspects and len(others) else math.nan
+        ),
+        budget=_budget(shares, share) if valid else {},
+        steps=steps,
+        u_steps=u_steps,
+        air_in_glass=_air_in_glass(measurement, readings, best.weights),
+        agreeing_ratio=measurement.bk7_to_air_group_index_ratio - difference / (slope * 1e-3),
+        u_agreeing_ratio=(
+            float(np.linalg.norm((share - shares.l_mpbc)[by_sizes])) / abs(slope * 1e-3) if valid else math.nan
+        ),
+        status=status,
+        notes=(),
+    )
+    return _with_notes(found)
+
+
+def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
+    """The sheet as arrays over its placements, metres; the air's index by the sheet's model.
+
+    measurement   a measured unit
+
+    Where the sheet gives the group index of the glass, the delay in it follows the air of each placement, the fiducial
+    points staying where the sheet has them.
+    """
+    m, plate = measurement, measurement.surface_plate
+    left, right = m.prisms
+
+    def column(name: str) -> Array:
+        return np.array([getattr(each, name) for each in m.placement], dtype=float)
+
+    def after(quantity: str, unit: str) -> Array:
+        return np.array([each.flipped(quantity, unit) for each in m.placement], dtype=float)
+
+    light = {"wavelength_um": m.wavelength_um, "model": m.air_model}
+    weather = column("temperature_c"), column("pressure_hpa"), column("humidity_percent")
+    eta = 1.0 + group_refractivity(*weather, **light)
+    eta_fp = 1.0 + group_refractivity(
+        after("temperature", "c"), after("pressure", "hpa"), after("humidity", "percent"), **light
+    )
+    n = m.bk7_to_air_group_index_ratio
+    extra = np.zeros_like(eta) if m.bk7_group_index is None else m.bk7_group_index / eta - n
+    extra_fp = np.zeros_like(eta) if m.bk7_group_index is None else m.bk7_group_index / eta_fp - n
+    return TripletReadings(
+        phi_1=column("phi_1_rad"),
+        phi_2=column("phi_2_rad"),
+        phi_zrg=column("phi_zrg_rad"),
+        phi_cal=column("phi_cal_rad"),
+        phi_bcfp=column("phi_bcfp_rad"),
+        phi_zrg_fp=after("phi_zrg", "rad"),
+        phi_cal_fp=after("phi_cal", "rad"),
+        eta_a=eta,
+        eta_a_fp=eta_fp,
+        d_toppl=column("d_toppl_mm") * 1e-3,
+        h_s=column("h_s_mm") * 1e-3,
+        d_12=m.d12_mm * 1e-3,
+        l_1=plate.l1_mm * 1e-3,
+        l_2=plate.l2_mm * 1e-3,
+        l_bt=plate.l_bt_mm * 1e-3,
+        l_post=plate.l_post_mm * 1e-3,
+        height_1=left.height_mm * 1e-3,
+        height_2=right.height_mm * 1e-3,
+        hrp_1=left.hrp_mm * 1e-3,
+        hrp_2=right.hrp_mm * 1e-3,
+        pc_1=(left.pc_mm - left.height_mm * extra) * 1e-3,
+        pc_2=(right.pc_mm - right.height_mm * extra) * 1e-3,
+        pc_b=(m.ball.pc_b_mm - (m.ball.r1_mm + m.ball.r2_mm) * extra_fp) * 1e-3,
+        r_1=m.ball.r1_mm * 1e-3,
+        n=n,
+        modulation_hz=m.modulation_hz,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Combined:
+    """Correlated values of one quantity, combined; see `TripletReduction` for the words."""
+
+    value: float
+    weights: Array
+    residuals: Array
+    statistics: Array
+    chi_square: float
+    degrees_of_freedom: int
+    p: float
+    suspects: tuple[int, ...]
+
+
+def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combined:
+    """The mean of correlated values with weights of least variance, and which of them the others contradict.
+
+    values       (k,)
+    covariance   (k, k), of the used ones above zero
+    used         which count
+
+    The suspects are found one by one, the largest standardised residual w first, each judged without those before it,
+    by the two-sided limit of the level 5 % shared among all. Of two values that contradict each other both are.
+
+    Source: generalised least squares with Baarda's w, written out for one unknown.
+
+    >>> best = combined(np.array([1.0, 2.0]), np.diag([1.0, 4.0]), np.arange(2))
+    >>> round(best.value, 3), best.degrees_of_freedom, round(best.chi_square, 3)
+    (1.2, 1, 0.2)
+    """
+    from scipy.special import chdtrc, ndtri  # heavy
+
+    weights, residuals, statistics = np.zeros(len(values)), *(np.full(len(values), np.nan) for _ in range(2))
+    if not len(used):
+        return Combined(math.nan, weights, residuals, statistics, math.nan, 0, math.nan, ())
+    weights[used], inverse = _weights(covariance, used)
+    value = float(weights[used] @ values[used])
+    left = values[used] - value
+    residuals[used] = left
+    degrees = len(used) - 1
+    if not degrees:
+        return Combined(value, weights, residuals, statistics, 0.0, 0, math.nan, ())
+    chi_square = float(left @ inverse @ left)
+    statistics[used] = _standardised(values, covariance, used)
+    limit = -float(ndtri(0.5 * LEVEL / len(used)))
+    suspects: list[int] = []
+    rest, w = used, statistics[used]
+    while len(rest) > 1 and np.max(np.abs(w)) > limit:
+        if len(rest) == 2:  # nothing says which
+            suspects += [int(k) for k in rest]
+            break
+        worst = int(np.argmax(np.abs(w)))
+        suspects.append(int(rest[worst]))
+        rest = np.delete(rest, worst)
+        w = _standardised(values, covariance, rest)
+    p = float(chdtrc(degrees, chi_square))
+    return Combined(value, weights, residuals, statistics, chi_square, degrees, p, tuple(sorted(suspects)))
+
+
+def _weights(covariance: Array, used: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Of least variance, and the inverse of the covariance."""
+    apart = covariance[np.ix_(used, used)] + np.eye(len(used)) * FLOOR**2  # placements that share everything
+    inverse = np.asarray(np.linalg.inv(apart), dtype=np.float64)
+    return inverse.sum(axis=1) / inverse.sum(), inverse
+
+
+def _standardised(values: Array, covariance: Array, used: NDArray[np.intp]) -> Array:
+    """w of each; with v the residuals the covariance of C^-1 v is C^-1 - C^-1 1 1' C^-1 / (1' C^-1 1)."""
+    weights, inverse = _weights(covariance, used)
+    left = values[used] - weights @ values[used]
+    spread = inverse - np.outer(inverse.sum(axis=1), inverse.sum(axis=0)) / inverse.sum()
+    return (inverse @ left) / np.sqrt(np.diagonal(spread))
+
+
+def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
+    """Each group's share in the uncertainty of h_corr, m."""
+    budget: dict[str, float] = {}
+    for group, value in zip(shares.groups, share, strict=True):
+        budget[group] = math.hypot(budget.get(group, 0.0), float(value))
+    return budget
+
+
+def _steps(m: TripletMeasurement, lengths: TripletLengths, shares: TripletShares) -> tuple[Array, Array]:
+    """How far ranging puts the stops from where it put them in the first placement, and its u."""
+    spacer = np.array([each.spacer_mm for each in m.placement]) * 1e-3
+    place = lengths.depth_mp + spacer
+    u_spacer = np.where(spacer != spacer[0], math.sqrt(2.0) * m.u_spacer_mm * 1e-3, 0.0)
+    return place - place[0], np.hypot(np.linalg.norm(shares.depth - shares.depth[:, :1], axis=0), u_spacer)
+
+
+def _air_in_glass(m: TripletMeasurement, r: TripletReadings, weights: Array) -> float:
+    """What an index of glass that does not follow the air's would add to h_corr."""
+    if m.bk7_group_index is not None:
+        return 0.0
+    reference = 1.0 + float(group_refractivity(*REFERENCE_AIR, wavelength_um=m.wavelength_um, model=m.air_model))
+    n = m.bk7_to_air_group_index_ratio
+    prisms = 0.5e-3 * sum(p.height_mm for p in m.prisms) * (reference / r.eta_a - 1.0)
+    ball = 1e-3 * (m.ball.r1_mm + m.ball.r2_mm) * (reference / r.eta_a_fp - 1.0)
+    return float(weights @ (n * (prisms - ball)))
+
+
+def _status(
+    m: TripletMeasurement, k: int, lengths: TripletLengths, cycles: TripletCycles, suspects: tuple[int, ...]
+) -> str:
+    h = float(lengths.h_corr[k])
+    if not math.isfinite(h):
+        return NOT_A_TRIANGLE
+    if abs(h - float(np.ravel(lengths.l_mpbc)[0])) > FAR:
+        return SLIPPED
+    if float(cycles.margin[k]) < SIGMAS * m.u_d_toppl_mm * 1e-3:
+        return THIN
+    return SUSPECT if k in suspects else GOOD
+
+
+def _with_notes(found: TripletReduction) -> TripletReduction:
+    return replace(found, notes=tuple(triplet_notes(found)))

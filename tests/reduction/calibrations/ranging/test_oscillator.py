@@ -1,0 +1,69 @@
+"""The oscillator test on made phases: what was planted comes out, in ranges too."""
+
+import numpy as np
+import pytest
+
+from catseye.errors import InputError
+from catseye.reduction.calibrations.ranging.oscillator import KIND, OscillatorSheet, measure_oscillator
+from reduction.calibrations.length_scene import readings
+
+
+def phases(seed=1, spur=2e-3):
+    rng = np.random.default_rng(seed)
+    time = np.arange(8192) * 1e-3
+    return 3.0 + 0.01 * rng.normal(size=8192) + spur * np.sin(2 * np.pi * 57.0 * time)
+
+
+def test_noise_spur_and_the_range_that_averages_128_cycles():
+    found = measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()}, interval_s=0.001))
+    assert found.value("white_mrad2") == pytest.approx(100.0, abs=4 * found.u("white_mrad2"))
+    expected = 0.01 / np.sqrt(128) * 99.93e3 / (2 * np.pi)  # µm
+    assert found.value("white_range_um") == pytest.approx(expected, abs=4 * found.u("white_range_um"))
+    assert not found.decisions[0].passed
+    assert "57" in found.decisions[0].text
+    quiet = measure_oscillator(
+        readings(OscillatorSheet, KIND, numbers={"phase_rad": phases(spur=0.0)}, interval_s=0.001)
+    )
+    assert quiet.decisions[0].passed
+
+
+def test_phases_that_wrap_are_unwrapped():
+    plain = readings(OscillatorSheet, KIND, numbers={"phase_rad": phases() + 3.2}, interval_s=0.001)
+    wrapped = readings(
+        OscillatorSheet, KIND, numbers={"phase_rad": np.mod(phases() + 3.2, 2 * np.pi)}, interval_s=0.001
+    )
+    assert measure_oscillator(wrapped).value("white_mrad2") == pytest.approx(
+        measure_oscillator(plain).value("white_mrad2"), rel=1e-6
+    )
+
+
+def test_series_with_holes_or_too_short_are_refused():
+    left_out = ("",) * 99 + ("bump",)
+    holed = readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()[:100]}, left_out=left_out, interval_s=0.001)
+    with pytest.raises(InputError, match="line 101, is left out"):
+        measure_oscillator(holed)
+    with pytest.raises(InputError, match="at least 64"):
+        measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()[:20]}, interval_s=0.001))
+
+
+def test_a_drifting_phase_is_told_and_readings_that_alternate_make_no_infinite_figure():
+    drifting = phases(spur=0.0) + 0.5 * np.arange(8192) * 1e-3
+    found = measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": drifting}, interval_s=0.001))
+    assert found.decisions[0].passed
+    assert any("drift of +0.5 rad/s" in note for note in found.notes)
+    alternating = readings(OscillatorSheet, KIND, numbers={"phase_rad": np.arange(256) % 2 * 1e-3}, interval_s=0.001)
+    for x, y in measure_oscillator(alternating).curve.values():
+        assert np.all(np.isfinite([x, y]))
+
+
+def test_u_of_the_noise_of_a_range_and_the_table_and_line_of_averages_by_hand():
+    found = measure_oscillator(
+        readings(OscillatorSheet, KIND, numbers={"phase_rad": phases(spur=0.0)}, interval_s=0.001)
+    )
+    relative = found.u("white_mrad2") / found.value("white_mrad2")
+    assert found.u("white_range_um") == pytest.approx(0.5 * relative * found.value("white_range_um"), rel=1e-9)
+    first = dict(zip(found.columns, found.rows[0], strict=True))
+    assert first["range_um"] == pytest.approx(first["allan_deviation_rad"] * 99.93e3 / (2 * np.pi), rel=1e-9)
+    time, height = found.curve["fit"]
+    assert height[0] == pytest.approx(-2.0, abs=0.01)  # 10 mrad
+    assert np.diff(height) == pytest.approx(-0.5 * np.diff(time))  # white noise falls by the square root

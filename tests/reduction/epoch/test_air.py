@@ -1,0 +1,247 @@
+"""The air of a campaign: smoothing in time, profile in height, derivatives."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from catseye.atmosphere.air import group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.constants import SECONDS_PER_DAY
+from catseye.records.path_temperature import PathTemperature, path_temperature_columns
+from catseye.records.weather import Weather
+from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.settings import Settings
+
+Z0 = 806.42  # m above sea level, night-01's
+
+
+def weathered(campaign, heights, seconds, temperature, pressure=900.0, humidity=50.0):
+    """The campaign with stations at heights (ground frame, m) and functions of time (s) and station as readings."""
+    start = float(campaign.shots.mjd_utc[0])
+    names = [f"S{i}" for i in range(len(heights))]
+    rows = [(s, i) for s in seconds for i in range(len(heights))]
+    station = campaign.site.weather_station[0]
+    site = campaign.site.model_copy(
+        update={
+            "weather_station": tuple(
+                station.model_copy(update={"name": n, "elevation_m": h + Z0})
+                for n, h in zip(names, heights, strict=True)
+            )
+        }
+    )
+    weather = Weather(
+        mjd_utc=np.array([start + s / SECONDS_PER_DAY for s, _ in rows]),
+        station=tuple(names[i] for _, i in rows),
+        temperature_c=np.array([temperature(s, i) for s, i in rows]),
+        pressure_hpa=np.full(len(rows), pressure),
+        humidity_percent=np.full(len(rows), humidity),
+    )
+    return dataclasses.replace(campaign, site=site, weather=weather), start
+
+
+def at(start, *seconds):
+    return start + np.array(seconds) / SECONDS_PER_DAY
+
+
+def test_a_line_in_time_is_left_a_line_right_up_to_its_ends(night_01):
+    campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + i - s / 1800)
+    times = (0.0, 1.0, 77.0, 1800.0, 3599.0, 3600.0)
+    smooth = AirField.of(campaign, Settings()).smoothed(at(start, *times))
+    expected = np.array([[10 - s / 1800, 11 - s / 1800] for s in times])
+    # 1e-6 °C: the Modified Julian Day resolves a microsecond
+    np.testing.assert_allclose(smooth[:, :, 0], expected, atol=1e-6)
+
+
+def test_noise_of_a_reading_every_30_s_falls_to_a_sixth(night_01):
+    rng = np.random.default_rng(5)
+    noise = {}
+    campaign, start = weathered(
+        night_01, [0.0, 40.0], np.arange(0.0, 36001.0, 30.0), lambda s, i: noise.setdefault((s, i), rng.normal())
+    )
+    smooth = AirField.of(campaign, Settings()).smoothed(at(start, *np.arange(3000.0, 33000.0, 100.0)))[:, :, 0]
+    # theory: sqrt(30 / (2 sqrt(pi) 300)) = 0.168; 2 x 30000 s / 1060 s of independent values: 10 % of scatter
+    assert smooth.std() == pytest.approx(0.168, rel=0.25)
+
+
+def test_beyond_the_samples_the_air_stays_as_it_was_last_without_a_jump(night_01):
+    campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 1801.0, 30.0), lambda s, i: 10 - s / 600)
+    smooth = AirField.of(campaign, Settings()).smoothed(at(start, -3600, -0.01, 0.01, 1799.99, 1800.01, 1e5))[:, 0, 0]
+    np.testing.assert_allclose(smooth, [10, 10, 10, 7, 7, 7], atol=1e-3)
+
+
+def test_in_a_gap_of_hours_the_nearest_samples_still_count(night_01):
+    seconds = [0.0, 30.0, 60.0, 20000.0, 20030.0]
+    campaign, start = weathered(night_01, [0.0, 40.0], seconds, lambda s, i: 10 + s / 10000)
+    smooth = AirField.of(campaign, Settings()).smoothed(at(start, 10000.0))[0, 0, 0]
+    assert smooth == pytest.approx(11.0, abs=1e-6)
+
+
+def test_a_single_sample_holds_for_ever(night_01):
+    campaign, start = weathered(night_01, [0.0, 40.0], [100.0], lambda s, i: 7.0 + i)
+    smooth = AirField.of(campaign, Settings()).smoothed(at(start, -5e4, 100.0, 5e4))
+    np.testing.assert_array_equal(smooth[:, :, 0], [[7.0, 8.0]] * 3)
+
+
+def paths(m=6):
+    rng = np.random.default_rng(3)
+    a, b = rng.uniform(-100, 100, (2, m, 3))
+    a[:, 2], b[:, 2] = rng.uniform(0, 2, m), rng.uniform(0, 110, m)
+    return a, b
+
+
+@pytest.mark.parametrize("heights", [(-2.6, 43.7), (-2.6, 20.0, 43.7), (10.0,), (10.0, 12.0)])
+def test_slopes_are_the_derivatives_of_the_refractivity(night_01, heights):
+    campaign, start = weathered(night_01, heights, np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + 0.4 * i - s / 3600)
+    field = AirField.of(campaign, Settings())
+    a, b = paths()
+    when = at(start, *np.linspace(100, 3000, len(a)))
+    base = np.array([*[0.2, -0.1, 0.15][: len(heights)], 0.002])
+    found = field.along(when, a, b, base)
+    assert found.slopes.shape == (len(a), len(field.names))
+    for q in range(len(base)):
+        step = np.zeros(len(base))
+        step[q] = 1e-3
+        up, down = (field.along(when, a, b, base + sign * step).refractivity for sign in (1, -1))
+        # 1e-3: the slope is a difference over a whole degree, the curvature of n(T) enters in its third order
+        np.testing.assert_allclose(found.slopes[:, q], (up - down) / 2e-3, rtol=1e-3, atol=1e-12)
+
+
+def test_two_stations_make_a_straight_profile_and_pressure_falls_by_0_11_hpa_a_metre(night_01):
+    campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + 2.0 * i)
+    field = AirField.of(campaign, Settings())
+    # a path of no slope: the value at its height; both stations read 900 hPa, so 900 holds half-way
+    for z in (-5.0, 0.0, 20.0, 40.0, 100.0):
+        end = np.array([[50.0, 0.0, z]])
+        found = field.along(at(start, 1800.0), end - [[50, 0, 0]], end, np.zeros(3)).refractivity[0]
+        expected = group_refractivity(
+            10 + z / 20, 900.0 - 0.11 * (z - 20), 50.0, wavelength_um=0.78, model="rueger1990"
+        )
+        assert found == pytest.approx(float(expected), abs=1e-11)
+
+
+def test_three_stations_are_levelled_by_their_line(night_01):
+    line = [5.0, 5.5, 6.5]
+    campaign, start = weathered(night_01, [0.0, 10.0, 30.0], [0.0, 3600.0], lambda s, i: line[i])
+    field = AirField.of(campaign, Settings())
+    two, start = weathered(night_01, [0.0, 30.0], [0.0, 3600.0], lambda s, i: (5.0, 6.5)[i])
+    a, b = paths()
+    when = at(start, *[100.0] * len(a))
+    b[:, 2] = a[:, 2]  # level paths: pressure is referred to the stations' mean height, the same after a shift
+    shift = 0.11 * (15.0 - 40.0 / 3.0)
+    exact = group_refractivity(
+        5.0 + a[:, 2] / 20, 900.0 - 0.11 * (a[:, 2] - 15.0) - shift, 50.0, wavelength_um=0.78,
+        model="rueger1990",
+    )  # fmt: skip
+    np.testing.assert_allclose(field.along(when, a, b, np.zeros(4)).refractivity, exact, atol=1e-11)
+    assert field.names == ("S0", "S1", "S2", "bend")
+    assert field.steepest(np.zeros(3)) == pytest.approx(0.05, abs=1e-12)
+    assert AirField.of(two, Settings()).names == ("S0", "S1", "bend")
+
+
+@pytest.mark.parametrize("heights", [(5.0,), (5.0, 5.0), (5.0, 9.9)])
+def test_stations_at_one_height_show_no_gradient_so_it_is_a_parameter(night_01, heights):
+    campaign, start = weathered(night_01, heights, [0.0, 3600.0], lambda s, i: 10.0 + i)
+    field = AirField.of(campaign, Settings())
+    assert field.names[-1] == "gradient"
+    assert field.sigmas[-1] == Settings().u_gradient_c_per_m
+    assert field.steepest(np.zeros(len(heights))) == 0.0
+    a, b = paths(1)
+    b[:, 2] = a[:, 2] = 45.0
+    flat = np.zeros(len(field.names))
+    warm = flat.copy()
+    warm[-1] = 0.01
+    change = field.along(at(start, 0.0), a, b, warm).refractivity - field.along(at(start, 0.0), a, b, flat).refractivity
+    # 0.4 °C warmer 40 m higher, 0.9 ppm per °C at 10 °C and 900 hPa
+    assert change[0] == pytest.approx(-0.9e-6 * 0.01 * (45.0 - np.mean(heights)), rel=0.05)
+
+
+def test_a_path_has_one_air_from_either_end(night_01):
+    field = AirField.of(night_01, Settings())
+    a, b = paths()
+    when = np.full(len(a), night_01.shots.mjd_utc[50])
+    there, back = field.along(when, a, b, np.zeros(3)), field.along(when, b, a, np.zeros(3))
+    np.testing.assert_allclose(there.refractivity, back.refractivity, rtol=1e-14)
+    np.testing.assert_allclose(there.slopes, back.slopes, rtol=1e-12, atol=1e-20)
+
+
+def test_a_bend_of_one_degree_is_one_degree_warmer_half_way_and_nothing_at_the_stations(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 60.0], lambda s, i: 10.0 + 2.0 * i)
+    field = AirField.of(campaign, Settings(air_model="rueger1990"))
+    level = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 25.0], [0.0, 0.0, 50.0]])
+    far = level + np.array([100.0, 0.0, 0.0])
+    bent = field.along(at(start, 30.0, 30.0, 30.0), level, far, np.array([0.0, 0.0, 1.0]))
+    warmth, pressure = np.array([10.0, 12.0, 12.0]), 900.0 - 0.11 * (level[:, 2] - 25.0)  # half-way 11 on the line
+    expected = group_refractivity(warmth, pressure, 50.0, wavelength_um=0.78, model="rueger1990")
+    np.testing.assert_allclose(bent.refractivity, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("humidity", "expected"), [(100.0, 100.0), (0.0, 0.0)])
+def test_fog_and_dry_air_are_humidities_too(night_01, humidity, expected):
+    """Weights sum to one only to rounding: 100.00000000000001 % was refused, and with it the whole night."""
+    campaign, start = weathered(
+        night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 37.0), lambda s, i: 10.0, humidity=humidity
+    )
+    field = AirField.of(campaign, Settings())
+    times = at(start, *np.linspace(0.0, 3600.0, 500))
+    assert np.all(np.abs(field.smoothed(times)[:, :, 2] - expected) < 1e-9)
+    ends = np.zeros((500, 3)), np.tile([50.0, 0.0, 30.0], (500, 1))
+    assert np.all(np.isfinite(field.along(times, *ends, np.zeros(3)).refractivity))
+
+
+def lined(campaign, rows):
+    """Its field, with path temperatures (mjd, ranger, target, °C, u), and the field of shots ZY101 - T, ZY102 - T."""
+    keys = ("mjd_utc", "ranger", "target", "temperature_c", "u_temperature_c")
+    table = path_temperature_columns([PathTemperature(**dict(zip(keys, row, strict=True))) for row in rows])
+    return AirField.of(dataclasses.replace(campaign, path_temperatures=table), Settings())
+
+
+ENDS = [frozenset(("ZY101", "T")), frozenset(("ZY102", "T"))]
+
+
+def test_sound_takes_the_thermometers_place_on_its_own_line_and_leaves_the_vapour(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 3600.0], lambda s, i: 10.0 + i)
+    field = lined(campaign, [(start + 0.01, "T", "ZY101", 16.0, 0.2)])  # a line is the same from either end
+    times = at(start, 864.0, 864.0)
+    level = np.zeros((2, 3))
+    far = level + np.array([100.0, 0.0, 0.0])
+    found = field.on_lines(times, ENDS).along(times, level, far, np.zeros(4))
+    plain = field.along(times, level, far, np.zeros(4))
+    assert found.refractivity[1] == plain.refractivity[1]
+    pressure = 900.0 + 0.11 * 25.0
+    vapour = float(vapour_pressure_hpa(10.0, pressure, 50.0))
+    expected = group_refractivity_of_vapour(16.0, pressure, vapour, wavelength_um=0.78, model="rueger1990")
+    assert found.refractivity[0] == pytest.approx(float(expected), abs=1e-13)
+    assert found.refractivity[0] < plain.refractivity[0] - 5e-6  # 6 °C warmer
+    assert field.names == ("S0", "S1", "bend", "T - ZY101")
+    assert field.stations == ("S0", "S1")
+    assert field.sigmas[-1] == pytest.approx(0.2)
+
+
+def test_sound_counts_near_in_time_only_and_is_a_line_between_its_rows(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 9000.0], lambda s, i: 10.0)
+    rows = [(start + s / SECONDS_PER_DAY, "ZY101", "T", t, 0.2) for s, t in ((2000.0, 12.0), (2400.0, 14.0))]
+    field = lined(campaign, rows)
+    times = at(start, 1300.0, 1500.0, 2100.0, 2900.0, 3100.0)
+    bound = field.on_lines(times, [ENDS[0]] * 5)
+    assert bound.sounded.tolist() == [-1, 0, 0, 0, -1]
+    np.testing.assert_allclose(field.lines[0].at(times)[0][1:4], [12.0, 12.5, 14.0], atol=1e-4)
+
+
+def test_slopes_of_a_sounded_line_are_derivatives_and_every_row_feels_its_own_u(night_01):
+    campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 9000.0], lambda s, i: 10.0 + i)
+    rows = [(start + s / SECONDS_PER_DAY, "ZY101", "T", 13.0, u) for s, u in ((1000.0, 0.1), (3000.0, 0.3))]
+    times = at(start, 1000.0, 3000.0)
+    field = lined(campaign, rows).on_lines(times, [ENDS[0]] * 2)
+    a, b = paths(2)
+    base = np.array([0.2, -0.1, 0.05, 0.1])
+    found = field.along(times, a, b, base)
+    for q in range(4):
+        step = np.zeros(4)
+        step[q] = 1e-2
+        up, down = (field.along(times, a, b, base + sign * step).refractivity for sign in (1, -1))
+        # 2e-3: of the vapour's curve over a degree, as above
+        np.testing.assert_allclose(found.slopes[:, q], (up - down) / 2e-2, rtol=2e-3, atol=1e-13)
+    assert np.all(found.slopes[:, 3] > 0.0)  # sound that reads too warm hides a higher index
+    assert found.slopes[1, 3] / found.slopes[0, 3] == pytest.approx(3.0, rel=0.02)
+    assert field.sigmas[3] == pytest.approx(np.sqrt((0.01 + 0.09) / 2))

@@ -1,0 +1,133 @@
+"""One epoch: what becomes a campaign, what stays in the state, and that shots only ever add to what was known."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from catseye.errors import InputError
+from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.reduction.live.epoch import _lasts, campaign_of
+from catseye.reduction.site.motion import ground_from
+from live_scene import START, begun, site
+
+POSTURE = {"azimuth": np.radians(370.0), "elevation": np.radians(45.0), "mjd": START}
+RANGERS = ("ZY102", "ZY105", "ZY108", "ZY110", "ZY113", "ZY116")
+
+
+def weather(station, seconds=0.0):
+    return LiveWeather(station, round((START + seconds / 86400.0) * TICKS_PER_DAY), 10.0, 930.0, 70.0)
+
+
+@pytest.fixture(scope="module")
+def second_epoch():
+    """A Live after one epoch of six rangers, with the next round's shots in it, and the tick to solve for."""
+    night, live = begun(seed=3)
+    night.round(0, rangers=RANGERS).into(live)
+    assert live.solve(night.ticks(0)) is not None, live.failed
+    night.round(1, rangers=RANGERS).into(live)
+    return live, night.ticks(1)
+
+
+def test_without_weather_there_is_no_campaign():
+    with pytest.raises(InputError, match="no weather station has spoken"):
+        campaign_of(site(), [], [], **POSTURE)
+
+
+def test_only_stations_that_speak_take_part():
+    campaign = campaign_of(site(), [], [weather("WX2"), weather("WX2", 10.0)], **POSTURE)
+    assert [s.name for s in campaign.site.weather_station] == ["WX2"]
+    assert campaign.weather.station == ("WX2", "WX2")
+    assert campaign.site.campaign.azimuth_deg == pytest.approx(10.0)
+    assert campaign.site.campaign.elevation_deg == pytest.approx(45.0)
+    assert [s.name for s in site().site.weather_station] == ["WX1", "WX2"], "the site's own record stays"
+
+
+@pytest.mark.parametrize(
+    ("name", "stays"),
+    [
+        ("ZY101 x", True),
+        ("ZY101-F z", True),
+        ("zero ZY113", True),
+        ("leakage ZY113 real", True),
+        ("the air WX1", True),
+        ("the air bend", True),
+        ("TR01-L y", True),
+        ("normal TR01 1", True),
+        ("glass TR01-B", True),
+        ("DP01C x", False),
+        ("normal DP01C 2", False),
+        ("glass DP01C", False),
+    ],
+)
+def test_what_lasts_is_known_by_its_name(name, stays):
+    assert _lasts(name, ("ZY101", "ZY113", "TR01-L", "TR01-R", "TR01-B")) is stays
+
+
+def test_shots_only_add_to_what_was_known(second_epoch):
+    live = copy.deepcopy(second_epoch[0])
+    live.set_reference()
+    job = live.begin(second_epoch[1])
+    epoch = job.solve()
+    before, after = job.carried, epoch.carried
+    shared = [n for n in before.names if n in set(after.names)]
+    p, q = (s.covariance[np.ix_(s.columns(shared), s.columns(shared))] for s in (before, after))
+    size = np.sqrt(np.diag(p))
+    gained = np.linalg.eigvalsh((p - q) / np.outer(size, size))
+    # information adds, so that p - q is positive; prisms' normals and cycles are renewed at where points now are
+    assert gained[0] > -1e-3
+    assert gained[-1] > 0.5, "and here it adds much"
+    assert set(before.names) <= set(after.names), "nothing is lost on the way"
+    assert "ZY113@0 x" in after.names
+
+
+def test_what_the_records_say_is_counted_once(second_epoch):
+    """A ranger without shots is held by survey and sheet; the second epoch must not hear them a second time."""
+    live = copy.deepcopy(second_epoch[0])
+    job = live.begin(second_epoch[1])
+    before, after = job.carried, job.solve().carried
+    mirror = np.zeros((3, len(before.names)))  # scan point less fixed point: the sheet's mirror offset
+    for i, axis in enumerate("xyz"):
+        mirror[i, before.columns([f"ZY101 {axis}", f"ZY101-F {axis}"])] = 1.0, -1.0
+    order = after.columns(before.names)
+    now = after.covariance[np.ix_(order, order)]
+    u, v = (np.sqrt(np.diag(mirror @ p @ mirror.T)) for p in (before.covariance, now))
+    np.testing.assert_allclose(v, u, rtol=1e-3)  # heard twice it would be 0.7 of it
+    zero = before.columns(["zero ZY101"])[0]
+    assert now[zero, zero] == pytest.approx(before.covariance[zero, zero], rel=1e-3)
+
+
+def test_an_epoch_is_carried_in_the_frames_of_its_points(second_epoch):
+    live = copy.deepcopy(second_epoch[0])
+    found = live.solve(second_epoch[1])
+    assert live.carried.ticks == found.ticks == second_epoch[1]
+    for name in ("ZY102", "ZY113", "TR05-B", "ZEG41040L"):
+        ground, covariance = found.point(name)
+        np.testing.assert_allclose(live.place(name, found.ticks / TICKS_PER_DAY), ground, rtol=0, atol=1e-9)
+        own, own_covariance = live.carried.block([name])
+        np.testing.assert_allclose(np.trace(own_covariance), np.trace(covariance), rtol=1e-9)
+        moves = live.frames[name] != "ground"
+        assert (np.linalg.norm(own[0] - ground) > 1.0) == moves
+        latest = live.track.latest
+        axes = ground_from(site(), live.frames[name], latest.azimuth, latest.elevation).single.rotation
+        turned = axes @ own_covariance @ axes.T
+        np.testing.assert_allclose(live.uncertainty()[name], turned, rtol=1e-9, atol=1e-18)
+
+
+def test_rangers_that_were_dead_from_the_start_stay_known(second_epoch):
+    live = copy.deepcopy(second_epoch[0])
+    found = live.solve(second_epoch[1])
+    assert found.shots[found.names.index("ZY101")] == 0
+    sheet = live.site.mirror_of("ZY101")
+    u = np.sqrt(np.diag(found.point("ZY101")[1]))
+    assert 0.0 < u.max() < 1e-3 * (sheet.u_offset_mm + 1.0)  # its survey holds it
+
+
+def test_an_epoch_solved_elsewhere_is_the_same(second_epoch):
+    here, there = (copy.deepcopy(second_epoch[0]) for _ in range(2))
+    first = here.solve(second_epoch[1])
+    job = there.begin(second_epoch[1])
+    again = there.take_in(job, copy.deepcopy(job).solve())
+    np.testing.assert_array_equal(first.x, again.x)
+    np.testing.assert_array_equal(first.covariance, again.covariance)
+    assert first.used == again.used

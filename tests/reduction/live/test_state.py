@@ -1,0 +1,230 @@
+"""The carried state against plain matrices: Kalman's update in full, walks written out, what returns to its prior."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from catseye.geometry.frame import Transform
+from catseye.reduction.live.state import (
+    USUAL,
+    Carried,
+    carried_on,
+    from_ground,
+    to_ground,
+    with_reference,
+    with_unseen,
+    with_velocities,
+    without,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+BODIES = {"A": "arm", "B": "arm", "C": "arm", "D": "dish", "E": "alidade"}
+NAMES = (
+    *(f"{p} {a}" for p in ("A", "B", "C", "D", "E", "ZY1", "ZY1-F") for a in "xyz"),
+    "zero ZY1",
+    "leakage ZY1 real",
+    "leakage ZY1 imaginary",
+    "the air WX1",
+    "the air bend",
+    "normal D 1",
+)
+
+
+def spd(rng, n, size=1.0):
+    a = rng.normal(size=(n, n + 2))
+    return size * (a @ a.T) / n
+
+
+def state(seed=0, names=NAMES):
+    rng = np.random.default_rng(seed)
+    return Carried(tuple(names), 10.0 * rng.normal(size=len(names)), spd(rng, len(names), 1e-6), 1000, 0.7)
+
+
+@settings(max_examples=60)
+@given(seed=seeds, shared=st.integers(1, 5), outside=st.integers(1, 5), new=st.integers(0, 4))
+def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, outside, new):
+    rng = np.random.default_rng(seed)
+    old = tuple(f"s{k}" for k in rng.permutation(shared + outside))
+    before = Carried(old, rng.normal(size=len(old)), spd(rng, len(old)), 0, 0.1)
+    seen_names = (*rng.permutation(old)[:shared].tolist(), *(f"n{k}" for k in range(new)))
+    # the full problem: old states, then new ones with a prior of their own, and observations of the seen
+    names = (*old, *seen_names[shared:])
+    n = len(names)
+    p, x = np.zeros((n, n)), np.concatenate([before.x, rng.normal(size=new)])
+    p[: len(old), : len(old)], p[len(old) :, len(old) :] = before.covariance, spd(rng, new) if new else 0.0
+    at = [names.index(name) for name in seen_names]
+    h, r = np.zeros((6, n)), spd(rng, 6)
+    h[:, at] = rng.normal(size=(6, len(at)))
+    z = rng.normal(size=6)
+
+    def updated(x, p, h):
+        gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + r)
+        return x + gain @ (z - h @ x), p - gain @ h @ p
+
+    whole_x, whole_p = updated(x, p, h)
+    part_x, part_p = updated(x[at], p[np.ix_(at, at)], h[:, at])
+    after = with_unseen(before, Carried(seen_names, part_x, part_p, 5, 0.2))
+    order = [after.names.index(name) for name in names]
+    np.testing.assert_allclose(after.x[order], whole_x, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(after.covariance[np.ix_(order, order)], whole_p, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(after.covariance, after.covariance.T, rtol=0, atol=1e-10)  # what was seen is by inverses
+    assert (after.ticks, after.elevation) == (5, 0.2)
+
+
+def test_a_seen_state_stands_as_it_was_found():
+    before, seen = state(1, ("a", "b", "c")), state(2, ("c", "b"))
+    after = with_unseen(before, seen)
+    np.testing.assert_array_equal(after.covariance[:2, :2], seen.covariance)
+    np.testing.assert_array_equal(after.x[:2], seen.x)
+    assert with_unseen(seen, before) is before, "everything was seen"
+
+
+def test_the_reference_epoch_is_a_fully_correlated_copy_that_later_replaces_itself():
+    first = with_reference(state(3), ["A", "D"])
+    now, then = first.columns(["A x", "D z"]), first.columns(["A@0 x", "D@0 z"])
+    np.testing.assert_array_equal(first.x[now], first.x[then])
+    p = first.covariance
+    np.testing.assert_array_equal(p[np.ix_(now, now)], p[np.ix_(now, then)])
+    np.testing.assert_array_equal(p[np.ix_(then, then)], p[np.ix_(now, now)])
+    moved = Carried(first.names, first.x + 1.0, first.covariance, 9, 0.1)
+    again = with_reference(moved, ["A"])
+    assert sum("@0" in name for name in again.names) == 6, "D keeps its old reference, A has a new one"
+    np.testing.assert_array_equal(again.x[again.columns(["A@0 y"])], again.x[again.columns(["A y"])])
+
+
+def test_a_marginal_leaves_the_rest_alone():
+    whole = state(4)
+    left = without(whole, {"A x", "zero ZY1"})
+    at = [i for i, name in enumerate(whole.names) if name not in {"A x", "zero ZY1"}]
+    np.testing.assert_array_equal(left.x, whole.x[at])
+    np.testing.assert_array_equal(left.covariance, whole.covariance[np.ix_(at, at)])
+
+
+def test_velocities_are_added_once_and_are_uncorrelated():
+    one = with_velocities(state(5), ["A", "D"], USUAL)
+    assert with_velocities(one, ["A", "D"], USUAL).names == one.names
+    rate = one.columns([f"{p} rate {a}" for p in "AD" for a in "xyz"])
+    np.testing.assert_allclose(one.covariance[np.ix_(rate, rate)], (0.02e-3) ** 2 * np.eye(6), rtol=1e-12, atol=0)
+    rest = np.setdiff1d(np.arange(len(one.x)), rate)
+    assert not one.covariance[np.ix_(rate, rest)].any()
+    assert not one.x[rate].any()
+
+
+def cross(w):
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+
+
+@pytest.mark.parametrize(("seconds", "degrees"), [(0.0, 0.0), (10.0, 0.0), (1800.0, -7.0), (-5.0, 1.0)])
+def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
+    before = with_velocities(with_reference(state(6), ["A"]), ["B", "E"], USUAL)
+    elevation = 0.7 + np.radians(degrees)
+    after = carried_on(before, 2000, seconds, elevation, BODIES, USUAL, 0.5)
+    t, n = max(seconds, 0.0), len(before.x)
+    column = {name: i for i, name in enumerate(before.names)}
+    f, q = np.eye(n), np.zeros((n, n))
+    for point in ("B", "E"):
+        for axis in "xyz":
+            i, j = column[f"{point} {axis}"], column[f"{point} rate {axis}"]
+            f[i, j] = t
+            walk = (0.002e-3) ** 2
+            q[i, i] += walk * t**3 / 3
+            q[i, j] += walk * t**2 / 2
+            q[j, i] += walk * t**2 / 2
+            q[j, j] += walk * t
+    f[column["the air bend"], column["the air bend"]] = np.exp(-t / 1800.0)
+    q[column["the air bend"], column["the air bend"]] = 0.25 * (1.0 - np.exp(-2.0 * t / 1800.0))
+    x = f @ before.x
+    hours, far = t / 3600.0, abs(degrees)
+    for body in ("arm", "dish", "alidade"):
+        mine = [p for p in BODIES if BODIES[p] == body]
+        places = np.array([[x[column[f"{p} {a}"]] for a in "xyz"] for p in mine])
+        shift = np.hypot(USUAL.body_mm[body], 2.0 * far) * 1e-3
+        turn = np.hypot(USUAL.body_rad[body], 5e-5 * far)
+        design = np.vstack([np.hstack([np.eye(3), -cross(p - places.mean(axis=0))]) for p in places])  # w x r = -r x w
+        own = (USUAL.point_mm[body] ** 2 + (0.5 * far) ** 2 + 0.3**2 * hours) * 1e-6
+        at = np.array([column[f"{p} {a}"] for p in mine for a in "xyz"])
+        q[np.ix_(at, at)] += design @ np.diag([shift**2] * 3 + [turn**2] * 3) @ design.T + own * np.eye(len(at))
+    for axis in "xyz":
+        both = [column[f"ZY1 {axis}"], column[f"ZY1-F {axis}"]]
+        q[np.ix_(both, both)] += (0.02e-3) ** 2 * hours
+    q[column["zero ZY1"], column["zero ZY1"]] = (0.01e-3) ** 2 * hours
+    for part in ("real", "imaginary"):
+        q[column[f"leakage ZY1 {part}"], column[f"leakage ZY1 {part}"]] = 1e-8 * hours
+    q[column["the air WX1"], column["the air WX1"]] = 0.05**2 * hours
+    np.testing.assert_allclose(after.x, x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(after.covariance, f @ before.covariance @ f.T + q, rtol=1e-12, atol=1e-18)
+    assert (after.ticks, after.elevation) == (2000, elevation)
+    np.testing.assert_array_equal(before.x, with_velocities(with_reference(state(6), ["A"]), ["B", "E"], USUAL).x)
+
+
+def test_the_profile_returns_to_its_prior_and_the_reference_stands():
+    before = with_reference(state(7), ["A", "D"])
+    after = carried_on(before, 0, 24 * 3600.0, 0.7, BODIES, USUAL, 0.4)
+    bend = after.columns(["the air bend"])[0]
+    assert after.x[bend] == pytest.approx(0.0, abs=1e-12)
+    assert after.covariance[bend, bend] == pytest.approx(0.16, rel=1e-9)
+    assert np.abs(np.delete(after.covariance[bend], bend)).max() < 1e-12
+    old = [i for i, name in enumerate(before.names) if "@0" in name]
+    np.testing.assert_array_equal(after.covariance[np.ix_(old, old)], before.covariance[np.ix_(old, old)])
+
+
+@settings(max_examples=40)
+@given(seed=seeds)
+def test_there_and_back_through_the_ground_is_where_it_was(seed):
+    rng = np.random.default_rng(seed)
+    before = state(seed)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    frames = {"A": Transform("ground", "reflector", turn * np.sign(np.linalg.det(turn)), rng.normal(size=3))}
+    x, p = to_ground(before, frames)
+    np.testing.assert_allclose(x[:3], frames["A"].points(before.x[:3]), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(x[3:], before.x[3:])
+    back = from_ground(before.names, x, p, frames, ticks=1, elevation=0.0)
+    np.testing.assert_allclose(back.x, before.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(back.covariance, before.covariance, rtol=0, atol=1e-18)
+
+
+@pytest.mark.parametrize("velocities", [False, True])
+def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(velocities):
+    rng, now = np.random.default_rng(9), with_reference(state(8), ["A", "B", "C", "D"])
+    if velocities:
+        now = with_velocities(now, list("ABCDE"), USUAL)
+    seen_names = [n for n in NAMES if not n.startswith("E ")]
+    r = 1e-8
+    for epoch in range(500):
+        now = carried_on(now, epoch, 10.0, 0.7 + 1e-4 * epoch, BODIES, USUAL, 0.4)
+        at = now.columns(seen_names)
+        p, h = now.covariance[np.ix_(at, at)], rng.normal(size=(40, len(at)))
+        gain = np.linalg.solve(h @ p @ h.T + r * np.eye(40), h @ p).T
+        after = p - gain @ h @ p
+        x = now.x[at] + gain @ rng.normal(0.0, 1e-4, 40)
+        now = with_unseen(now, Carried(tuple(seen_names), x, 0.5 * (after + after.T), epoch, now.elevation))
+        np.testing.assert_allclose(now.covariance, now.covariance.T, rtol=0, atol=1e-20)
+    size = np.sqrt(np.diag(now.covariance))
+    low = np.linalg.eigvalsh(now.covariance / np.outer(size, size))[0]
+    assert low > 1e-9  # far above the rounding of 500 updates, 500 * 1e-16
+    seen = size[: len(seen_names)]
+    assert seen.max() < 0.5  # the air's profile at most; nothing seen grows
+    points = [i for i, n in enumerate(now.names) if n.startswith(("A ", "B ", "C ", "D "))]
+    assert size[points].max() < 2e-3
+
+
+def test_points_are_found_by_name():
+    one = state(2)
+    assert one.point("nobody") is None
+    np.testing.assert_array_equal(one.point("B"), one.x[3:6])
+    where, covariance = one.block(["B", "A"])
+    np.testing.assert_array_equal(where, [one.x[3:6], one.x[0:3]])
+    np.testing.assert_array_equal(covariance[:3, 3:], one.covariance[3:6, 0:3])
+    with pytest.raises(KeyError):
+        one.columns(["nobody x"])
+
+
+def test_what_lasts_of_a_path_returns_to_its_prior():
+    """Half an hour takes e^-1 of it and gives 1 - e^-2 of its variance back."""
+    before = Carried(("path ZY1 A", "x"), np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
+    after = carried_on(before, 1, 1800.0, 0.5, {}, USUAL, 0.5, 0.105)
+    kept = np.exp(-1.0)
+    np.testing.assert_allclose(after.x, [0.1 * kept, 2.0], rtol=1e-12)
+    expected = [[4e-4 * kept**2 + (1 - kept**2) * 0.105**2, 1e-4 * kept], [1e-4 * kept, 1.0]]
+    np.testing.assert_allclose(after.covariance, expected, rtol=1e-12)
