@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.gateways.polarization_figures import corners, polarization_plot
+from catseye.gateways.optics.polarization_figures import corners, polarization_plot
 from catseye.optics.corner_polarization import (
     far_field_jones,
     returned_power,

@@ -14,7 +14,7 @@ import numpy as np
 
 from catseye.atmosphere.air import air
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.gateways.retroreflector_figures import Dimensions, aberration_plot, return_plot
+from catseye.gateways.optics.retroreflector_figures import Dimensions, aberration_plot, return_plot
 from catseye.optics import dihedral, prism
 from catseye.optics.cats_eye import focal_radius
 from catseye.optics.glass import group_index, index_over_air

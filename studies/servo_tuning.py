@@ -12,7 +12,7 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
-from catseye.gateways.servo_figures import move_figure, step_figure
+from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 from catseye.simulator.motion_chip import MotionChip
 from catseye.simulator.motor import AxisDesign

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.constants import DEGREE
-from catseye.gateways.example import example_campaign
+from catseye.gateways.examples import example_campaign
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.encoder import BEAM_PER_COUNT
 from catseye.geometry.pointing import Station, in_mirror_axes

@@ -129,6 +129,6 @@ def test_help_has_examples_and_spares_the_heavy_imports(catseye):
 
 
 def test_the_kinds_are_those_of_the_forms():
-    from catseye.gateways.field_report_fields import FORMS
+    from catseye.gateways.calibrations.field_report_fields import FORMS
 
     assert list(FORMS) == list(certificate.KINDS)

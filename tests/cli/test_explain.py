@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from catseye.gateways.explain_page import MARK
+from catseye.gateways.epoch.explain_page import MARK
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

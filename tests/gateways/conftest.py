@@ -1,6 +1,6 @@
 import pytest
 
-from catseye.gateways.reduction_files import write_reduction
+from catseye.gateways.epoch.files import write_reduction
 from catseye.gateways.writers.output import whole_directory
 from catseye.records import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch

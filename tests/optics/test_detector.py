@@ -9,12 +9,12 @@ from catseye.optics.detector import (
     Photodiode,
     image_offset,
     place_response,
+    quadrant_position,
     quadrant_signals,
     spot_range,
     spot_range_uncertainty,
     spot_response,
 )
-from catseye.signal.quadrant import quadrant_position
 
 DIODE = Photodiode(radius=0.25e-3, sheet_resistance=100.0, capacitance=1e-12)
 SLOW = Photodiode(radius=0.25e-3, sheet_resistance=2000.0, capacitance=3e-12)  # phases of more than a radian

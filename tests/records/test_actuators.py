@@ -3,7 +3,7 @@
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways.surface_tables import actuators_csv
+from catseye.gateways.surface.tables import actuators_csv
 from catseye.records.actuators import read_corrections, read_positions
 from repository import TESTS
 

@@ -10,7 +10,7 @@ from simulator.living_scene import site
 
 
 def test_its_options_say_the_same_world_to_another_process(monkeypatch):
-    import catseye.cli.zy as command
+    import catseye.cli.live.zy as command
     from catseye.cli.commands import app, join_commands
 
     join_commands()

@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from scipy.special import erf
 
 from catseye.errors import EstimationError, ValidityError
-from catseye.signal.quadrant import quadrant_position
+from catseye.optics.detector import quadrant_position
 from catseye.signal.vibration import (
     Mode,
     decay_of,

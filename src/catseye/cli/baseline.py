@@ -160,7 +160,7 @@ def baseline(
 
     def keep() -> None:
         if write is not None:
-            from catseye.gateways.baseline_files import write_record
+            from catseye.gateways.baseline.files import write_record
 
             day = None if measured_on is None else date.fromisoformat(measured_on)
             write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
@@ -168,7 +168,7 @@ def baseline(
     try:
         found, inputs = _calibrated(observations, heights, against, settings, progress)
         if out is not None:
-            from catseye.gateways.baseline_files import write_calibration
+            from catseye.gateways.baseline.files import write_calibration
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, observations) as directory:
@@ -202,7 +202,7 @@ def _calibrated(
 
 
 def _tell(found: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
-    from catseye.gateways.baseline_objects import baseline_object, passages, spans
+    from catseye.gateways.baseline.objects import baseline_object, passages, spans
 
     if json:
         from catseye.gateways.writers.objects import json_line

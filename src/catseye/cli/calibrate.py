@@ -63,7 +63,7 @@ def calibrate(
     found = calibrated(kind, readings, sheet, reject=reject)
     _write(found, write, certificate)
     if json:
-        from catseye.gateways.certificate_record import calibration_object
+        from catseye.gateways.calibrations.certificate_record import calibration_object
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(calibration_object(found)))
@@ -93,12 +93,12 @@ def _write(found: "Calibration", write: Path | None, certificate: Path | None) -
 
     pages = []
     if write is not None:
-        from catseye.gateways.certificate_record import MARK, calibration_toml
+        from catseye.gateways.calibrations.certificate_record import MARK, calibration_toml
 
         pages.append((write, "--write", MARK, calibration_toml(found)))
     if certificate is not None:
-        from catseye.gateways.certificate import MARK as PAGE_MARK
-        from catseye.gateways.certificate import certificate as drawn
+        from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
+        from catseye.gateways.calibrations.certificate import certificate as drawn
 
         pages.append((certificate, "--certificate", PAGE_MARK, drawn(found, datetime.now(UTC))))
     with ExitStack() as files:
@@ -107,7 +107,7 @@ def _write(found: "Calibration", write: Path | None, certificate: Path | None) -
 
 
 def _tell(found: "Calibration") -> None:
-    from catseye.gateways.certificate_text import passages
+    from catseye.gateways.calibrations.certificate import passages
 
     for title, text in passages(found):
         say(wrapped(title, text))

@@ -10,9 +10,12 @@ from catseye.cli.terminal import say, wrapped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.gateways.field_report_fields import Report
+    from catseye.gateways.calibrations.field_report_fields import Report
 
-KINDS = ("monument", "mirror")  # as in catseye.gateways.field_report_fields, whose import --help spares itself
+KINDS = (
+    "monument",
+    "mirror",
+)  # as in catseye.gateways.calibrations.field_report_fields, whose import --help spares itself
 
 
 def _known(kind: str) -> str:
@@ -45,7 +48,7 @@ def certificate(
         raise typer.BadParameter("takes no RECORD.", param_hint="'--blank'")
     if out is None and not json:
         raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
-    from catseye.gateways.field_report_fields import blank_report, read_report, report_object
+    from catseye.gateways.calibrations.field_report_fields import blank_report, read_report, report_object
 
     report = blank_report(kind) if record is None else read_report(kind, record)
     if out is not None:
@@ -62,7 +65,7 @@ def _write(report: "Report", out: Path, record: Path | None) -> None:
     """The page, whole or not at all."""
     from datetime import UTC, datetime
 
-    from catseye.gateways.field_report import field_report, mark
+    from catseye.gateways.calibrations.field_report import field_report, mark
     from catseye.gateways.writers.output import whole_file
 
     if record is not None and out.resolve() == record.resolve():
@@ -72,7 +75,7 @@ def _write(report: "Report", out: Path, record: Path | None) -> None:
 
 
 def _tell(report: "Report", out: Path | None) -> None:
-    from catseye.gateways.field_report_fields import FORMS
+    from catseye.gateways.calibrations.field_report_fields import FORMS
 
     number = report.fields[0].value
     say(wrapped("Report", FORMS[report.kind].title + (f", {number}" if number else ", blank")))

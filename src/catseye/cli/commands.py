@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 
 ROOMS = (
-    *("air", "sound", "refractometer", "acoustic", "networks", "explain", "calibrate", "certificate"),
-    *("baseline", "link", "point", "triplet", "glass", "beam", "safety", "plot"),
-    *("zy", "ziy", "simulate", "serve", "replay", "export"),
-    *("pose", "surface", "pointing", "structure", "panels"),
+    *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
+    *("baseline", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
+    *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.replay", "live.export"),
+    *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
 )
 
 app = typer.Typer(
@@ -125,7 +125,7 @@ def demo(
     quiet: Quiet = False,
 ) -> None:
     """The bundled night of measurements, reduced and explained."""
-    from catseye.gateways.example import example_campaign
+    from catseye.gateways.examples import example_campaign
 
     reduction = _reduced(example_campaign(), directory, Settings.air_model, quiet)
     if json:
@@ -149,7 +149,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
         night = read_campaign(campaign)
         reduction = reduce_epoch(night, Settings(air_model=air_model), progress)
         if out is not None:
-            from catseye.gateways.reduction_files import write_reduction
+            from catseye.gateways.epoch.files import write_reduction
 
             with whole_directory(out, campaign) as directory:
                 write_reduction(reduction, directory, progress)
@@ -166,7 +166,7 @@ def _say_reduction(reduction: "Reduction") -> None:
 
 
 def _tell(reduction: "Reduction") -> None:
-    from catseye.gateways.summary import feed_arm_rows, passages
+    from catseye.gateways.epoch.summary import feed_arm_rows, passages
 
     for passage in passages(reduction):
         say(wrapped(passage.title, passage.text))

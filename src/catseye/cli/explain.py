@@ -56,7 +56,7 @@ def explain(
     finally:
         progress.clear()
     if json:
-        from catseye.gateways.explain import explanation_object
+        from catseye.gateways.epoch.explain import explanation_object
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(explanation_object(found, seed if monte_carlo else None)))
@@ -67,7 +67,7 @@ def explain(
 def _page(page: Path | None) -> AbstractContextManager[list[str]]:
     if page is None:
         return nullcontext([])
-    from catseye.gateways.explain_page import MARK
+    from catseye.gateways.epoch.explain_page import MARK
     from catseye.gateways.writers.output import whole_file
 
     return whole_file(page, "--page", MARK)
@@ -76,13 +76,13 @@ def _page(page: Path | None) -> AbstractContextManager[list[str]]:
 def _page_of(found: "Explanation", night: "Campaign") -> str:
     from datetime import UTC, datetime
 
-    from catseye.gateways.explain_page import explanation_page
+    from catseye.gateways.epoch.explain_page import explanation_page
 
     return explanation_page(found, night, datetime.now(UTC))
 
 
 def _tell(found: "Explanation", page: Path | None) -> None:
-    from catseye.gateways.explain import budget_lines, explanation_passages
+    from catseye.gateways.epoch.explain import budget_lines, explanation_passages
 
     for passage in explanation_passages(found):
         say(wrapped(passage.title, passage.text))

@@ -12,8 +12,8 @@ from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
     from catseye.estimation.network import Network
-    from catseye.gateways.network_findings import Findings
-    from catseye.gateways.network_plan import PlanFindings
+    from catseye.gateways.network.findings import Findings
+    from catseye.gateways.network.plan import PlanFindings
     from catseye.reduction.network import Adjusted
 
 DATUMS = "free|fixed"
@@ -116,7 +116,7 @@ def adjust(
         for source in sources:
             refuse_output(out, source)
     try:
-        from catseye.gateways.network_findings import findings
+        from catseye.gateways.network.findings import findings
         from catseye.records.network import read_network
         from catseye.reduction.network import adjusted
 
@@ -164,7 +164,7 @@ def _write_adjusted(
 ) -> None:
     if out is None:
         return
-    from catseye.gateways.network_files import input_hashes, write_network
+    from catseye.gateways.network.files import input_hashes, write_network
     from catseye.gateways.writers.output import whole_directory
 
     with whole_directory(out, source) as directory:
@@ -173,13 +173,13 @@ def _write_adjusted(
 
 def _tell_adjusted(treated: "Adjusted", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
-        from catseye.gateways.network_objects import network_json
+        from catseye.gateways.network.objects import network_json
 
         say("".join(network_json(found, treated=treated)).rstrip("\n"))
         return
     if quiet:
         return
-    from catseye.gateways.network_summary import passages, treatment_passages
+    from catseye.gateways.network.summary import passages, treatment_passages
 
     for passage in [*passages(found), *treatment_passages(treated, found)]:
         say(wrapped(passage.title, passage.text))
@@ -208,7 +208,7 @@ def _compared(
     progress: ProgressLine,
 ) -> None:
     from catseye.estimation.comparison import compare
-    from catseye.gateways.network_comparison import Comparison, comparison_object
+    from catseye.gateways.network.comparison import Comparison, comparison_object
     from catseye.gateways.writers.objects import json_line
 
     for one, source in zip(found, sources, strict=True):
@@ -218,7 +218,7 @@ def _compared(
     moved = compare(found[0].solution, found[1].solution, points=names, level=level)
     compared = Comparison(found[0], found[1], moved)
     if out is not None:
-        from catseye.gateways.network_files import input_hashes, write_comparison
+        from catseye.gateways.network.files import input_hashes, write_comparison
         from catseye.gateways.writers.output import whole_directory
 
         hashes = {f"{k + 1}: {name}": h for k, s in enumerate(sources) for name, h in input_hashes(s).items()}
@@ -228,7 +228,7 @@ def _compared(
     if json:
         say(json_line(comparison_object(compared)))
     elif not quiet:
-        from catseye.gateways.network_comparison import comparison_passages
+        from catseye.gateways.network.comparison import comparison_passages
 
         for passage in comparison_passages(compared):
             say(wrapped(passage.title, passage.text))
@@ -279,8 +279,8 @@ def plan(
     try:
         from catseye.estimation.plan import plan as planned
         from catseye.estimation.plan import schedule
-        from catseye.gateways.network_findings import findings
-        from catseye.gateways.network_plan import PlanFindings
+        from catseye.gateways.network.findings import findings
+        from catseye.gateways.network.plan import PlanFindings
         from catseye.records.network import read_network
         from catseye.reduction.network import measured_on_paper
 
@@ -304,8 +304,8 @@ def plan(
         )
         told = PlanFindings(findings(worth.solution), worth, picked, runs_made)
         if out is not None:
-            from catseye.gateways.network_files import input_hashes
-            from catseye.gateways.network_plan import write_plan
+            from catseye.gateways.network.files import input_hashes
+            from catseye.gateways.network.plan import write_plan
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, network) as directory:
@@ -317,13 +317,13 @@ def plan(
 
 def _tell_plan(told: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
-        from catseye.gateways.network_plan import plan_json
+        from catseye.gateways.network.plan import plan_json
 
         say("".join(plan_json(told)).rstrip("\n"))
         return
     if quiet:
         return
-    from catseye.gateways.network_plan import plan_passages
+    from catseye.gateways.network.plan import plan_passages
 
     for passage in plan_passages(told):
         say(wrapped(passage.title, passage.text))

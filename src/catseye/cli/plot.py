@@ -69,7 +69,7 @@ def sky(
     quiet: Quiet = False,
 ) -> None:
     """A ranger's sky with Sun, boxes and a slew."""
-    from catseye.gateways.plots import sky_plot
+    from catseye.gateways.steering.plots import sky_plot
     from catseye.geometry.time_tag import mjd_of
 
     if (start is None) != (end is None):
@@ -90,7 +90,7 @@ def servo(
     quiet: Quiet = False,
 ) -> None:
     """A move of a mirror's servo."""
-    from catseye.gateways.plots import servo_plot
+    from catseye.gateways.steering.plots import servo_plot
 
     _finish("servo", servo_plot(mirror, axis, counts), out, json, quiet, inputs=(mirror,))
 
@@ -115,7 +115,7 @@ def air(
     quiet: Quiet = False,
 ) -> None:
     """The index of air against each variable, with its uncertainty and the other models."""
-    from catseye.gateways.air_figures import air_plot
+    from catseye.gateways.air.air_figures import air_plot
 
     drawn = air_plot(
         temperature_c,
@@ -134,7 +134,7 @@ def air(
 @plots.command("return", epilog="\b\nExample: catseye plot return --out return.svg")
 def return_(out: Out, json: Json = False, quiet: Quiet = False) -> None:
     """What each kind of retroreflector returns against the incidence, and how its range changes."""
-    from catseye.gateways.retroreflector_figures import return_plot
+    from catseye.gateways.optics.retroreflector_figures import return_plot
 
     _finish("return", return_plot(), out, json, quiet)
 
@@ -149,7 +149,7 @@ def aberration(
     quiet: Quiet = False,
 ) -> None:
     """The ball's spherical aberration: range, deviation and light against the ray's height."""
-    from catseye.gateways.retroreflector_figures import aberration_plot
+    from catseye.gateways.optics.retroreflector_figures import aberration_plot
 
     _finish("aberration", aberration_plot(beam_radius=beam_radius_mm * 1e-3), out, json, quiet)
 
@@ -168,7 +168,7 @@ def coating(
     quiet: Quiet = False,
 ) -> None:
     """Coatings against angle and wavelength: reflectance, and what a range reads too long."""
-    from catseye.gateways.beam_figures import DRAWN, coating_plot
+    from catseye.gateways.optics.beam_figures import DRAWN, coating_plot
 
     if not (math.isfinite(incidence_deg) and 0.0 <= incidence_deg < 90.0):
         raise typer.BadParameter(f"{incidence_deg} is not within 0 to 90 degrees.", param_hint="'--incidence-deg'")
@@ -185,7 +185,7 @@ def polarization(
     quiet: Quiet = False,
 ) -> None:
     """What cube corners do to polarized light: six sectors, and the return through an analyser."""
-    from catseye.gateways.polarization_figures import polarization_plot
+    from catseye.gateways.optics.polarization_figures import polarization_plot
 
     _finish("polarization", polarization_plot(wavelength_um, glass), out, json, quiet)
 
@@ -198,7 +198,7 @@ def beam(
     quiet: Quiet = False,
 ) -> None:
     """A beam along its path from the diode to the detector."""
-    from catseye.gateways.beam_figures import beam_plot
+    from catseye.gateways.optics.beam_figures import beam_plot
 
     _finish("beam", beam_plot(train), out, json, quiet, inputs=(train,))
 

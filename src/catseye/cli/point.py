@@ -133,7 +133,13 @@ def point(
     """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun, keep-out boxes, visibility."""
     import numpy as np
 
-    from catseye.gateways.pointing_objects import MARK, output_dat, pointing_objects, pointing_remarks, pointing_table
+    from catseye.gateways.steering.pointing_objects import (
+        MARK,
+        output_dat,
+        pointing_objects,
+        pointing_remarks,
+        pointing_table,
+    )
     from catseye.gateways.writers.objects import json_line
     from catseye.geometry.time_tag import mjd_of
     from catseye.records.coordinate_list import read_coordinates

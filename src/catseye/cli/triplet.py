@@ -50,7 +50,7 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
     """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
     if not files:
         return []
-    from catseye.gateways.triplet_files import refuse_namesakes, write_triplets
+    from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.reading import Folder
     from catseye.records.triplet_measurement import TripletMeasurement
@@ -78,7 +78,7 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
 
 
 def _write_blank(path: Path) -> None:
-    from catseye.gateways.triplet_form import MARK, blank_form
+    from catseye.gateways.triplet.form import MARK, blank_form
     from catseye.gateways.writers.output import whole_file
 
     with whole_file(path, "--blank", MARK) as pieces:
@@ -87,7 +87,7 @@ def _write_blank(path: Path) -> None:
 
 def _say_objects(units: "Units") -> None:
     """One object, or a list of them for several files."""
-    from catseye.gateways.triplet_objects import triplet_object
+    from catseye.gateways.triplet.objects import triplet_object
     from catseye.gateways.writers.objects import json_line
 
     told = [triplet_object(found, path.name) for path, found in units]
@@ -96,7 +96,7 @@ def _say_objects(units: "Units") -> None:
 
 def _tell(units: "Units", out: Path | None, blank: Path | None) -> None:
     """The whole sheet of one unit; of several, what each comes to."""
-    from catseye.gateways.triplet_sheet import text_sheet, verdict
+    from catseye.gateways.triplet.sheet import text_sheet, verdict
 
     if len(units) == 1:
         ((path, found),) = units

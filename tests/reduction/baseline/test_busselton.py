@@ -124,7 +124,7 @@ def test_ignoring_the_offsets_from_the_line_would_bend_the_short_distances(ts30)
 
 def test_distances_between_pillars_carry_the_covariance_of_both_ends(ts30):
     """By 20 000 draws of the pillars from their covariance: 0.5 %, three of these."""
-    from catseye.gateways.baseline_objects import spans
+    from catseye.gateways.baseline.objects import spans
 
     s = ts30.solution
     rows, covariance = s.places

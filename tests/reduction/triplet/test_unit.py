@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2, norm
 
-from catseye.gateways.triplet_figure import triplet_figure
-from catseye.gateways.triplet_objects import triplet_object
-from catseye.gateways.triplet_sheet import text_sheet
+from catseye.gateways.triplet.figure import triplet_figure
+from catseye.gateways.triplet.objects import triplet_object
+from catseye.gateways.triplet.sheet import text_sheet
 from catseye.gateways.writers.objects import plain
 from catseye.optics import cats_eye, prism
 from catseye.records.reading import read_record

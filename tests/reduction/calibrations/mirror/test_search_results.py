@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError, InputError
-from catseye.gateways.certificate_record import calibration_toml
+from catseye.gateways.calibrations.certificate_record import calibration_toml
 from catseye.records.calibration import CalibrationRecord
 from catseye.reduction.calibrations.mirror.search_results import RECIPE
 from lab_scene import MIRROR, MONUMENT, field, searches, station_truth, table

@@ -1,0 +1,82 @@
+"""The command that takes a journal to others' formats."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.live.options import one_of, time_of
+from catseye.cli.live.replay import JournalArgument, RunName, run_of
+from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.errors import InputError
+
+FORMS = "csv|fits|campaign"
+
+
+@app.command(
+    epilog="\b\nExample: catseye export night.db --to campaign --out night\n"
+    "The campaign is for: catseye reduce night --out report"
+)
+def export(
+    journal: JournalArgument,
+    to: Annotated[str, typer.Option("--to", metavar=FORMS, callback=one_of(FORMS), help="Tables, or a campaign.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
+    ],
+    run: RunName = None,
+    since: Annotated[
+        str | None, typer.Option("--from", metavar="TIME", callback=time_of, help="UTC or MJD; from the start if not.")
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="TIME", callback=time_of, help="Not in it; to the end if not.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A run as tables (CSV, FITS), or as a campaign that `catseye reduce` reads."""
+    from catseye.coordinator.journal_reader import JournalReader
+    from catseye.gateways.journal.campaign import export_campaign
+    from catseye.gateways.journal.export import export_tables
+    from catseye.gateways.writers.output import refuse_output
+
+    span = _span(since, until)
+    refuse_output(out, Path(journal))
+    progress = ProgressLine(quiet)
+    notes: tuple[str, ...] = ()
+    with JournalReader(journal) as reader:
+        number = reader.run(run_of(run)).run
+        try:
+            if to == "campaign":
+                written = export_campaign(reader, out, run=number, span=span)
+                counts, notes = {"shots": written.shots, "weather": written.readings}, written.notes
+            else:
+                form: Literal["csv", "fits"] = "csv" if to == "csv" else "fits"
+                counts = export_tables(reader, out, runs=[number], forms=[form], span=span, progress=progress)
+        finally:
+            progress.clear()
+    if json:
+        from catseye.gateways.writers.objects import json_line
+
+        told = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
+        say(json_line(told))
+    elif not quiet:
+        rows = ", ".join(f"{count} {name}" for name, count in counts.items())
+        say(wrapped("Written to", f"{out}/: run {number}, {rows}."))
+        for note in notes:
+            say(wrapped("Note", note))
+
+
+def _span(since: str | None, until: str | None) -> tuple[int, int] | None:
+    """Ticks; None for all."""
+    if since is None and until is None:
+        return None
+    from catseye.geometry.time_tag import mjd_of
+    from catseye.records.live import TICKS_PER_DAY
+
+    low = 0 if since is None else round(mjd_of(since) * TICKS_PER_DAY)
+    high = 10**6 * TICKS_PER_DAY if until is None else round(mjd_of(until) * TICKS_PER_DAY)
+    if not low < high:
+        raise InputError(f"--from {since} is not before --until {until} (expected an earlier time)")
+    return low, high

@@ -1,0 +1,1 @@
+"""Commands about beams, glass and laser safety."""

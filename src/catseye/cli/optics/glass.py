@@ -1,0 +1,40 @@
+"""The command of the glasses."""
+
+import math
+from typing import Annotated
+
+import typer
+
+from catseye.cli.commands import Json, app
+from catseye.cli.terminal import say, wrapped
+
+
+def _height(value: float) -> float:
+    if not (math.isfinite(value) and value > 0.0):
+        raise typer.BadParameter(f"{value} mm is not a prism's height (expected above 0).")
+    return value
+
+
+@app.command(
+    epilog="\b\nExample: catseye glass BK7-old --height-mm 38.4\n"
+    "Example: catseye glass fused-silica --wavelength-um 0.85 --temperature-c=-10"
+)
+def glass(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Which glass; without it, all.")] = None,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
+    temperature_c: Annotated[float, typer.Option("--temperature-c", help="Temperature of the glass, °C.")] = 20.0,
+    height_mm: Annotated[
+        float, typer.Option("--height-mm", callback=_height, help="Height of a prism of it, face to corner, mm.")
+    ] = 38.1,
+    json: Json = False,
+) -> None:
+    """Index of a glass, its slopes, what a prism of it does to a range, and what a wrong glass costs."""
+    from catseye.gateways.optics.glass_objects import glass_object, glass_rows, table_object, table_rows
+    from catseye.gateways.writers.objects import json_line
+
+    found = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm)
+    if json:
+        say(json_line(found))
+        return
+    for title, text in table_rows() if name is None else glass_rows(found):
+        say(wrapped(title, text))

@@ -1,0 +1,276 @@
+"""The command of surface."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.errors import EstimationError, InputError
+
+if TYPE_CHECKING:
+    from catseye.gateways.surface.inputs import Frame
+    from catseye.gateways.surface.report import SurfaceResult
+    from catseye.records.site_folder import SiteFolder
+    from catseye.reduction.surface.actuators import Travel
+    from catseye.reduction.surface.shape import Prisms, ShapeSettings
+
+PARTS = ("vertex", "axis", "focal-length")  # as catseye.estimation.paraboloid, whose import --help spares itself
+TERMS_TOLD = 22  # on a terminal
+
+
+def _free(value: str) -> str:
+    names = [name.strip() for name in value.split(",")] if value != "none" else []
+    for name in names:
+        if name not in PARTS:
+            raise typer.BadParameter(f"{name!r} is not one of {', '.join(PARTS)} or none.")
+    return ",".join(name for name in PARTS if name in names)
+
+
+def _one_of(*known: str):
+    def check(value: str) -> str:
+        if value not in known:
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(known)}.")
+        return value
+
+    return check
+
+
+def _frequencies(values: list[float] | None) -> list[float]:
+    for value in values or []:
+        if not (math.isfinite(value) and 0.01 <= value <= 1e4):
+            raise typer.BadParameter(f"{value} GHz (expected 0.01 to 10000).")
+    return values or []
+
+
+def _angles(values: list[float] | None) -> list[float]:
+    for value in values or []:
+        if not -10.0 <= value <= 100.0:
+            raise typer.BadParameter(f"{value} is no elevation (expected -10 to 100°).")
+    return values or []
+
+
+@app.command(
+    epilog="\b\nExample: catseye surface night-01-report --taper-db 13 --frequency-ghz 86 --out surface\n"
+    "         catseye surface before.csv after.csv --zernike 21\n"
+    "         catseye surface e10 e30 e50 e80 e50b e30b --actuators actuators.csv --out lookup\n"
+    "One input: its shape; two: second less first as well; from three on: a look-up table by elevation. "
+    "Tables: docs/formats/surface.md"
+)
+def surface(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="INPUT…", help="Directories of catseye reduce --out, or tables of prisms; in the order measured."
+        ),
+    ],
+    site: Annotated[str, typer.Option("--site", metavar="SITE", help="The telescope: gbt, or a folder.")] = "gbt",
+    free: Annotated[
+        str, typer.Option("--free", metavar="vertex,axis,focal-length|none", callback=_free, help="What is fitted.")
+    ] = "vertex,axis,focal-length",
+    taper_db: Annotated[
+        float, typer.Option("--taper-db", min=0.0, max=60.0, help="Illumination's edge below its middle, dB.")
+    ] = 0.0,
+    frequency_ghz: Annotated[
+        list[float] | None,
+        typer.Option("--frequency-ghz", callback=_frequencies, help="Gain there, GHz; may repeat."),
+    ] = None,
+    zernike: Annotated[int, typer.Option("--zernike", min=1, max=500, help="How many terms.")] = 15,
+    order: Annotated[
+        str, typer.Option("--order", metavar="noll|ansi", callback=_one_of("noll", "ansi"), help="Their numbering.")
+    ] = "noll",
+    frame: Annotated[
+        str,
+        typer.Option("--frame", metavar="reflector|ground", callback=_one_of("reflector", "ground"), help="Of tables."),
+    ] = "reflector",
+    azimuth_deg: Annotated[
+        float | None, typer.Option("--azimuth-deg", min=-540.0, max=540.0, help="Of tables in the ground frame.")
+    ] = None,
+    elevation_deg: Annotated[
+        list[float] | None,
+        typer.Option("--elevation-deg", callback=_angles, help="Of each table, once for each input."),
+    ] = None,
+    temperature_c: Annotated[
+        list[float] | None, typer.Option("--temperature-c", help="Of the structure, °C, once for each input.")
+    ] = None,
+    actuators: Annotated[
+        Path | None,
+        typer.Option("--actuators", metavar="FILE.csv|.fits", help="Corrections of all actuators, last input."),
+    ] = None,
+    positions: Annotated[
+        Path | None, typer.Option("--positions", metavar="FILE.csv", help="Where the actuators stand; middle without.")
+    ] = None,
+    travel: Annotated[
+        str,
+        typer.Option("--travel", metavar="normal|axis", callback=_one_of("normal", "axis"), help="Of an actuator."),
+    ] = "normal",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """A dish's surface: best paraboloid, half-path errors, Zernike terms, gain, change, elevation, actuators."""
+    from catseye.reduction.surface.shape import ShapeSettings
+
+    if positions is not None and actuators is None:
+        raise InputError(f"--positions {positions}: goes with --actuators only")
+    for name, values in (("--elevation-deg", elevation_deg), ("--temperature-c", temperature_c)):
+        if values and len(values) != len(inputs):
+            raise InputError(f"{name} is given {len(values)} times for {len(inputs)} inputs (expected once for each)")
+    if actuators is not None and actuators.suffix.lower() not in (".csv", ".fits"):
+        raise InputError(f"--actuators {actuators}: ends in {actuators.suffix!r} (expected .csv or .fits)")
+    for place in (actuators, positions):
+        if place is not None and any(place.resolve() == source.resolve() for source in inputs):
+            raise InputError(f"{place}: is an input, too (expected another file)")
+    if out is not None:
+        from catseye.gateways.writers.output import refuse_output
+
+        for source in inputs:
+            refuse_output(out, source)
+    settings = ShapeSettings(
+        tuple(name for name in free.split(",") if name),
+        taper_db,
+        tuple(f * 1e9 for f in frequency_ghz or []),
+        zernike,
+        "noll" if order == "noll" else "ansi",
+    )
+    progress = ProgressLine(quiet)
+    reading = _Reading(
+        site, "ground" if frame == "ground" else "reflector", azimuth_deg, elevation_deg or [], temperature_c or []
+    )
+    try:
+        asked: tuple[Path | None, Path | None, Travel] = (
+            actuators,
+            positions,
+            "axis" if travel == "axis" else "normal",
+        )
+        found, hashes = _found(inputs, reading, settings, asked, progress)
+        if out is not None:
+            from catseye.gateways.surface.files import write_surface
+            from catseye.gateways.writers.output import whole_directory
+
+            with whole_directory(out, inputs[0]) as directory:
+                write_surface(found, directory, hashes, progress)
+                _keep(found, actuators)  # no directory without the table that was asked for, too
+        else:
+            _keep(found, actuators)
+    finally:
+        progress.clear()
+    _tell(found, json, quiet, out, actuators)
+
+
+def _keep(found: "SurfaceResult", actuators: Path | None) -> None:
+    if actuators is not None:
+        from catseye.gateways.surface.files import write_actuators
+
+        write_actuators(found, actuators)
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """How inputs are read."""
+
+    site: str
+    frame: "Frame"
+    azimuth_deg: float | None
+    elevation_deg: list[float]
+    temperature_c: list[float]
+
+    def of(self, inputs: list[Path], site: "SiteFolder") -> "tuple[list[Prisms], dict[str, str]]":
+        """Each input's prisms, and the SHA-256 of each file read."""
+        from catseye.gateways.surface.inputs import read_prisms
+
+        epochs: list[Prisms] = []
+        hashes: dict[str, str] = {}
+        for k, source in enumerate(inputs):
+            prisms, read = read_prisms(
+                source,
+                site,
+                frame=self.frame,
+                azimuth_deg=self.azimuth_deg,
+                elevation_deg=self.elevation_deg[k] if self.elevation_deg else None,
+                temperature_c=self.temperature_c[k] if self.temperature_c else None,
+            )
+            epochs.append(prisms)
+            hashes |= read
+        return epochs, hashes
+
+
+def _found(
+    inputs: list[Path],
+    reading: _Reading,
+    settings: "ShapeSettings",
+    actuators: "tuple[Path | None, Path | None, Travel]",
+    progress: ProgressLine,
+) -> "tuple[SurfaceResult, dict[str, str]]":
+    """What the inputs say, and the SHA-256 of each file read."""
+    from catseye.gateways.examples import site_directory
+    from catseye.gateways.surface.report import SurfaceResult
+    from catseye.records.actuators import read_positions
+    from catseye.records.site_folder import read_site
+    from catseye.reduction.surface.actuators import actuators_of, corrections
+    from catseye.reduction.surface.change import change_between
+    from catseye.reduction.surface.lookup import lookup_of
+    from catseye.reduction.surface.shape import Aperture, shape_of
+
+    wanted, positions, travel = actuators
+    site = read_site(site_directory(reading.site))
+    aperture = Aperture.of(site.site.paraboloid)
+    epochs, hashes = reading.of(inputs, site)
+    shapes = []
+    for k, prisms in enumerate(epochs):
+        progress("fitting epochs", k, len(epochs))
+        try:
+            shapes.append(shape_of(prisms, aperture, settings))
+        except EstimationError as problem:
+            raise EstimationError(f"{prisms.source}: {problem}") from problem
+    change = change_between(epochs[0], epochs[1], aperture, settings) if len(epochs) == 2 else None
+    lookup = lookup_of(shapes) if len(epochs) >= 3 else None
+    table = None
+    if wanted is not None:
+        progress("actuators", 0, 1)
+        known = None if positions is None else read_positions(positions)
+        table = corrections(shapes[-1], *actuators_of(site), positions=known, travel=travel)
+    return SurfaceResult(tuple(shapes), change, lookup, table), hashes
+
+
+def _tell(found: "SurfaceResult", json: bool, quiet: bool, out: Path | None, actuators: Path | None) -> None:
+    from catseye.gateways.surface.objects import (
+        actuators_passage,
+        change_passages,
+        lookup_passages,
+        shape_passages,
+        term_lines,
+    )
+
+    if json:
+        from catseye.gateways.surface.files import surface_object
+        from catseye.gateways.writers.objects import json_line
+
+        say(json_line(surface_object(found)))
+        return
+    if quiet:
+        return
+    passages = []
+    if found.lookup is not None:
+        passages += lookup_passages(found.lookup)
+    else:
+        for shape in found.shapes:
+            passages += shape_passages(shape)
+    if found.change is not None:
+        passages += change_passages(found.change)
+    if found.actuators is not None:
+        passages.append(actuators_passage(found.actuators))
+    for passage in passages:
+        say(wrapped(passage.title, passage.text))
+    for line in term_lines(found.shapes, found.change, found.lookup)[:TERMS_TOLD]:
+        say(f"{'':<14}{line}")
+    if out is not None:
+        say(wrapped("Written to", f"{out}/: report.html, surface.json, tables of prisms and Zernike terms"))
+    if actuators is not None:
+        say(wrapped("Written to", f"{actuators}: the actuators' corrections"))

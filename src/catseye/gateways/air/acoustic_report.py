@@ -1,0 +1,125 @@
+"""All files of acoustic paths: tables, object, and a report of one HTML page that needs nothing else."""
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.gateways.air.acoustic_figures import acoustic_figures
+from catseye.gateways.air.acoustic_objects import full_object, mean, path_temperatures_csv, shots_csv, words
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.written import Files, origin, write_files
+
+if TYPE_CHECKING:
+    from catseye.reduction.air.acoustic_recording import AcousticPath
+
+FORMAT = "catseye-acoustic-1"
+CAPTIONS = {
+    "recording": "The first shot as it was heard, about the predicted arrival.",
+    "correlation": "The correlation with the known signal over the window, and about its peak, where dots are samples: "
+    "the arrival is sought between them.",
+    "temperature": "Mean temperature of the path. The band holds what is common to all shots: length, electronics, "
+    "humidity, crosswind, the formula; the bars only what changes from shot to shot.",
+}
+
+
+def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
+    """Tables, object, report, and last the provenance with the hashes of the others.
+
+    paths       as reduced
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    """
+    when = datetime.now(UTC)
+    files: Files = {
+        "path_temperatures.csv": lambda: path_temperatures_csv(paths),
+        "shots.csv": lambda: shots_csv(paths),
+        "acoustic.json": lambda: json_page(full_object(paths)),
+        "report.html": lambda: acoustic_report(paths, when),
+    }
+    settings = {"model": paths[0].model, "air_model": paths[0].air_model}
+    made = {"format": FORMAT, "made_by": "catseye acoustic", "settings": settings}
+    write_files(files, directory, {**made, **origin(when, _inputs(paths))})
+
+
+def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
+    """The whole page; `when` is UTC."""
+    names = [f"{path.sheet.ranger} to {path.sheet.target}" for path in paths]
+    links = "".join(f'<a href="#path-{i}">{escape(name)}</a>' for i, name in enumerate(names))
+    header = (
+        f'<header><h1>Temperature by sound</h1><div class="faint">reduced by catseye on {when:%Y-%m-%d %H:%M} UTC; '
+        f'u = standard uncertainty, 1σ</div><nav>{links}<a href="#provenance">Provenance</a></nav></header>'
+    )
+    body = [header, *(_section(i, path) for i, path in enumerate(paths)), _provenance(_inputs(paths), when)]
+    return page("catseye: temperature by sound", "\n".join(body))
+
+
+def _section(number: int, path: "AcousticPath") -> str:
+    sheet, over = path.sheet, mean(path)
+    cards = [
+        card("Temperature", f"{over.temperature_c:.3f} °C", f"u = {over.u_temperature_c:.3f} °C"),
+        card("Wind", f"{over.wind:+.2f} m/s", f"from {sheet.ranger} to {sheet.target}"),
+        card("Group index", f"{over.refractivity / PPM:.3f} ppm", f"u = {over.u_refractivity / PPM:.3f} ppm"),
+    ] if over.used else []  # fmt: skip
+    said = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in words(path))
+    drawn = acoustic_figures(path)
+    return section(
+        f"path-{number}",
+        f"{sheet.ranger} to {sheet.target}",
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{said}</dl>",
+        *(picture(drawn[name], caption) for name, caption in CAPTIONS.items() if name in drawn),
+        _budget(path),
+        _shots(path),
+    )
+
+
+def _budget(path: "AcousticPath") -> str:
+    if not path.used.any():
+        return ""
+    k = int(np.argmax(path.used))
+    rows = [(name, f"{float(part[k]):.4f}") for name, part in path.found.parts_c.items()]
+    rows.append(("all together", f"{float(path.found.u_temperature_c[k]):.4f}"))
+    return paragraph("Standard uncertainty of the first used shot, °C, by cause; causes add in squares.") + table(
+        ("cause", "u (°C)"), rows, "tn"
+    )
+
+
+def _shots(path: "AcousticPath") -> str:
+    shots, found = path.shots, path.found
+    back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
+
+    def cell(value: float, form: str) -> str:
+        return format(float(value), form) if np.isfinite(value) else ""
+
+    rows = [
+        (f"{shots.mjd[k]:.6f}", shots.file[k], cell(shots.time_ab[k] * 1e3, ".5f"), cell(back[k] * 1e3, ".5f"),
+         cell(found.temperature_c[k], ".3f"), cell(found.u_temperature_c[k], ".3f"), cell(found.wind[k], "+.2f"),
+         cell(found.group_refractivity[k] / PPM, ".3f"), path.status(k))
+        for k in range(len(shots.mjd))
+    ]  # fmt: skip
+    columns = ("MJD", "file", "A to B (ms)", "B to A (ms)", "°C", "u (°C)", "wind (m/s)", "n_g - 1 (ppm)", "status")
+    return table(columns, rows, "ntnnnnnnw")
+
+
+def _inputs(paths: Sequence["AcousticPath"]) -> dict[str, str]:
+    """File -> SHA-256; of files of one name in several directories, with their path's name before it."""
+    found: dict[str, str] = {}
+    for path in paths:
+        for name, digest in path.hashes.items():
+            double = found.get(name, digest) != digest
+            found[f"{path.sheet.ranger} to {path.sheet.target}/{name}" if double else name] = digest
+    return found
+
+
+def _provenance(inputs: Mapping[str, str], when: datetime) -> str:
+    return section(
+        "provenance",
+        "Provenance",
+        table(("file read", "SHA-256"), list(inputs.items()), "th"),
+        table(("what", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()], "tt"),
+    )

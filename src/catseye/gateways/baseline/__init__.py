@@ -1,0 +1,1 @@
+"""An EDM baseline on the way out."""

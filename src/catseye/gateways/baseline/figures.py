@@ -1,0 +1,145 @@
+"""Figures of an EDM baseline as SVG text."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM, TWO_PI
+from catseye.gateways.baseline.tables import shot_residuals
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+
+if TYPE_CHECKING:
+    from catseye.reduction.baseline.instrument import BaselineCalibration
+
+MARKERS = "osD^vP"
+
+
+def baseline_figures(found: "BaselineCalibration") -> dict[str, str]:
+    """Every figure of the report by its name, as SVG text."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {
+            "line": _line(found),
+            "residuals": _residuals(found),
+            "weather": _weather(found),
+            "corrections": _corrections(found),
+        }
+        if found.cyclic:
+            drawn["cyclic"] = _cyclic(found)
+        return {name: svg(figure) for name, figure in drawn.items()}
+
+
+def _setups(found: "BaselineCalibration"):
+    """Number, legend, colour and marker of each set-up."""
+    seen = found.observations
+    for k in range(int(seen.setup.max()) + 1):
+        first = int(np.argmax(seen.setup == k))
+        yield k, f"from {found.names[seen.start[first]]}", SERIES[k % len(SERIES)], MARKERS[k // len(SERIES) % 6]
+
+
+def _line(found: "BaselineCalibration") -> Figure:
+    s = found.solution
+    figure = Figure(figsize=(9.4, 2.9), layout="constrained")
+    ax = figure.add_subplot()
+    rows, covariance = s.places
+    u = np.zeros(2 * len(s.x))
+    u[rows] = np.sqrt(np.diag(covariance))
+    ax.axhline(0.0, color=FAINT, lw=0.8)
+    ax.errorbar(s.x, s.y / MILLIMETRE, u[len(s.x) :] / MILLIMETRE, fmt="o", color=SERIES[0], ms=5, elinewidth=1.0)
+    for name, x, y, ux in zip(found.names, s.x, s.y, u, strict=False):
+        label = f"{name}   {x:.4f} m" + (f" ± {ux / MILLIMETRE:.2f} mm" if ux > 0.0 else "")
+        ax.annotate(label, (x, y / MILLIMETRE), xytext=(5, 7), textcoords="offset points", fontsize=7.5, rotation=22)
+    ax.margins(x=0.05, y=0.35)
+    ax.set_xlim(right=s.x.max() + 0.25 * np.ptp(s.x))
+    ax.set_ylim(top=ax.get_ylim()[1] + 0.35 * np.ptp(ax.get_ylim()))
+    ax.set_xlabel("along the line (m)")
+    ax.set_ylabel("to its left (mm)")
+    return figure
+
+
+def _residuals(found: "BaselineCalibration") -> Figure:
+    seen, distance = found.observations, found.lengths.distance
+    residual = shot_residuals(found) / MILLIMETRE
+    figure = Figure(figsize=(9.4, 4.3), layout="constrained")
+    ax = figure.add_subplot()
+    far = np.linspace(0.0, 1.03 * float(distance.max()), 101)
+    settings = found.settings
+    claim = settings.specified_mm + settings.specified_ppm * PPM * far / MILLIMETRE
+    ax.fill_between(far, -2 * claim, 2 * claim, color="#eef2f5", lw=0, label="twice the maker's claim")
+    ax.axhline(0.0, color=FAINT, lw=0.8)
+    for k, label, colour, marker in _setups(found):
+        mine = seen.setup == k
+        ax.scatter(distance[mine], residual[mine], s=22, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
+    out = ~found.keep
+    for d in distance[out]:
+        ax.axvline(d, color=BAD, lw=0.8, ls=":")
+    ax.set_xlabel("horizontal distance (m)")
+    ax.set_ylabel("observed minus adjusted (mm)")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=7)
+    return figure
+
+
+def _weather(found: "BaselineCalibration") -> Figure:
+    """Residuals in ppm over the change of the index: a slope is a light that does not follow the sensors."""
+    seen, way = found.observations, found.lengths
+    residual = shot_residuals(found) / way.distance / PPM
+    change = -(way.index - way.index[found.keep].mean()) / PPM
+    long = way.distance > 0.25 * way.distance.max()
+    figure = Figure(figsize=(9.4, 4.0), layout="constrained")
+    ax = figure.add_subplot()
+    ax.axhline(0.0, color=FAINT, lw=0.8)
+    for k, label, colour, marker in _setups(found):
+        mine = long & (seen.setup == k)
+        ax.scatter(change[mine], residual[mine], s=22, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
+    share, u = found.weather
+    if np.isfinite(share):
+        ends = np.array([change[long].min(), change[long].max()])
+        ax.plot(ends, (1.0 - share) * ends, color=INK, lw=1.1, label=f"light followed {share:.2f} ± {u:.2f} of it")
+    ax.set_xlabel("change that the weather makes in the corrected length (ppm)")
+    ax.set_ylabel("residual over distance (ppm)")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=7)
+    return figure
+
+
+def _corrections(found: "BaselineCalibration") -> Figure:
+    way = found.lengths
+    figure = Figure(figsize=(9.4, 3.4), layout="constrained")
+    panels = figure.subplots(1, 3)
+    for ax, values, label, scale in (
+        (panels[0], way.first, "first velocity (mm)", MILLIMETRE),
+        (panels[1], way.second + way.chord, "second velocity, chord (µm)", 1e-6),
+        (panels[2], way.level, "slope to level (mm)", MILLIMETRE),
+    ):
+        ax.scatter(way.distance, values / scale, s=10, c=SERIES[0], lw=0, alpha=0.7)
+        ax.axhline(0.0, color=FAINT, lw=0.8)
+        ax.set_title(label)
+        ax.set_xlabel("distance (m)")
+    return figure
+
+
+def _cyclic(found: "BaselineCalibration") -> Figure:
+    unit = found.settings.unit_length
+    assert unit is not None
+    seen = found.observations
+    angle = np.linspace(0.0, 1.0, 201)
+
+    def curve(share):
+        total = np.zeros_like(share)
+        for order in range(1, len(found.cyclic) // 2 + 1):
+            for name, wave in (("cosine", np.cos), ("sine", np.sin)):
+                total = total + found.solution.of(f"cyclic {name} {order}")[0] * wave(TWO_PI * order * share)
+        return total
+
+    share = seen.slope / unit % 1.0
+    figure = Figure(figsize=(9.4, 3.6), layout="constrained")
+    ax = figure.add_subplot()
+    ax.plot(angle * unit, curve(angle) / MILLIMETRE, color=INK, lw=1.2, label="adjusted")
+    values = (shot_residuals(found) + curve(share)) / MILLIMETRE
+    for k, label, colour, marker in _setups(found):
+        mine = seen.setup == k
+        ax.scatter(share[mine] * unit, values[mine], s=18, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
+    ax.set_xlabel(f"place in the unit length of {unit:g} m (m)")
+    ax.set_ylabel("cyclic term and residual (mm)")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=7)
+    return figure

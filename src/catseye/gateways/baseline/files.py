@@ -1,0 +1,79 @@
+"""All files of an EDM baseline, and the record that keeps its pillars."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from catseye.gateways.baseline.objects import baseline_object
+from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.records.baseline import FORMAT, Baseline, baseline_text
+from catseye.reduction.baseline.instrument import record_values
+
+if TYPE_CHECKING:
+    from catseye.reduction.baseline.instrument import BaselineCalibration
+
+Progress = Callable[[str, int, int], None]
+MARK = f'format = "{FORMAT}"'
+
+
+def write_calibration(
+    found: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """Tables, object, report, and last the provenance with the hashes of the others.
+
+    found       a calibration
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    inputs      SHA-256 of each file read, by its name
+    progress    told of each file
+    """
+    from catseye.gateways.baseline.report import baseline_report  # matplotlib is heavy
+
+    when = datetime.now(UTC)
+    files: Files = {
+        "pillars.csv": lambda: pillars_csv(found),
+        "distances.csv": lambda: distances_csv(found),
+        "observations.csv": lambda: observations_csv(found),
+        "baseline.json": lambda: json_page(baseline_object(found)),
+        "report.html": lambda: baseline_report(found, when, inputs),
+    }
+    made = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(found.settings)}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+
+
+def write_record(
+    found: "BaselineCalibration",
+    path: Path,
+    inputs: Mapping[str, str],
+    *,
+    serial: str | None = None,
+    measured_on: date | None = None,
+    by: str | None = None,
+    report: str | None = None,
+) -> None:
+    """BASELINE.toml, whole or not at all.
+
+    found         a calibration
+    path          new, or an earlier one of catseye
+    inputs        SHA-256 of each file read, by its name
+    serial        of the instrument
+    measured_on   day of the shots
+    by            who measured
+    report        where it is written up
+    """
+    record = Baseline(
+        format=FORMAT,
+        name=path.stem[:200] or "baseline",
+        serial=serial,
+        measured_on=measured_on,
+        by=by,
+        report=report,
+        inputs_sha256=dict(inputs),
+        **record_values(found),
+    )
+    with whole_file(path, "--write", MARK) as pieces:
+        pieces.append(baseline_text(record))

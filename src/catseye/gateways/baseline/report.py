@@ -1,0 +1,193 @@
+"""The report of an EDM baseline: one HTML page that needs nothing else."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM
+from catseye.estimation.baseline_iso17123 import FullTest
+from catseye.gateways.baseline.figures import baseline_figures
+from catseye.gateways.baseline.objects import baseline_object, passages, spans
+from catseye.gateways.baseline.tables import shot_residuals
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+
+if TYPE_CHECKING:
+    from catseye.reduction.baseline.instrument import BaselineCalibration
+
+CONTENTS = {
+    "summary": "Summary",
+    "pillars": "Pillars",
+    "residuals": "Residuals",
+    "tests": "Tests",
+    "budget": "Budget",
+    "sets": "Sets",
+    "provenance": "Provenance",
+}
+
+
+def baseline_report(found: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
+    """The whole page.
+
+    found    a calibration
+    when     UTC
+    inputs   SHA-256 of each file read, by its name
+    """
+    drawn = baseline_figures(found)
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
+    header = (
+        f"<header><h1>{escape(Path(found.observations.file).name)}: EDM baseline</h1>"
+        f'<div class="faint">adjusted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; '
+        f"observed = (1 + scale) × distance + zero + cyclic</div><nav>{links}</nav></header>"
+    )
+    body = [
+        header,
+        _summary(found),
+        _pillars(found, drawn),
+        _residuals(drawn),
+        _tests(found),
+        _budget(found),
+        _sets(found),
+        _provenance(found, when, inputs),
+    ]
+    return page("catseye: EDM baseline", "\n".join(body))
+
+
+def _summary(found: "BaselineCalibration") -> str:
+    s, test = found.solution, found.test
+    zero, u_zero = (v / MILLIMETRE for v in s.of("zero"))
+    scale, u_scale = (v / PPM for v in s.of("scale"))
+    known = np.isfinite(scale)
+    failed = [d for d in found.decisions if d.passed is False]
+    longest = max(spans(found), key=lambda span: span.distance)
+    cards = [
+        card("Zero", f"{zero:+.3f} ± {u_zero:.3f} mm", "observed minus true"),
+        card("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm" if known else "not determined", "shows too long above zero"),
+        card(
+            "s of one distance",
+            f"{test.s / MILLIMETRE:.3f} mm" if isinstance(test, FullTest) else "unknown",
+            f"{test.degrees_of_freedom} degrees of freedom" if isinstance(test, FullTest) else test,
+        ),
+        card(f"{longest.start} to {longest.end}", f"{longest.distance:.4f} m", f"u = {longest.u / MILLIMETRE:.2f} mm"),
+    ]
+    words = "".join(
+        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(found) if p.title != "Test"
+    )
+    verdict = "Every test passes." if not failed else f"Failed: {'; '.join(d.name for d in failed)}."
+    return section(
+        "summary",
+        CONTENTS["summary"],
+        paragraph(verdict, "bad" if failed else ""),
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{words}</dl>",
+    )
+
+
+def _pillars(found: "BaselineCalibration", drawn: dict[str, str]) -> str:
+    rows = [
+        (name, f"{p['x']:.5f}", f"{p['u_x'] / MILLIMETRE:.3f}", f"{p['y']:.5f}", f"{p['u_y'] / MILLIMETRE:.3f}",
+         "" if p["height"] is None else f"{p['height']:.4f}")
+        for name, p in baseline_object(found)["pillars"].items()
+    ]  # fmt: skip
+    pairs = [(a, b, f"{d:.5f}", f"{u / MILLIMETRE:.3f}") for a, b, d, u in spans(found)]
+    height = "one height" if found.reference_height is None else f"the height {found.reference_height:.3f} m"
+    return section(
+        "pillars",
+        CONTENTS["pillars"],
+        picture(drawn["line"], "Pillars along the line from the first to the last, and how far they stand off it."),
+        table(("pillar", "x (m)", "u (mm)", "y (m)", "u (mm)", "height (m)"), rows, "tnnnnn"),
+        paragraph(f"Horizontal distances at {height}; their full covariance is in baseline.json and BASELINE.toml."),
+        table(("from", "to", "distance (m)", "u (mm)"), pairs, "ttnn"),
+    )
+
+
+def _residuals(drawn: dict[str, str]) -> str:
+    parts = [
+        picture(drawn["residuals"], "Every shot, by set-up: those of a set lie together where the set, not the shot, "
+                "makes the scatter."),
+        picture(drawn["weather"], "Residuals of the longer lines over what the weather's change did to the corrected "
+                "length: flat where the light follows the weather as read, rising where the correction is too much."),
+        picture(drawn["corrections"], "What was added to the lengths shown."),
+    ]  # fmt: skip
+    if "cyclic" in drawn:
+        parts.append(picture(drawn["cyclic"], "Cyclic terms over the unit length, with the residuals about them."))
+    return section("residuals", CONTENTS["residuals"], *parts)
+
+
+def _tests(found: "BaselineCalibration") -> str:
+    verdict = {True: "passed", False: "failed", None: "not possible"}
+    rows = [
+        (d.name, f"{d.statistic:.4g}" if np.isfinite(d.statistic) else "",
+         f"{d.limit:.4g}" if np.isfinite(d.limit) else "", verdict[d.passed], d.text)
+        for d in found.decisions
+    ]  # fmt: skip
+    return section(
+        "tests",
+        CONTENTS["tests"],
+        paragraph(
+            f"Each at the level {found.settings.level:g}. Limits come from the claim and the degrees of freedom, "
+            "never from the scatter that they judge. A set, its repeats averaged, counts as one distance."
+        ),
+        table(("test", "statistic", "limit", "outcome", "meaning"), rows, "wnntw"),
+    )
+
+
+def _budget(found: "BaselineCalibration") -> str:
+    s = found.solution
+    last = f"x {found.order[-1]}"
+    wanted = [n for n in ("zero", "scale", *found.cyclic, last) if n in s.names]
+    at = [s.names.index(n) for n in wanted]
+    unit = [PPM if n == "scale" else MILLIMETRE for n in wanted]
+    rows = [(cause, *(f"{part[i] / u:.4f}" for i, u in zip(at, unit, strict=True))) for cause, part in s.parts.items()]
+    rows.append(("all together", *(f"{s.of(n)[1] / u:.4f}" for n, u in zip(wanted, unit, strict=True))))
+    heads = [f"x of {found.names[found.order[-1]]}" if n == last else n for n in wanted]
+    heads = [f"{h} ({'ppm' if n == 'scale' else 'mm'})" for h, n in zip(heads, wanted, strict=True)]
+    return section(
+        "budget",
+        CONTENTS["budget"],
+        paragraph("Standard uncertainty that each cause gives; causes are independent and add in squares."),
+        table(("cause", *heads), rows, "t" + "n" * len(heads)),
+    )
+
+
+def _sets(found: "BaselineCalibration") -> str:
+    s, seen = found.solution, found.observations
+    first = np.flatnonzero(found.keep)[s.used.first]
+    scatter = [float(np.std(shot_residuals(found)[found.keep][s.used.set == k])) for k in range(len(s.residual))]
+    rows = [
+        (
+            found.names[seen.start[row]],
+            found.names[seen.end[row]],
+            str(s.used.shots[k]),
+            f"{found.lengths.distance[row]:.4f}",
+            f"{seen.temperature_c[row]:.1f}",
+            f"{s.residual[k] / MILLIMETRE:+.3f}",
+            f"{scatter[k] / MILLIMETRE:.3f}",
+            f"{s.w_set[k]:+.2f}" if np.isfinite(s.w_set[k]) else "",
+            f"{s.redundancy[k]:.2f}",
+        )
+        for k, row in enumerate(first)
+    ]
+    columns = ("from", "to", "shots", "distance (m)", "°C", "residual (mm)", "repeats (mm)", "w", "redundancy")
+    left_out = [f"row {k + 1}: {why}" for k, why in enumerate(found.rejected) if why]
+    return section(
+        "sets",
+        CONTENTS["sets"],
+        paragraph("Left out: " + "; ".join(left_out), "bad") if left_out else "",
+        table(columns, rows, "ttnnnnnnn"),
+        paragraph("Every shot is in observations.csv."),
+    )
+
+
+def _provenance(found: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
+    facts = [*((k, v) for k, v in versions().items()), *((k, str(v)) for k, v in found.settings.__dict__.items())]
+    return section(
+        "provenance",
+        CONTENTS["provenance"],
+        table(("file read", "SHA-256"), list(inputs.items()), "th"),
+        table(("what", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *facts], "tt"),
+    )

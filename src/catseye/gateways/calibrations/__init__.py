@@ -1,0 +1,1 @@
+"""Certificates and field reports of calibrations."""

@@ -1,0 +1,224 @@
+"""A certificate of calibration: one page that a person can read, print and sign."""
+
+import math
+from collections.abc import Iterator
+from datetime import datetime
+from html import escape
+from typing import Any
+
+from catseye.gateways.calibrations.certificate_figure import calibration_figure
+from catseye.gateways.calibrations.certificate_record import record_lines
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
+from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
+
+TITLE = "Certificate of calibration"
+MARK = f"<title>{TITLE}"  # by which a page is known as ours
+SHOWN = 12  # readings named at most
+SIGNATURES = ("measured by", "checked by", "approved by")
+LINES = """<style>
+.sign { display: grid; grid-template-columns: repeat(3, 1fr); gap: 2.2rem; margin: 3.4rem 0 1rem; }
+.sign div { border-top: 1px solid var(--ink); padding-top: .3rem; font-size: .85rem; color: var(--faint); }
+dl.head { grid-template-columns: 11rem 1fr; margin: .8rem 0; gap: .2rem 1rem; font-size: .95rem; }
+@media print { .sign { break-inside: avoid; } }
+</style>"""
+HEAD = {
+    "instrument": "instrument",
+    "serial": "serial",
+    "measured_on": "measured on",
+    "valid_until": "valid until",
+    "by": "measured by",
+    "report": "report",
+}
+
+
+def certificate(found: Calibration, when: datetime) -> str:
+    """The whole page.
+
+    found   the calibration
+    when    UTC, of the computation
+    """
+    said = found.provenance
+    rows = "".join(f"<dt>{name}</dt><dd>{escape(str(said[key]))}</dd>" for key, name in HEAD.items())
+    body = [
+        LINES,
+        f'<header><h1>{TITLE}</h1><div class="faint">{escape(found.title)}</div></header>',
+        f'<dl class="head">{rows}</dl>',
+        _results(found),
+        section("method", "Method", paragraph(found.method)),
+        _tests(found),
+        section("figure", "Readings and residuals", picture(calibration_figure(found), found.title)),
+        _notes(found),
+        _readings(found),
+        _inputs(found, when),
+        '<div class="sign">' + "".join(f"<div>{name}, date, signature</div>" for name in SIGNATURES) + "</div>",
+    ]
+    return page(f"{TITLE}: {found.title}", "\n".join(body))
+
+
+def rounded(value: float, u: float) -> tuple[str, str]:
+    """A value and its u, u with two digits and the value to the same place.
+
+    >>> rounded(180.68514159, 0.00545), rounded(-173.7, 12.0), rounded(1.5, 0.0)
+    (('180.6851', '0.0054'), ('-174', '12'), ('1.5', '0'))
+    """
+    if not (math.isfinite(value) and math.isfinite(u)):
+        return f"{value:g}", "unknown"
+    if u <= 0.0:
+        return f"{value:.12g}", "0"
+    places = max(0, 1 - math.floor(math.log10(u)))
+    if float(f"{u:.1e}") >= 10.0 ** (2 - places) and places > 0:  # 0.0996 rounds up to 0.10, which has a digit less
+        places -= 1
+    return f"{value:.{places}f}", f"{u:.{places}f}"
+
+
+def _results(found: Calibration) -> str:
+    return section(
+        "results",
+        "Results",
+        table(
+            ("quantity", "value", "u", "k", "U = k u", "interval", "unit", "what it is"),
+            [_result(q) for q in found.quantities],
+            "tnnnnntw",
+        ),
+        paragraph(
+            "u is the standard uncertainty (1σ) of all known causes together, U = k u the expanded uncertainty; the "
+            "interval holds the quantity with a probability of about 95 %. k is 2 for a normal quantity, more where u "
+            "rests on few readings (Student).",
+            "faint",
+        ),
+        _correlations(found),
+        _to_copy(found.record),
+    )
+
+
+def _result(q: Quantity) -> tuple[str, ...]:
+    value, u = rounded(q.value, q.u)
+    places = len(value.partition(".")[2])
+    low, high = q.value - q.coverage * q.u, q.value + q.coverage * q.u
+    return (
+        q.key,
+        value,
+        u,
+        f"{q.coverage:.2f}",
+        f"{q.coverage * q.u:.{places}f}",
+        f"{low:.{places}f} to {high:.{places}f}",
+        q.unit,
+        q.meaning,
+    )
+
+
+def _correlations(found: Calibration) -> str:
+    """Coefficients of correlation, where there are several quantities."""
+    if len(found.quantities) < 2:
+        return ""
+    u = [q.u or 1.0 for q in found.quantities]
+    rows = [
+        (f"{i + 1}  {q.key}", *(f"{found.covariance[i, j] / (u[i] * u[j]):+.3f}" for j in range(len(u))))
+        for i, q in enumerate(found.quantities)
+    ]
+    return "<h3>Correlation</h3>" + table(("", *(str(j + 1) for j in range(len(u)))), rows, "t" + "n" * len(u))
+
+
+def _to_copy(record: dict[str, Any]) -> str:
+    if not record:
+        return ""
+    lines = "\n".join(record_lines(_readable(record)))
+    return f"<h3>For the record of the instrument</h3><pre>{escape(lines)}</pre>"
+
+
+def _readable(value: Any) -> Any:
+    """Numbers to nine digits, far below any uncertainty, for people; the record file has them all."""
+    if isinstance(value, dict):
+        return {key: _readable(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_readable(each) for each in value]
+    return float(f"{value:.9g}") if isinstance(value, float) else value
+
+
+def _tests(found: Calibration) -> str:
+    rows = [
+        (d.name, _number(d.statistic, ".4g"), _number(d.limit, ".4g"), _outcome(d), d.text) for d in found.decisions
+    ]
+    degrees = (
+        f"Variance factor {found.variance_factor:.3g} from {found.degrees_of_freedom} degrees of freedom (expected 1)."
+        if math.isfinite(found.variance_factor)
+        else f"{found.degrees_of_freedom} degrees of freedom."
+    )
+    return section(
+        "tests", "Tests", paragraph(degrees), table(("test", "value", "limit", "", "what it means"), rows, "tnntw")
+    )
+
+
+def _outcome(decision: Decision) -> str:
+    return "–" if decision.passed is None else "passed" if decision.passed else "FAILED"
+
+
+def _notes(found: Calibration) -> str:
+    lines = "".join(f"<li>{escape(note)}</li>" for note in found.notes)
+    return section("notes", "Worth knowing", f'<ul class="notes">{lines}</ul>') if lines else ""
+
+
+def _readings(found: Calibration) -> str:
+    kinds = "".join("t" if isinstance(cell, str) else "n" for cell in found.rows[0])
+    forms = [_form(name) for name in found.columns]
+    rows = [tuple(_cell(cell, form) for cell, form in zip(row, forms, strict=True)) for row in found.rows]
+    return section("readings", f"{len(rows)} readings", table(found.columns, rows, kinds))
+
+
+def _inputs(found: Calibration, when: datetime) -> str:
+    said = found.provenance
+    settings = [(key, str(value)) for key, value in said["sheet"].items()]
+    return section(
+        "provenance",
+        "Provenance",
+        paragraph(f"Computed {when:%Y-%m-%d %H:%M:%S} UTC by catseye {versions()['catseye']}."),
+        table(("input", "SHA-256"), list(said["inputs_sha256"].items()), "th"),
+        "<h3>Stated in the sheet</h3>",
+        table(("key", "value"), settings, "tt"),
+        folded("Programs", table(("part", "version"), list(versions().items()), "tt")),
+    )
+
+
+def _form(column: str) -> str:
+    """How a column's numbers are written: lengths to 0.1 µm or finer, statistics with two decimals."""
+    if column.endswith(("_m", "_mm")):
+        return ".7f" if column.endswith("_m") else ".5f"
+    if column.split("|")[-1] in ("w", "tau", ""):
+        return ".2f"
+    return "+.3f" if column.startswith("residual") else ".7g"
+
+
+def _cell(value: Any, form: str) -> str:
+    return value if isinstance(value, str) else _number(value, form)
+
+
+def _number(value: float, form: str) -> str:
+    if not math.isfinite(value):
+        return "–"
+    return str(value) if isinstance(value, int) else format(value, form)
+
+
+def passages(found: Calibration) -> Iterator[tuple[str, str]]:
+    """(title, text) of each paragraph that a terminal shows of a calibration."""
+    said = found.provenance
+    yield (
+        "Calibration",
+        f"{found.title}; serial {said['serial']}, measured on {said['measured_on']} by {said['by']}, valid until "
+        f"{said['valid_until']}.",
+    )
+    for number, q in enumerate(found.quantities):
+        value, u = rounded(q.value, q.u)
+        yield "" if number else "Found", f"{q.key} = {value}, u {u} {q.unit}: {q.meaning}"
+    for number, decision in enumerate(found.decisions):
+        outcome = {True: "passed", False: "FAILED", None: "not judged"}[decision.passed]
+        numbers = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.limit == decision.limit else ""
+        yield "" if number else "Tests", f"{decision.name}{numbers}: {outcome}; {decision.text}"
+    odd = [f"{number} ({state})" for number, state in enumerate(found.states, start=1) if state != "used"]
+    if odd:
+        more = f" and {len(odd) - SHOWN} more" if len(odd) > SHOWN else ""
+        yield "Readings", f"{len(found.rows)}, of which {', '.join(odd[:SHOWN])}{more}"
+    elif found.states:
+        yield "Readings", f"{len(found.rows)}, all used"
+    for number, note in enumerate(found.notes):
+        yield "" if number else "Notes", note

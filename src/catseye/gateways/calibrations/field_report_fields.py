@@ -1,0 +1,317 @@
+"""The fields of the notes' two calibration reports, in their printed order, filled from a record or blank."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE
+from catseye.gateways.calibrations.certificate import rounded
+from catseye.geometry.mount import gamma, lambda_
+from catseye.records.mirror import MirrorGeometry
+from catseye.records.monument import MonumentGeometry
+from catseye.records.reading import Folder
+
+LEAST_PLACES = 6  # decimals of a matrix, as the notes print them
+U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: nothing is known of an angle, uniform over a turn
+HEADED = 3  # fields in the form's head: number, date, initials
+SUBSCRIPTS = "₁₂₃"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A field as the form has it.
+
+    name    as the notes print it
+    key     of the record
+    unit    of the value; none for text and for the motion chip's plain integers
+    u       key of its standard uncertainty, if the record has one
+    sense   what is positive, or what it is
+    aid     how a person reads the angle too: dms or arcsec
+    """
+
+    name: str
+    key: str
+    unit: str = ""
+    u: str = ""
+    sense: str = ""
+    aid: str = ""
+
+
+@dataclass(frozen=True)
+class Form:
+    """One of the two reports: its title and place in the notes, its fields and the matrix at its end."""
+
+    title: str
+    figure: str
+    record: type[MonumentGeometry] | type[MirrorGeometry]
+    entries: tuple[Entry, ...]
+    symbol: str
+    matrix: str
+    angles: tuple[str, ...]
+    u_angles: tuple[str, ...]
+    rule: str
+    turned: Callable[..., np.ndarray]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field with what the record says: value None where it says nothing, u None where it is not known."""
+
+    entry: Entry
+    value: Any = None
+    u: float | None = None
+
+
+@dataclass(frozen=True)
+class Report:
+    """A form filled from a record, or blank.
+
+    kind       monument or mirror
+    file       name of the record's file, empty for a blank form
+    sha256     of that file
+    fields     in the form's order, the matrix last
+    said       the record's provenance
+    notes      of the record
+    """
+
+    kind: str
+    file: str
+    sha256: str
+    fields: tuple[Field, ...]
+    said: dict[str, Any]
+    notes: str = ""
+
+    @property
+    def missing(self) -> tuple[Entry, ...]:
+        """What the record does not say; a blank form misses nothing."""
+        return tuple(field.entry for field in self.fields if field.value is None) if self.file else ()
+
+
+def _servo(axis: int) -> tuple[Entry, ...]:
+    """The motion chip's settings of an axis, 0 azimuth, 1 elevation."""
+    commands = (
+        ("ABV", "velocity", "2⁻¹⁶ counts/sample"),
+        ("ABA", "acceleration", "2⁻¹⁶ counts/sample²"),
+        ("FKP", "proportional gain", ""),
+        ("FKI", "integral gain", ""),
+        ("FKD", "derivative gain", ""),
+        ("FIL", "integration limit", ""),
+        ("FSI", "derivative interval", ""),
+        ("ERL", "position error limit", "counts"),
+    )
+    return tuple(Entry(f"{name} {axis}", f"{name.lower()}_{axis}", unit, sense=what) for name, what, unit in commands)
+
+
+FORMS = {
+    "monument": Form(
+        "Laser Monument Calibration Report",
+        "after the notes' Figure 2.2, rev 1/20/96",
+        MonumentGeometry,
+        (
+            Entry("ZY", "monument"),
+            Entry("DATE", "measured_on"),
+            Entry("INITIALS", "by"),
+            Entry("ZP NUMBER", "zp"),
+            Entry("CONTROL PANEL", "control_panel"),
+            Entry("ETHERNET ADDRESS", "ethernet_address"),
+            Entry("IP ADDRESS", "ip_address"),
+            Entry("x", "x_mm", "mm", "u_x_mm", "fixed point, east"),
+            Entry("y", "y_mm", "mm", "u_y_mm", "fixed point, north"),
+            Entry("z", "z_mm", "mm", "u_z_mm", "fixed point, up"),
+            Entry("azimuth", "azimuth_deg", "deg", "u_alpha1_rad", "of ẑ, clockwise from north", "dms"),
+            Entry("α₁ (π − azimuth)", "alpha1_rad", "rad", "u_alpha1_rad", "+ : ẑ from south towards east", "dms"),
+            Entry("α₂ (rotation about ẑ)", "alpha2_rad", "rad", "u_alpha2_rad", "+ : x̂ rises", "arcsec"),
+            Entry("α₃ (rotation about x̂)", "alpha3_rad", "rad", "u_alpha3_rad", "+ : ẑ (v-block) sinks", "arcsec"),
+            Entry("LATITUDE", "latitude_deg", "deg", sense="north", aid="dms"),
+            Entry("LONGITUDE", "longitude_deg", "deg", sense="east; west is negative", aid="dms"),
+            Entry("ELEVATION", "elevation_m", "m", sense="above sea level"),
+            Entry("WV X", "wv_x_m", "m", sense="state plane, east"),
+            Entry("WV Y", "wv_y_m", "m", sense="state plane, north"),
+            Entry("WV Z", "wv_z_m", "m", sense="NAVD88, up"),
+        ),
+        "γ",
+        "gamma",
+        ("alpha1_rad", "alpha2_rad", "alpha3_rad"),
+        ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad"),
+        "(x̂, ŷ, ẑ) = γ · (east, north, up), computed from α₁, α₂, α₃ by eq. 2.5",
+        gamma,
+    ),
+    "mirror": Form(
+        "Laser Mirror Assembly Calibration Report",
+        "after the notes' Figure 2.4, rev 1/20/96",
+        MirrorGeometry,
+        (
+            Entry("ZP", "zp"),
+            Entry("DATE", "measured_on"),
+            Entry("INITIALS", "by"),
+            Entry("LASER NUMBER", "laser_number"),
+            Entry("DETECTOR NUMBER", "detector_number"),
+            Entry("HEAD NUMBER", "head_number"),
+            Entry("OSCILLATOR NUMBER", "oscillator_number"),
+            Entry("LEAKAGE SIGNAL", "leakage_amplitude_volt", "V", "u_leakage_volt", "amplitude"),
+            Entry("LEAKAGE SIGNAL", "leakage_phase_rad", "rad", "u_leakage_volt", "phase"),
+            Entry("D₀", "d0_mm", "mm", "u_d0_mm", "scan point to internal cube"),
+            Entry("Δx", "dx_mm", "mm", "u_offset_mm", "+ : ball to scan point along x̂"),
+            Entry("Δy", "dy_mm", "mm", "u_offset_mm", "+ : up, along ŷ"),
+            Entry("Δz", "dz_mm", "mm", "u_offset_mm", "+ : towards v-block, along ẑ"),
+            Entry("β₁ rotation about x (θ)", "beta1_rad", "rad", "u_beta_rad", "+ : z̃ sinks", "arcsec"),
+            Entry("β₂ rotation about y (ϕ)", "beta2_rad", "rad", "u_beta_rad", "+ : z̃ to x̂", "arcsec"),
+            Entry("Nₐ₀", "na0", "counts", "u_zero_counts", "Θ = 0: beam along x̃ at Φ = 90°"),
+            Entry("Nₑ₀", "ne0", "counts", "u_zero_counts", "Φ = 0: beam along z̃"),
+            Entry("AZ LOW LIMIT", "az_low_limit", "counts"),
+            Entry("AZ HIGH LIMIT", "az_high_limit", "counts"),
+            Entry("AZM ZRG", "azm_zrg", "counts", sense="at the cube"),
+            *_servo(0),
+            Entry("ELV ZRG", "elv_zrg", "counts", sense="at the cube"),
+            *_servo(1),
+        ),
+        "λ",
+        "lambda",
+        ("beta1_rad", "beta2_rad"),
+        ("u_beta_rad", "u_beta_rad"),
+        "(x̃, ỹ, z̃) = λ · (x̂, ŷ, ẑ), computed from β₁, β₂ by eq. 2.11",
+        lambda_,
+    ),
+}
+PROVENANCE = ("serial", "measured_on", "valid_until", "by", "report")
+
+
+def read_report(kind: str, path: Path) -> Report:
+    """The form of a kind, filled from the record in a TOML file.
+
+    kind    monument or mirror
+    path    of the record
+
+    Raises InputError where the file is missing or is no such record.
+    """
+    folder = Folder(path.parent)
+    record = folder.record(path.name, FORMS[kind].record)
+    said = {key: getattr(record, key) for key in PROVENANCE}
+    return Report(kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), said, record.notes or "")
+
+
+def blank_report(kind: str) -> Report:
+    """The form of a kind with nothing in it."""
+    return Report(kind, "", "", _filled(FORMS[kind], None), {})
+
+
+def report_object(report: Report, written: str | None) -> dict[str, Any]:
+    """A report as `catseye certificate --json` gives it; units stand beside the values, null where nothing is said.
+
+    written    path of the page, as the user gave it
+    """
+    return {
+        "kind": report.kind,
+        "record": report.file or None,
+        "sha256": report.sha256 or None,
+        "fields": [
+            {"name": f.entry.name, "key": f.entry.key, "value": f.value, "u": f.u, "unit": f.entry.unit or None}
+            for f in report.fields
+        ],
+        "notes": report.notes or None,
+        "missing": [entry.key for entry in report.missing],
+        "written": written,
+    }
+
+
+def written_value(field: Field) -> str:
+    """A value with the digits that belong to its u; as the record has it where u is not known.
+
+    >>> at = Entry("x", "x_mm", "mm")
+    >>> [written_value(Field(at, value, u)) for value, u in ((29503.7431, 0.1), (-2.4e-5, None), (12, 0.3))]
+    ['29503.74', '-0.000024', '12']
+    """
+    value = field.value
+    if value is None:
+        return ""
+    if not isinstance(value, float):
+        return value.isoformat() if isinstance(value, date) else str(value)
+    return rounded(value, field.u)[0] if field.u else np.format_float_positional(value, trim="0")
+
+
+def written_u(field: Field) -> str:
+    """Its standard uncertainty with two digits; held where it is zero, which fixes a coordinate."""
+    if field.u is None or field.value is None:
+        return ""
+    return rounded(0.0, field.u)[1] if field.u else "held"
+
+
+def written_aid(field: Field) -> str:
+    """The same angle in degrees, minutes and seconds, or in seconds alone.
+
+    >>> written_aid(Field(Entry("azimuth", "azimuth_deg", "deg", aid="dms"), 122.19722))
+    '122° 11′ 50.0″'
+    """
+    if field.value is None or not field.entry.aid:
+        return ""
+    seconds = field.value * (1.0 if field.entry.unit == "rad" else DEGREE) / ARCSECOND
+    if field.entry.aid == "arcsec":
+        return f"{round(seconds, 1) + 0.0:+.1f}″"  # + 0.0 makes minus zero plain zero
+    minutes, tenths = divmod(round(abs(seconds) * 10.0), 600)
+    return f"{'-' if seconds < -0.05 else ''}{minutes // 60}° {minutes % 60:02d}′ {tenths / 10.0:04.1f}″"
+
+
+def written_matrix(fields: tuple[Field, ...]) -> list[str]:
+    """The elements with one number of decimals, that of the greatest u among them, six at least."""
+    if fields[0].value is None:
+        return ["" for _ in fields]
+    known = [field.u for field in fields if field.u]
+    places = max(LEAST_PLACES, len(rounded(0.0, max(known))[0].partition(".")[2]) if known else 0)
+    return [f"{round(field.value, places) + 0.0:.{places}f}" for field in fields]
+
+
+def _filled(form: Form, record: Any) -> tuple[Field, ...]:
+    """Every field of the form, the matrix last."""
+    stated = [Field(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
+    return (*stated, *_matrix(form, record))
+
+
+def _uncertainty(entry: Entry, record: Any) -> float | None:
+    """u of a field in its own unit."""
+    u = getattr(record, entry.u, None) if entry.u else None
+    if u is None or getattr(record, entry.key) is None:
+        return None
+    if entry.key == "azimuth_deg":
+        return float(u) / DEGREE
+    if entry.key == "leakage_phase_rad":  # each quadrature has u; a phasor lost in it may have any phase
+        amplitude = record.leakage_amplitude_volt
+        return min(u / amplitude, U_OF_ANY_PHASE) if amplitude else U_OF_ANY_PHASE
+    return float(u)
+
+
+def _matrix(form: Form, record: Any) -> tuple[Field, ...]:
+    """The nine direction cosines, row by row, with the u that those of the angles give them."""
+    entries = [
+        Entry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
+        for i in range(3)
+        for j in range(3)
+    ]
+    if record is None:
+        return tuple(Field(entry) for entry in entries)
+    angles = np.array([getattr(record, key) for key in form.angles])
+    u = [getattr(record, key, None) for key in form.u_angles]
+    values = form.turned(*angles).ravel()
+    if any(each is None for each in u):
+        return tuple(Field(e, float(value)) for e, value in zip(entries, values, strict=True))
+    spread = matrix_uncertainty(form.turned, angles, np.array(u, dtype=float)).ravel()
+    return tuple(Field(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
+
+
+def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Standard uncertainties (3, 3) of a rotation matrix's elements.
+
+    turned    function of the angles that gives the matrix
+    angles    (n,), rad
+    u         (n,), rad, of each angle, independent
+
+    Source: [JCGM100] eq. 10. The derivatives are exact: each element is a cos t + b sin t + c of every angle t, whose
+    derivative is half the difference of its values a quarter turn ahead and behind.
+    """
+    quarter = 0.5 * math.pi * np.eye(len(angles))
+    slopes = np.array([0.5 * (turned(*(angles + q)) - turned(*(angles - q))) for q in quarter])
+    return np.sqrt(np.einsum("k,kij->ij", u**2, slopes**2))

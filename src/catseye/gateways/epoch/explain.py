@@ -1,0 +1,273 @@
+"""A shot explained, as an object for programs and as lines for people."""
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.estimation.propagation import Input, agreement
+from catseye.gateways.epoch.summary import MEANING
+from catseye.gateways.writers.passage import Passage
+from catseye.records.campaign import REFERENCE
+from catseye.reduction.budget import Explanation
+
+MICROMETRE = 1e-6
+SMALLEST_SHARE = 5e-5  # of a line in the text's table
+START_OF_MJD = datetime(1858, 11, 17)
+
+
+def explanation_object(found: Explanation, seed: int | None = None) -> dict[str, Any]:
+    """An explanation as `catseye explain --json` gives it: metres, shares of 1, null where there is nothing to tell.
+
+    seed   of the Monte Carlo, where there was one
+
+    An input's value and standard uncertainty are in its unit, its sensitivity is metres a unit, its contribution
+    metres. Infinite degrees of freedom are null, and `agrees` where the draws are too few to tell.
+    """
+    budget, cycles = found.budget, found.cycles
+    return {
+        "shot": found.shot,
+        "ranger": found.ranger,
+        "target": found.target,
+        "mjd_utc": found.mjd_utc,
+        "status": found.status,
+        "reason": found.reason,
+        "amplitude": abs(found.phasor),
+        "phase": float(np.mod(np.angle(found.phasor), 2.0 * np.pi)),
+        "u_phase": found.u_across / abs(found.phasor) if found.phasor else None,
+        "range": budget and budget.value,
+        "u_range": budget and budget.u,
+        "expanded_uncertainty": budget and budget.expanded,
+        "coverage_probability": budget and budget.probability,
+        "coverage_factor": budget and budget.coverage_factor,
+        "effective_degrees_of_freedom": budget and budget.degrees_of_freedom,
+        "cycles": cycles and int(cycles.cycles),
+        "margin": cycles and float(cycles.margin),
+        "slip_probability": cycles and float(cycles.slip_probability),
+        "coarse_from": found.coarse or None,
+        "inputs": _inputs(found),
+        "correlations": _correlations(found),
+        "monte_carlo": _monte_carlo(found, seed),
+        "adjusted": _adjusted(found),
+        "references": [{"shot": s, "after": after, "weight": w} for s, after, w in found.references],
+        "notes": list(found.notes),
+    }
+
+
+def _inputs(found: Explanation) -> list[dict[str, Any]]:
+    budget = found.budget
+    if budget is None:
+        return []
+    return [
+        {
+            "name": item.given.name,
+            "value": item.given.value,
+            "unit": item.unit,
+            "standard_uncertainty": item.given.u,
+            "distribution": item.given.distribution,
+            "degrees_of_freedom": item.given.degrees_of_freedom,
+            "sensitivity": item.slope,
+            "contribution": contribution,
+            "share": share,
+            "source": item.source,
+        }
+        for item, contribution, share in zip(found.items, budget.contribution, budget.share, strict=True)
+    ]
+
+
+def _correlations(found: Explanation) -> list[dict[str, Any]]:
+    if found.budget is None:
+        return []
+    r = found.budget.correlation
+    return [
+        {"first": found.items[i].given.name, "second": found.items[j].given.name, "correlation": r[i, j]}
+        for i in range(len(r))
+        for j in range(i)
+        if r[i, j] != 0.0
+    ]
+
+
+def _monte_carlo(found: Explanation, seed: int | None) -> dict[str, Any] | None:
+    scattered, budget = found.scattered, found.budget
+    if scattered is None or budget is None:
+        return None
+    return {
+        "draws": len(scattered.values),
+        "seed": seed,
+        "mean": scattered.mean,
+        "standard_uncertainty": scattered.u,
+        "low": scattered.low,
+        "high": scattered.high,
+        "shortest": list(scattered.shortest),
+        "coverage_probability": scattered.probability,
+        "agrees": agreement(budget, scattered, digits=1),
+    }
+
+
+def _adjusted(found: Explanation) -> dict[str, Any] | None:
+    adjusted = found.adjusted
+    if adjusted is None:
+        return None
+    return {
+        "range": adjusted.range_,
+        "u_range": adjusted.u_range,
+        "residual": adjusted.residual,
+        "standardised": adjusted.standardised,
+        "redundancy": adjusted.redundancy,
+        "distance": adjusted.distance,
+        "u_distance": adjusted.u_distance,
+        "used": adjusted.used,
+    }
+
+
+def explanation_passages(found: Explanation) -> list[Passage]:
+    """The shot, its return, its range, cycles, Monte Carlo, the network's word, and what else there is to know."""
+    told = [Passage(f"Shot {found.shot}", _shot(found)), Passage("The return", _return(found))]
+    if found.budget is not None:
+        told += [Passage("The range", _range(found)), Passage("Whole cycles", _cycles(found))]
+        told.append(Passage("Correlation", _shared(found)))
+    if found.scattered is not None:
+        told.append(Passage("Monte Carlo", _scatter(found)))
+    if found.adjusted is not None:
+        told.append(Passage("The network", _network(found)))
+    return [*told, *([Passage("Notes", "; ".join(found.notes) + ".")] if found.notes else [])]
+
+
+def when(found: Explanation) -> str:
+    """Calendar date and time of the trigger."""
+    return f"{START_OF_MJD + timedelta(days=found.mjd_utc):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def metres(length: float) -> str:
+    """A length with micrometres, in groups of three.
+
+    >>> metres(71.1038541)
+    '71.103\u202f854 m'
+    """
+    whole, _, decimals = f"{length:.6f}".partition(".")
+    return f"{whole}.{decimals[:3]}\u202f{decimals[3:]} m"
+
+
+def micrometres(u: float) -> str:
+    """A small length with two or three digits.
+
+    >>> micrometres(7.8169e-5), micrometres(-3.4e-6)
+    ('78 µm', '-3.4 µm')
+    """
+    size = u / MICROMETRE
+    return f"{size:.0f} µm" if abs(size) >= 10.0 else f"{size:.1f} µm"
+
+
+def distribution(given: Input) -> str:
+    """Its name, with the degrees of freedom where they are finite."""
+    degrees = given.degrees_of_freedom
+    return given.distribution + (f", {degrees:.0f}" if np.isfinite(degrees) else "")
+
+
+def _shot(found: Explanation) -> str:
+    what = "its internal cube" if found.target == REFERENCE else found.target
+    start = f"{found.ranger} on {what} at {when(found)}. "
+    if found.status == "used":
+        return start + "It took part in the adjustment."
+    if found.status == "reference":
+        return start + "It follows the drift of the electronics; a range it gives none."
+    word = found.reason.partition(":")[0]
+    meaning = f" ({MEANING[word]})" if word in MEANING and MEANING[word] not in found.reason else ""
+    return start + (f"Not used: {found.reason}{meaning}." if found.reason else f"Status: {found.status}.")
+
+
+def _return(found: Explanation) -> str:
+    amplitude = abs(found.phasor)
+    if not np.isfinite(found.u_across) or amplitude == 0.0:
+        return f"{amplitude:.4f} V after the leakage; its noise is unknown."
+    return (
+        f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(found.phasor), 2.0 * np.pi):.4f} rad; "
+        f"noise of the samples across it {1e3 * found.u_across:.2f} mV, that is "
+        f"{1e3 * found.u_across / amplitude:.2f} mrad."
+    )
+
+
+def _range(found: Explanation) -> str:
+    budget = found.budget
+    assert budget is not None
+    degrees = budget.degrees_of_freedom
+    many = "infinitely many" if degrees > 1e6 else f"{degrees:.0f}"
+    return (
+        f"{metres(budget.value)}, u {micrometres(budget.u)}, scan point to reference point as this shot alone gives "
+        f"it; with {100.0 * budget.probability:g} % within ±{micrometres(budget.expanded)} "
+        f"(k {budget.coverage_factor:.2f}, {many} degrees of freedom)."
+        + (" That knows nothing of what this shot was rejected for." if found.reason else "")
+    )
+
+
+def _cycles(found: Explanation) -> str:
+    cycles, scene = found.cycles, found.scene
+    assert cycles is not None
+    assert scene is not None
+    slip = float(cycles.slip_probability)
+    chance = "below 1e-12" if slip < 1e-12 else f"{slip:.1e}"
+    return (
+        f"{int(cycles.cycles)} half wavelengths, decided by {found.coarse}: margin "
+        f"{float(cycles.margin) / MILLIMETRE:.2f} mm of {0.5 * scene.half / MILLIMETRE:.2f}, u of the coarse length "
+        f"{float(cycles.u) / MILLIMETRE:.2g} mm; probability of another number {chance}."
+    )
+
+
+def _shared(found: Explanation) -> str:
+    pairs = [f"{c['first']} and {c['second']}: {c['correlation']:+.2f}" for c in _correlations(found)]
+    return "What acts on target and references alike, such as leakage, is one input; " + (
+        f"correlated are {', '.join(pairs)}." if pairs else "no two inputs are correlated."
+    )
+
+
+def _scatter(found: Explanation) -> str:
+    scattered, budget = found.scattered, found.budget
+    assert scattered is not None
+    assert budget is not None
+    verdict = {
+        True: "the budget's interval agrees",
+        False: "the budget's interval differs: believe this one",
+        None: "too few draws to compare the budget's interval",
+    }[agreement(budget, scattered, digits=1)]
+    u = f"u {micrometres(scattered.u)}" if np.isfinite(scattered.u) else "too few cycles for a u"
+    return (
+        f"{len(scattered.values)} draws of all inputs through the whole chain: {u}, "
+        f"{100.0 * scattered.probability:g} % between {metres(scattered.low)} and {metres(scattered.high)}; {verdict}."
+    )
+
+
+def _network(found: Explanation) -> str:
+    adjusted = found.adjusted
+    assert adjusted is not None
+    side = "more" if adjusted.residual > 0.0 else "less"
+    mine = (
+        f"with zero, leakage and air as estimated this shot gives {metres(adjusted.range_)} (u "
+        f"{micrometres(adjusted.u_range)} of its own), {micrometres(abs(adjusted.residual))} {side} than between "
+        f"the adjusted points, {metres(adjusted.distance)} (u {micrometres(adjusted.u_distance)}); "
+        f"w {adjusted.standardised:+.1f}, redundancy {adjusted.redundancy:.2f}."
+    )
+    return mine[0].upper() + mine[1:]
+
+
+def budget_lines(found: Explanation) -> list[str]:
+    """The table of inputs for a terminal, largest share first, the smallest in one line."""
+    budget = found.budget
+    if budget is None:
+        return []
+    lines = [f"{'share %':>7} {'µm':>7}  {'input':<35}{'value':>11}{'u':>10} {'unit':<5}{'mm/unit':>10}  distribution"]
+    order = np.argsort(-np.abs(budget.share), kind="stable")
+    shown = [k for k in order if abs(budget.share[k]) >= SMALLEST_SHARE]
+    for k in shown:
+        item, given = found.items[k], found.items[k].given
+        lines.append(
+            f"{100.0 * budget.share[k]:7.2f} {abs(budget.contribution[k]) / MICROMETRE:7.2f}  {given.name:<35}"
+            f"{given.value:>11.6g}{given.u:>10.2g} {item.unit:<5}{item.slope / MILLIMETRE:>10.4g}  "
+            f"{distribution(given)}"
+        )
+    rest = [k for k in order if k not in set(shown)]
+    if rest:
+        size = float(np.sqrt(np.sum(budget.contribution[rest] ** 2))) / MICROMETRE
+        share = 100.0 * float(budget.share[rest].sum())
+        lines.append(f"{share:7.2f} {size:7.2f}  {len(rest)} smaller inputs (--json or --page)")
+    return [*lines, f"{100.0:7.2f} {budget.u / MICROMETRE:7.2f}  together"]

@@ -1,0 +1,221 @@
+"""A shot explained on one page that needs nothing else: budget, Monte Carlo, every input with its source."""
+
+from datetime import datetime
+from html import escape
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.gateways.epoch.explain import (
+    MICROMETRE,
+    SMALLEST_SHARE,
+    distribution,
+    explanation_passages,
+    metres,
+    micrometres,
+    when,
+)
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.records.campaign import Campaign
+from catseye.reduction.budget import Assumptions, Explanation
+
+MARK = "<title>catseye: shot "  # tells our pages from others' files
+WIDE = 4.5  # standard uncertainties on either side in the histogram
+GROUPS = (
+    ("the samples", SERIES[0], ("noise", "amplitude", "steps")),
+    ("the electronics", SERIES[1], ("reference", "references", "walk")),
+    ("the head", SERIES[3], ("leakage", "d0", "axes", "coupling", "cyclic", "frequency")),
+    ("the air", SERIES[2], ("thermometer", "profile", "sound", "pressure", "humidity", "formula", "fluctuation")),
+    ("the glass", SERIES[4], ("height", "ratio", "r1", "r2", "incidence", "across")),
+)
+
+
+def explanation_page(found: Explanation, campaign: Campaign, made: datetime) -> str:
+    """The whole page.
+
+    campaign   that the shot is of
+    made       UTC
+    """
+    name = campaign.site.campaign.name
+    header = (
+        f"<header><h1>Shot {found.shot} of {escape(name)}</h1>"
+        f'<div class="faint">{escape(found.ranger)} on {escape(found.target)}, {when(found)}; explained by catseye on '
+        f"{made:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>"
+    )
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(found))
+    body = [header, _cards(found), f"<dl>{words}</dl>"]
+    if found.budget is not None:
+        drawn = figures(found)
+        body += [_budget(found, drawn["contributions"]), _scattered(drawn.get("histogram")), _references(found)]
+    body.append(_provenance(found, campaign, made))
+    return page(f"catseye: shot {found.shot} of {name}", "\n".join(part for part in body if part))
+
+
+def figures(found: Explanation) -> dict[str, str]:
+    """The budget's contributions and, after a Monte Carlo, its histogram, as SVG text."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {"contributions": _contributions(found)}
+        if found.scattered is not None:
+            drawn["histogram"] = _histogram(found)
+        return {name: svg(figure) for name, figure in drawn.items()}
+
+
+def _colour(key: str) -> str:
+    first = key.partition(" ")[0]
+    return next(colour for _, colour, keys in GROUPS if first in keys)
+
+
+def _contributions(found: Explanation) -> Figure:
+    budget = found.budget
+    assert budget is not None
+    order = [k for k in np.argsort(-np.abs(budget.share), kind="stable") if abs(budget.share[k]) >= SMALLEST_SHARE]
+    size = np.abs(budget.contribution[order]) / MICROMETRE
+    figure = Figure(figsize=(9.4, 1.2 + 0.27 * (len(order) + 1)), layout="constrained")
+    ax = figure.add_subplot()
+    where = np.arange(len(order)) + 1
+    ax.barh(0, budget.u / MICROMETRE, color=INK, height=0.62)
+    ax.barh(where, size, color=[_colour(found.items[k].key) for k in order], height=0.62)
+    ax.text(budget.u / MICROMETRE, 0, f"  u {micrometres(budget.u)}", va="center", color=INK, fontweight="bold")
+    for y, k, length in zip(where, order, size, strict=True):
+        share = 100.0 * budget.share[k]
+        ax.text(
+            float(length),
+            float(y),
+            f"  {share:.0f} %" if abs(share) >= 1.0 else f"  {share:.2f} %",
+            va="center",
+            color=FAINT,
+        )
+    ax.set_yticks([0, *where], ["together", *(found.items[k].given.name for k in order)])
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, 1.16 * max(budget.u / MICROMETRE, float(size.max(initial=0.0))))
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("contribution to the standard uncertainty, µm (beside: share of its square)")
+    used = {_colour(found.items[k].key) for k in order}
+    handles = [mpl.patches.Patch(color=colour, label=name) for name, colour, _ in GROUPS if colour in used]
+    ax.legend(handles=handles, loc="lower right")
+    return figure
+
+
+def _histogram(found: Explanation) -> Figure:
+    budget, scattered = found.budget, found.scattered
+    assert budget is not None
+    assert scattered is not None
+    figure = Figure(figsize=(9.4, 3.4), layout="constrained")
+    ax = figure.add_subplot()
+    off = (scattered.values - budget.value) / MICROMETRE
+    u = budget.u / MICROMETRE
+    edges = np.linspace(-WIDE * u, WIDE * u, 91)
+    counts, _ = np.histogram(off, edges)
+    density = counts / len(off) / np.diff(edges)
+    ax.stairs(density, edges, fill=True, color=SERIES[0] + "40", label=f"{len(off)} draws")
+    x = np.linspace(-WIDE * u, WIDE * u, 400)
+    ax.plot(x, np.exp(-0.5 * (x / u) ** 2) / (u * np.sqrt(2.0 * np.pi)), color=INK, lw=1.2, label="budget, normal")
+    for k, end in enumerate((scattered.low, scattered.high)):
+        label = f"{100.0 * scattered.probability:g} % of the draws" if not k else None
+        ax.axvline((end - budget.value) / MICROMETRE, color=SERIES[1], lw=1.1, ls="--", label=label)
+    if found.adjusted is not None:
+        d = (found.adjusted.distance - budget.value) / MICROMETRE
+        if abs(d) < WIDE * u:
+            wide = found.adjusted.u_distance / MICROMETRE
+            ax.axvspan(d - wide, d + wide, color=SERIES[2] + "22", lw=0)
+            ax.axvline(d, color=SERIES[2], lw=1.4, label="adjusted distance, ± u")
+        else:
+            ax.plot([], [], color=BAD, label=f"adjusted distance {micrometres(d * MICROMETRE)} off, out of the picture")
+    ax.set_xlim(-WIDE * u, WIDE * u)
+    ax.set_ylim(0.0, None)
+    ax.set_yticks([])
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel(f"range less {metres(budget.value)}, µm")
+    ax.legend(loc="upper right", frameon=True, facecolor="white", edgecolor="none", framealpha=0.9)
+    return figure
+
+
+def _cards(found: Explanation) -> str:
+    budget, cycles = found.budget, found.cycles
+    cards = [card("Status", found.status, found.reason or "nothing speaks against this shot")]
+    if budget is not None and cycles is not None:
+        biggest = found.items[int(np.argmax(np.abs(budget.share)))].given.name
+        cards += [
+            card("Range", metres(budget.value), "before any adjustment, scan point to reference point"),
+            card("Standard uncertainty", micrometres(budget.u), f"most of it: {biggest}"),
+            card(
+                f"{100.0 * budget.probability:g} % interval",
+                f"± {micrometres(budget.expanded)}",
+                f"coverage factor {budget.coverage_factor:.2f}",
+            ),
+        ]
+    return f'<div class="cards">{"".join(cards)}</div>'
+
+
+def _budget(found: Explanation, drawn: str) -> str:
+    budget = found.budget
+    assert budget is not None
+    rows = []
+    for k in np.argsort(-np.abs(budget.share), kind="stable"):
+        item, given = found.items[k], found.items[k].given
+        rows.append(
+            (
+                given.name,
+                f"{given.value:.7g} {item.unit}",
+                f"{given.u:.2g}",
+                distribution(given),
+                f"{item.slope / MILLIMETRE:.4g}",
+                f"{budget.contribution[k] / MICROMETRE:+.2f}",
+                f"{100.0 * budget.share[k]:.2f}",
+                item.source,
+            )
+        )
+    columns = ("input", "value", "u", "distribution", "mm a unit", "µm", "share, %", "source")
+    return section(
+        "budget",
+        "Budget",
+        picture(drawn, "What each input adds to the standard uncertainty of this range."),
+        table(columns, rows, "tnntnnnw"),
+        paragraph(
+            "µm: slope times u, with its sign. A share of zero is an effect of second order, or one that this head's "
+            "sheet gives no coupling for.",
+            "faint",
+        ),
+    )
+
+
+def _scattered(drawn: str | None) -> str:
+    if drawn is None:
+        return ""
+    return section(
+        "monte-carlo",
+        "Monte Carlo",
+        paragraph(
+            "Every input drawn from its distribution and carried through the whole chain, nothing linearised: noise on "
+            "the phasors, a path of the drifting electronics, the air along the path, the glass and its tilt."
+        ),
+        picture(drawn, "Draws of the range against the budget's normal law."),
+    )
+
+
+def _references(found: Explanation) -> str:
+    rows = [(str(shot), f"{after:+.0f}", f"{weight:+.4f}") for shot, after, weight in found.references]
+    return section(
+        "references",
+        "Reference shots",
+        paragraph(
+            "Their weighted mean is the phase of the electronics at this shot; the weights follow from the walk."
+        ),
+        table(("shot", "seconds after this one", "weight"), rows, "nnn"),
+    )
+
+
+def _provenance(found: Explanation, campaign: Campaign, made: datetime) -> str:
+    assumed = found.scene.assumptions if found.scene is not None else Assumptions()
+    told = {"made at": f"{made:%Y-%m-%d %H:%M:%S} UTC", **versions()}
+    told |= {f"assumed {key}": f"{value:g}" for key, value in vars(assumed).items()}
+    return section(
+        "provenance",
+        "Provenance",
+        folded("Versions and assumptions", table(("what", "value"), told.items(), "tt")),
+        folded("SHA-256 of the files read", table(("file", "SHA-256"), campaign.hashes.items(), "th")),
+    )

@@ -1,0 +1,347 @@
+"""The report of a reduction: one HTML page that needs nothing else."""
+
+from collections import Counter
+from datetime import datetime
+from html import escape
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.epoch.figures import figures
+from catseye.gateways.epoch.objects import benchmark_object
+from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits
+from catseye.gateways.epoch.tables import kind_of
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.reduction.air.group_index import benchmark_refractometers
+from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.surface import UNOBSERVED
+
+CONTENTS = {
+    "summary": "Summary",
+    "feed-arm": "Feed arm",
+    "dish": "Dish",
+    "network": "Network",
+    "residuals": "Residuals",
+    "rejected": "Rejected shots",
+    "rangers": "Rangers",
+    "air": "Air",
+    "points": "Points",
+    "provenance": "Provenance",
+}
+
+
+def report(reduction: Reduction, when: datetime) -> str:
+    """The whole page."""
+    drawn = figures(reduction)
+    name = reduction.campaign.site.campaign.name
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
+    header = (
+        f"<header><h1>{escape(name)}: coordinates, pose and surface</h1>"
+        f'<div class="faint">from {len(reduction.campaign.shots)} shots in '
+        f"{escape(reduction.campaign.directory.resolve().name)}/, reduced by catseye "
+        f"on {when:%Y-%m-%d %H:%M} UTC; lengths in the ground frame (x east, y north, z up), u = standard uncertainty, "
+        f"1σ</div><nav>{links}</nav></header>"
+    )
+    body = [
+        header,
+        _summary(reduction),
+        _feed_arm(reduction, drawn),
+        _dish(reduction, drawn),
+        _network(drawn),
+        _residuals(reduction, drawn),
+        _rejected(reduction),
+        _rangers(reduction, drawn),
+        _air(reduction, drawn),
+        _points(reduction),
+        _provenance(reduction, when),
+    ]
+    return page(f"catseye: {name}", "\n".join(body))
+
+
+def _summary(reduction: Reduction) -> str:
+    coordinates, surface = reduction.coordinates, reduction.surface
+    count, rows = Counter(reduction.status), feed_arm_rows(reduction)
+    _, spread = trust_limits(reduction)
+    cards = [
+        card(
+            "Ranges used", f"{count['used']}", f"{len(reduction.rejected)} of all shots rejected, each with its reason"
+        ),
+        card(
+            "Variance factor",
+            _number(coordinates.variance_factor, 2),
+            f"expected 1 ± {_number(spread, 2)}, {coordinates.degrees_of_freedom:.0f} degrees of freedom",
+        ),
+        card("Refractivity", f"{_number(coordinates.refractivity_ppm, 2)} ppm", "group, mean over the used paths"),
+    ]
+    if rows:
+        worst = max(float(np.max(u)) for _, _, u in rows)
+        cards.insert(1, card("Feed arm known to", f"{worst:.2f} mm", "largest u of a coordinate of its rangers"))
+    if surface is not None:
+        u = float(np.median(surface.u_deviation)) / MILLIMETRE
+        cards.insert(
+            2,
+            card(
+                "Surface", f"{surface.rms / MILLIMETRE:.3f} mm rms", f"{len(surface.names)} prisms, u {u:.3f} mm each"
+            ),
+        )
+        tilt = float(np.linalg.norm(surface.fit.rotation)) / ARCSECOND
+        moved = float(np.linalg.norm(surface.fit.translation)) / MILLIMETRE
+        cards.insert(
+            3, card("Dish off nominal", f"{moved:.1f} mm, {tilt:.1f}″", "shift of the vertex, tilt of the axis")
+        )
+    told = "".join(
+        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(reduction) if p.title != "Notes"
+    )
+    notes = "".join(f"<li>{escape(note)}</li>" for note in reduction.notes)
+    return section(
+        "summary",
+        CONTENTS["summary"],
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{told}</dl>",
+        f'<h3>Worth knowing</h3><ul class="notes">{notes}</ul>' if notes else "",
+    )
+
+
+def _feed_arm(reduction: Reduction, drawn: dict[str, str]) -> str:
+    rows = feed_arm_rows(reduction)
+    if not rows:
+        return section("feed-arm", CONTENTS["feed-arm"], paragraph("No ranger on the feed arm was seen."))
+    return section(
+        "feed-arm",
+        CONTENTS["feed-arm"],
+        paragraph("Scan points of the rangers on the feed arm: the points where their two mirror axes meet."),
+        table(
+            ("ranger", "x (m)", "y (m)", "z (m)", "u x (mm)", "u y (mm)", "u z (mm)"),
+            [(name, *(f"{v:.5f}" for v in x), *(f"{v:.3f}" for v in u)) for name, x, u in rows],
+            "tnnnnnn",
+        ),
+        picture(
+            drawn["feed_arm"],
+            "Left: the feed arm from above, with the outlines of the 1σ ellipsoids, enlarged as stated above. "
+            "Right: the standard uncertainties of the coordinates.",
+        ),
+    )
+
+
+def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
+    surface, aim = reduction.surface, pointing(reduction)
+    if surface is None or aim is None:
+        reasons = [note for note in reduction.notes if note.startswith("no paraboloid")]
+        return section("dish", CONTENTS["dish"], paragraph(f"No pose and no surface: {'; '.join(reasons)}."))
+    pose, u = surface.pose(), np.sqrt(np.diag(surface.fit.covariance))
+    posture = reduction.campaign.site.campaign
+    motion = [
+        (f"shift along {axis}", f"{value / MILLIMETRE:+.3f} mm", f"{each / MILLIMETRE:.3f} mm")
+        for axis, value, each in zip("xyz", pose["translation"], u[:3], strict=True)
+    ] + [
+        (f"rotation about {axis}", f"{value / ARCSECOND:+.2f}″", f"{each / ARCSECOND:.2f}″")
+        for axis, value, each in zip("xyz", pose["rotation"], u[3:], strict=True)
+    ]
+    places = [
+        ("pivot of the rotation: nominal vertex", *(f"{v:.5f}" for v in pose["pivot"])),
+        ("vertex", *(f"{v:.5f}" for v in pose["vertex"])),
+        ("focus", *(f"{v:.5f}" for v in pose["focus"])),
+        ("axis (unit vector)", *(f"{v:.8f}" for v in pose["axis"])),
+    ]
+    return section(
+        "dish",
+        CONTENTS["dish"],
+        paragraph(
+            f"The paraboloid of {surface.focal_length:g} m focal length that fits {len(surface.names)} prisms best "
+            f"(least squares of the normal residuals) points to azimuth {aim[0]:.4f}°, elevation {aim[1]:.4f}°; the "
+            f"encoders said {posture.azimuth_deg:g}° and {posture.elevation_deg:g}°. Frame: ground."
+        ),
+        table(("against the nominal posture", "value", "u"), motion, "tnn"),
+        table(("in the ground frame (m)", "x", "y", "z"), places, "tnnn"),
+        paragraph(f"Not observed: {UNOBSERVED}.", "faint"),
+        picture(
+            drawn["dish"],
+            "Normal deviations of the prisms from that paraboloid in millimetres, "
+            f"{surface.rms / MILLIMETRE:.3f} mm rms; "
+            f"u {np.min(surface.u_deviation) / MILLIMETRE:.3f} to {np.max(surface.u_deviation) / MILLIMETRE:.3f} mm. "
+            "Dashed: the aperture.",
+        ),
+    )
+
+
+def _network(drawn: dict[str, str]) -> str:
+    return section(
+        "network",
+        CONTENTS["network"],
+        picture(
+            drawn["plan"],
+            "Plan. Every point with the outline of its 1σ ellipsoid, enlarged as stated above the figure; thin lines "
+            "are used ranges. Hollow circles: points that the ranges leave open in at least one direction.",
+        ),
+        picture(drawn["elevation"], "Elevation, seen across the telescope's azimuth."),
+    )
+
+
+def _residuals(reduction: Reduction, drawn: dict[str, str]) -> str:
+    limit = reduction.settings.critical
+    return section(
+        "residuals",
+        CONTENTS["residuals"],
+        picture(
+            drawn["residuals"],
+            "Left: residuals of all ranges; rejected ones are drawn at the edge. Right: the test statistic w of the "
+            "used ranges against the normal distribution that the claimed uncertainties predict; a shot with |w| "
+            f"above {limit:g} is rejected.",
+        ),
+    )
+
+
+def _rejected(reduction: Reduction) -> str:
+    shots = reduction.campaign.shots
+    rows = []
+    for k, number in enumerate(shots.shot):
+        reason = reduction.rejected.get(int(number))
+        if reason is not None:
+            word, _, rest = reason.partition(": ")
+            rows.append((str(number), shots.ranger[k], shots.target[k], word, rest))
+    if not rows:
+        return section("rejected", CONTENTS["rejected"], paragraph("None."))
+    return section(
+        "rejected",
+        CONTENTS["rejected"],
+        paragraph(f"{len(rows)} of {len(shots)} shots. They stay in ranges.csv with their reasons."),
+        table(("shot", "ranger", "target", "why", "what was seen"), rows, "ntttw"),
+    )
+
+
+def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
+    campaign, coordinates = reduction.campaign, reduction.coordinates
+    amplitude = reduction.phases.amplitude
+    rows = []
+    for name, (zero, u) in sorted(coordinates.zeros.items()):
+        mine = [k for k, ranger in enumerate(campaign.shots.ranger) if ranger == name]
+        used = [k for k in mine if reduction.status[k] == "used"]
+        mirror = campaign.mirror_of(name)
+        rows.append(
+            (
+                name,
+                mirror.zp,
+                kind_of(reduction, name).removesuffix(" ranger").replace("-", " "),
+                f"{zero * 1e6:+.1f}",
+                f"{u * 1e6:.1f}",
+                f"{mirror.u_d0_mm * 1e3:.1f}",
+                str(len(used)),
+                str(sum(int(campaign.shots.shot[k]) in reduction.rejected for k in mine)),
+                _number(float(np.median(amplitude[used])) if used else float("nan"), 2),
+            )
+        )
+    columns = (
+        "ranger",
+        "mirror",
+        "stands on",
+        "zero (µm)",
+        "u (µm)",
+        "u before (µm)",
+        "used",
+        "rejected",
+        "return (V)",
+    )
+    return section(
+        "rangers",
+        CONTENTS["rangers"],
+        paragraph("Each ranger's zero is estimated with the coordinates; its laboratory calibration is the prior."),
+        picture(drawn["zeros"], "Corrections to the rangers' zeros against what their laboratory claimed."),
+        table(columns, rows, "tttnnnnnn"),
+    )
+
+
+def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
+    *stations, (profile, (value, u)) = reduction.coordinates.air.items()
+    rows = [(f"{name}: thermometer reads too high by", f"{v:+.3f} °C", f"{s:.3f} °C") for name, (v, s) in stations]
+    label, unit = (
+        ("gradient with height", "°C/m")
+        if profile == "gradient"
+        else ("half-way between the stations warmer than on their line by", "°C")
+    )
+    rows.append((label, f"{value:+.4f} {unit}", f"{u:.4f} {unit}"))
+    rows += [
+        (f"{line}: its sound reads too warm by", f"{warm:+.3f} °C", f"{s:.3f} °C")
+        for line, (warm, s) in reduction.coordinates.sound.items()
+    ]
+    benchmarks = [
+        (
+            one["benchmark"],
+            one["ranger"],
+            str(one["shots"]),
+            f"{one['path_ppm']:.2f} ± {one['u_path_ppm']:.2f}",
+            f"{one['weather_ppm']:.2f} ± {one['u_weather_ppm']:.2f}",
+            f"{one['adjusted_ppm']:.2f}",
+            f"{one['thermometers_too_warm_c']:+.2f} ± {one['u_thermometers_too_warm_c']:.2f}",
+        )
+        for one in map(benchmark_object, benchmark_refractometers(reduction))
+        if one["shots"]
+    ]
+    columns = ("benchmark", "ranger", "shots", "by the path", "by the stations", "adjusted", "stations too warm (°C)")
+    paths = paragraph(
+        "Each benchmark path is a refractometer: n_g − 1 (ppm) from its phase, its certificate and the ranger's sheet, "
+        "beside the weather stations as they read and as the adjustment leaves them."
+    )
+    return section(
+        "air",
+        CONTENTS["air"],
+        picture(drawn["refractivity"], "Group refractivity (n − 1) along every used path, coloured by its mean height.")
+        if "refractivity" in drawn
+        else "",
+        picture(drawn["weather"], "What the weather stations recorded."),
+        table((f"estimated with the coordinates (model {reduction.settings.air_model})", "value", "u"), rows, "tnn"),
+        *([paths, table(columns, benchmarks, "ttnnnnn")] if benchmarks else []),
+    )
+
+
+def _points(reduction: Reduction) -> str:
+    coordinates = reduction.coordinates
+    u = np.sqrt(np.diag(coordinates.covariance)).reshape(-1, 3) / MILLIMETRE
+    rows = [
+        (
+            name,
+            kind_of(reduction, name),
+            *(f"{v:.5f}" for v in coordinates.x[row]),
+            *(f"{v:.3f}" for v in u[row]),
+            str(coordinates.shots[row]),
+        )
+        for row, name in enumerate(coordinates.points)
+    ]
+    columns = ("point", "kind", "x (m)", "y (m)", "z (m)", "u x (mm)", "u y (mm)", "u z (mm)", "shots")
+    return section(
+        "points",
+        CONTENTS["points"],
+        paragraph(
+            "A ranger's name is its scan point; its monument's fixed point ends in -F. Covariances are in "
+            "coordinates.csv, the full matrix in coordinates.json. A large u means that the ranges leave that "
+            "direction open and only the typed position holds it."
+        ),
+        table(columns, rows, "ttnnnnnnn"),
+    )
+
+
+def _provenance(reduction: Reduction, when: datetime) -> str:
+    campaign = reduction.campaign
+    settings = [
+        (key, f"{value:.6g}" if isinstance(value, float) else str(value))
+        for key, value in vars(reduction.settings).items()
+    ]
+    return section(
+        "provenance",
+        CONTENTS["provenance"],
+        paragraph(
+            f"Reduced {when:%Y-%m-%d %H:%M:%S} UTC. Adjustment: {reduction.coordinates.status}. The same, for "
+            "programs, is in provenance.json."
+        ),
+        "<h3>Programs</h3>",
+        table(("part", "version"), list(versions().items()), "tt"),
+        folded("Settings", table(("assumption", "value"), settings, "tt")),
+        folded(
+            f"Inputs: SHA-256 of {len(campaign.hashes)} files",
+            table(("file", "SHA-256"), list(campaign.hashes.items()), "th"),
+        ),
+    )
+
+
+def _number(value: float, places: int) -> str:
+    return f"{value:.{places}f}" if np.isfinite(value) else "unknown"

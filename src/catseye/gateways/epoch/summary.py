@@ -1,0 +1,155 @@
+"""A reduction told in sentences, for people who did not design it."""
+
+from collections import Counter
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
+from catseye.gateways.epoch.tables import kind_of
+from catseye.gateways.writers.passage import Passage
+from catseye.records.campaign import REFERENCE
+from catseye.reduction.epoch.epoch import Reduction
+
+MEANING = {
+    "blocked": "nothing came back",
+    "reflected": "light from elsewhere in the return",
+    "undecided": "shots that contradict each other, and nothing says which is wrong",
+    "clipped": "the converter was overdriven",
+    "dead": "converter or cable",
+    "noise unknown": "too few samples to tell their noise",
+    "bad reference": "something else in the beam of the internal cube",
+    "no reference": "the drift of the electronics is unknown",
+}
+
+
+def passages(reduction: Reduction) -> list[Passage]:
+    """The night, the shots, the feed arm, the dish, the air, and how far to trust it all."""
+    return [
+        Passage("The night", _night(reduction)),
+        Passage("The shots", _shots(reduction)),
+        Passage("The feed arm", _feed_arm(reduction)),
+        Passage("The dish", _dish(reduction)),
+        Passage("The air", _air(reduction)),
+        Passage("The trust", _trust(reduction)),
+        *([Passage("Notes", "; ".join(reduction.notes) + ".")] if reduction.notes else []),
+    ]
+
+
+def feed_arm_rows(reduction: Reduction) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Name, coordinates (m) and standard uncertainties (mm) of each feed-arm ranger."""
+    coordinates = reduction.coordinates
+    u = np.sqrt(np.diag(coordinates.covariance)).reshape(-1, 3) / MILLIMETRE
+    return [
+        (name, coordinates.x[row], u[row])
+        for row, name in enumerate(coordinates.points)
+        if kind_of(reduction, name) == "feed-arm ranger"
+    ]
+
+
+def pointing(reduction: Reduction) -> tuple[float, float] | None:
+    """Azimuth and elevation of the fitted axis, degrees, azimuth beside the nominal one."""
+    if reduction.surface is None:
+        return None
+    x, y, z = reduction.surface.pose()["axis"]
+    nominal = reduction.campaign.site.campaign.azimuth_deg
+    azimuth = float(np.arctan2(x, y)) / DEGREE
+    return nominal + (azimuth - nominal + 180.0) % 360.0 - 180.0, float(np.arcsin(z)) / DEGREE
+
+
+def trust_limits(reduction: Reduction) -> tuple[float, float]:
+    """The variance factor's expectation and its standard deviation, for its degrees of freedom."""
+    degrees = reduction.coordinates.degrees_of_freedom
+    return 1.0, float(np.sqrt(2.0 / degrees)) if degrees > 0.0 else float("nan")
+
+
+def _night(reduction: Reduction) -> str:
+    campaign = reduction.campaign
+    posture, shots = campaign.site.campaign, campaign.shots
+    ground, arm = len(campaign.monuments), len(campaign.feedarm.ranger)
+    minutes = (shots.mjd_utc[-1] - shots.mjd_utc[0]) * SECONDS_PER_DAY / 60.0
+    return (
+        f"In {posture.name} the telescope stood at azimuth {posture.azimuth_deg:g}°, elevation "
+        f"{posture.elevation_deg:g}° while {ground + arm} laser rangers, {ground} on the ground and {arm} on the feed "
+        f"arm, fired {len(shots)} shots in "
+        f"{minutes:.0f} minutes, at retroreflectors on the dish and the structure and at their own reference cubes."
+    )
+
+
+def _shots(reduction: Reduction) -> str:
+    count = Counter(reduction.status)
+    index = {int(shot): k for k, shot in enumerate(reduction.campaign.shots.shot)}
+    references = sum(
+        reduction.campaign.shots.target[k] == REFERENCE and shot not in reduction.rejected for shot, k in index.items()
+    )
+    words = Counter(reason.partition(":")[0] for reason in reduction.rejected.values())
+    told = ", ".join(
+        f"{number} {word}" + (f" ({MEANING[word]})" if word in MEANING else "") for word, number in words.most_common()
+    )
+    rejected = f"{len(reduction.rejected)} were rejected: {told}" if reduction.rejected else "none was rejected"
+    return (
+        f"{count['used']} ranges went into one adjustment; {references} shots on the reference cubes followed "
+        f"the drift of the electronics; {rejected}."
+    )
+
+
+def _feed_arm(reduction: Reduction) -> str:
+    rows = feed_arm_rows(reduction)
+    if not rows:
+        return "No ranger on the feed arm was seen."
+    centre = np.mean([x for _, x, _ in rows], axis=0)
+    worst = np.max([u for _, _, u in rows], axis=0)
+    return (
+        f"{len(rows)} rangers around x {centre[0]:.1f}, y {centre[1]:.1f}, z {centre[2]:.1f} m (east, north, up from "
+        f"the pintle), each known to {worst[0]:.2f} mm east, {worst[1]:.2f} mm north and {worst[2]:.2f} mm up or "
+        "better (standard uncertainty)."
+    )
+
+
+def _dish(reduction: Reduction) -> str:
+    surface = reduction.surface
+    if surface is None:
+        return "Too few of its prisms were seen to say where it is."
+    shift = surface.fit.translation / MILLIMETRE
+    u = np.sqrt(np.diag(surface.fit.covariance))
+    turn = surface.fit.rotation / ARCSECOND
+    aim = pointing(reduction)
+    assert aim is not None
+    return (
+        f"{len(surface.names)} prisms lie on a paraboloid of {surface.focal_length:g} m focal length to "
+        f"{surface.rms / MILLIMETRE:.3f} mm rms. Against the nominal posture its vertex is at "
+        f"{shift[0]:+.2f}, {shift[1]:+.2f}, {shift[2]:+.2f} mm east, north, up "
+        f"(u {', '.join(f'{each / MILLIMETRE:.2f}' for each in u[:3])}) and it is turned by "
+        f"{turn[0]:+.1f}, {turn[1]:+.1f}, {turn[2]:+.1f} arc seconds about those axes "
+        f"(u {', '.join(f'{each / ARCSECOND:.1f}' for each in u[3:])}): its axis points to azimuth {aim[0]:.4f}°, "
+        f"elevation {aim[1]:.4f}°."
+    )
+
+
+def _air(reduction: Reduction) -> str:
+    coordinates = reduction.coordinates
+    weather = reduction.campaign.weather
+    stations = list(coordinates.air.items())[:-1]
+    offsets = ", ".join(f"{name} {value:+.2f} °C (u {u:.2f})" for name, (value, u) in stations)
+    return (
+        f"{weather.temperature_c.mean():.1f} °C, {weather.pressure_hpa.mean():.1f} hPa, "
+        f"{weather.humidity_percent.mean():.0f} % humidity on average; it slowed the light by "
+        f"{coordinates.refractivity_ppm:.2f} parts in a million. The ranges also weighed the thermometers, "
+        f"which read too high by: {offsets}."
+    )
+
+
+def _trust(reduction: Reduction) -> str:
+    factor, degrees = reduction.coordinates.variance_factor, reduction.coordinates.degrees_of_freedom
+    if not (np.isfinite(factor) and degrees >= 1.0):
+        return "Nothing was measured twice, so nothing checks the claimed uncertainties."
+    _, spread = trust_limits(reduction)
+    ratio = 100.0 * (np.sqrt(factor) - 1.0)
+    if abs(factor - 1.0) <= 2.0 * spread:
+        verdict = "the measurements scatter as their uncertainties claim"
+    elif factor < 1.0:
+        verdict = (
+            f"the measurements scatter {-ratio:.0f} % less than claimed: the uncertainties here are on the safe side"
+        )
+    else:
+        verdict = f"the measurements scatter {ratio:.0f} % more than claimed: the uncertainties here are too small"
+    return f"Variance factor {factor:.2f} with {degrees:.0f} degrees of freedom (expected 1 ± {spread:.2f}): {verdict}."

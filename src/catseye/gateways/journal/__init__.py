@@ -1,0 +1,1 @@
+"""A journal on the way out: tables, FITS, a campaign."""

@@ -1,0 +1,302 @@
+"""A run of a journal, or a part of it, as a campaign directory that `catseye reduce` reads.
+
+What a campaign cannot hold is left out and told: shots without samples, taken in another way than site.toml says, not
+later than the ranger's last, without weather; readings with a silent sensor. The directory is read before it appears.
+"""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from catseye.constants import DEGREE
+from catseye.coordinator.journal_entries import AnsweredShot
+from catseye.coordinator.journal_reader import JournalReader
+from catseye.errors import InputError
+from catseye.gateways.journal.export import seal, stamp
+from catseye.gateways.writers.output import whole_directory
+from catseye.gateways.writers.written import origin
+from catseye.records.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
+from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveWeather
+from catseye.records.shot import Shot
+from catseye.records.site_folder import REFERENCE, SiteFolder, site_files
+from catseye.records.weather import WeatherSample
+
+STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
+MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
+MOST_TOLD = 3  # examples of each reason
+
+
+@dataclass
+class LeftOut:
+    """Why and how often something was left out, and the first few of each."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    examples: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, reason: str, which: str) -> None:
+        self.counts[reason] += 1
+        if self.counts[reason] <= MOST_TOLD:
+            self.examples.setdefault(reason, []).append(which)
+
+    def notes(self) -> list[str]:
+        """One line a reason."""
+        return [
+            f"left out {count}: {reason} ({', '.join(self.examples[reason])}{', ...' if count > MOST_TOLD else ''})"
+            for reason, count in sorted(self.counts.items())
+        ]
+
+
+@dataclass(frozen=True)
+class CampaignExport:
+    """What was written.
+
+    shots, readings   how many
+    left_out          how many of each reason
+    notes             lines for people: what was left out, what was changed
+    """
+
+    shots: int
+    readings: int
+    left_out: dict[str, int]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A shot that goes into the campaign."""
+
+    ticks: int
+    seq: int
+    number: int
+    ranger: str
+    target: str
+    cycles: int
+    samples_per_cycle: int
+
+
+def export_campaign(
+    reader: JournalReader, out: Path, *, run: int, span: tuple[int, int] | None = None
+) -> CampaignExport:
+    """A run's shots, samples and weather in the layout of docs/formats/campaign.md, whole or not at all.
+
+    run    its number
+    span   ticks, the end not in it; all
+
+    Raises InputError: no such run, no shot or weather that a campaign can hold, a directory that is another's.
+    """
+    stored, site = reader.run(run), reader.site(run)
+    left = LeftOut()
+    readings = _readings(reader, run, span, site, left)
+    if not readings:
+        raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
+    chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings))
+    if not chosen:
+        told = "; ".join(left.notes()) or "no shots in the span"
+        raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {told}")
+    notes = left.notes()
+    site = _as_it_stood(reader, run, site, chosen, readings, notes)
+    with whole_directory(out, Path(reader.place)) as directory:
+        for path, text in site_files(site).items():
+            (directory / path).parent.mkdir(exist_ok=True)
+            (directory / path).write_text(text, encoding="utf-8", newline="")
+        for name in ("monuments", "mirrors", "triplets"):  # which must be there, be they empty
+            (directory / name).mkdir(exist_ok=True)
+        (directory / "weather.csv").write_text(_weather_csv(readings), encoding="utf-8", newline="")
+        (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
+        _write_frames(reader, run, chosen, directory / "frames.npy")
+        read_campaign(directory)
+        made = origin(datetime.now(UTC), stored.hashes)
+        seal(directory, reader, {"made_by": "catseye export", **made, "run": stored.uuid, "notes": notes})
+    return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes))
+
+
+def _readings(
+    reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
+) -> list[LiveWeather]:
+    """Whole readings of the site's stations, in order of time, an hour longer than the span."""
+    found: list[LiveWeather] = []
+    for _, entry in reader.events(run, kinds=["weather"]):
+        if isinstance(entry, LiveWeather) and (span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN):
+            found.append(entry)
+    stations = {station.name for station in site.site.weather_station}
+    kept: list[LiveWeather] = []
+    latest: dict[str, int] = {}
+    for read in sorted(found, key=lambda read: read.ticks):
+        which = f"{read.station} at {stamp(read.ticks)}"
+        if read.station not in stations:
+            left.add("a reading of a station that site.toml does not name", which)
+        elif read.ticks <= latest.get(read.station, -1):
+            left.add("a reading not later than its station's last", which)
+        elif problem := _unholdable(read):
+            left.add(problem, which)
+        else:
+            latest[read.station] = read.ticks
+            kept.append(read)
+    return kept
+
+
+def _unholdable(read: LiveWeather) -> str:
+    values = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
+    if not np.isfinite(values).all():
+        return "a reading with a silent sensor"
+    try:
+        t, p, h = values
+        WeatherSample(
+            mjd_utc=read.ticks / TICKS_PER_DAY, station=read.station, temperature_c=t, pressure_mb=p, humidity_pct=h
+        )
+    except ValidationError:
+        return "a reading out of a thermometer's, barometer's or hygrometer's range"
+    return ""
+
+
+def _chosen(
+    reader: JournalReader,
+    run: int,
+    span: tuple[int, int] | None,
+    site: SiteFolder,
+    left: LeftOut,
+    weather: list[int],
+) -> list[Chosen]:
+    """The shots that a campaign holds, in order of time."""
+    refusal = _refusals(site, weather)
+    found: list[Chosen] = []
+    for seq, entry in reader.shots(run):
+        shot = entry.shot
+        if span is not None and not span[0] <= shot.ticks < span[1]:
+            continue
+        if reason := refusal(entry):
+            left.add(reason, f"shot {shot.number} of {shot.ranger}")
+            continue
+        taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
+        found.append(Chosen(shot.ticks, seq, *taken))
+    found.sort(key=lambda shot: (shot.ticks, shot.seq))
+    kept: list[Chosen] = []
+    latest: dict[str, int] = {}
+    for shot_ in found:
+        which = f"shot {shot_.number} of {shot_.ranger}"
+        if shot_.ticks <= latest.get(shot_.ranger, -1):
+            left.add("a shot not later than its ranger's last", which)
+        elif shot_.ticks - found[0].ticks > LONGEST_CAMPAIGN * TICKS_PER_DAY:
+            left.add("a shot more than a day after the first", which)
+        else:
+            latest[shot_.ranger] = shot_.ticks
+            kept.append(shot_)
+    return kept
+
+
+def _refusals(site: SiteFolder, weather: list[int]) -> Callable[[AnsweredShot], str]:
+    """What says why a campaign of a site cannot hold a shot; "" where it can."""
+    rangers, targets = set(site.rangers), set(site.target_names) | {REFERENCE}
+    ranging, adc = site.site.ranging, site.site.adc
+    volts = adc.full_scale_volt / 2**15
+
+    def refusal(entry: AnsweredShot) -> str:
+        shot = entry.shot
+        if shot.samples is None:
+            return "a shot without samples"
+        if len(shot.samples) != shot.cycles * shot.samples_per_cycle:
+            return "a shot with samples missing"
+        if shot.ranger not in rangers or shot.target not in targets or shot.target == shot.ranger:
+            return "a shot of or at what the site does not have"
+        if shot.if_hz != ranging.if_hz or abs(shot.volts_per_code / volts - 1.0) > 1e-9:
+            return "a shot with another if_hz or volts a code than site.toml's"
+        if not weather[0] - MARGIN <= shot.ticks <= weather[-1] + MARGIN:
+            return "a shot without weather within 1 h"
+        try:
+            _row(1, shot.ticks, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, 0)
+        except ValidationError:
+            return "a shot that shots.csv cannot hold"
+        return ""
+
+    return refusal
+
+
+def _as_it_stood(
+    reader: JournalReader,
+    run: int,
+    site: SiteFolder,
+    chosen: list[Chosen],
+    readings: list[LiveWeather],
+    notes: list[str],
+) -> SiteFolder:
+    """The site with the campaign's start and posture, and the stations that spoke."""
+    start, end = chosen[0].ticks, chosen[-1].ticks
+    named: dict[str, object] = {"start_mjd_utc": start / TICKS_PER_DAY}
+    seen = [
+        (entry.azimuth, entry.elevation)
+        for _, entry in reader.events(run, kinds=["postures"])
+        if isinstance(entry, LivePosture) and start <= entry.ticks <= end
+    ]
+    if seen:
+        azimuth, elevation = np.unwrap([s[0] for s in seen]), np.array([s[1] for s in seen])
+        middle = np.median(azimuth), np.median(elevation)
+        named |= {"azimuth_deg": float(middle[0] / DEGREE % 360.0), "elevation_deg": float(middle[1] / DEGREE)}
+        moved = max(np.ptp(azimuth), np.ptp(elevation))
+        if moved > STEADY:
+            notes.append(
+                f"the telescope moved by {moved / DEGREE:.3f} deg: a campaign has one posture, the median's "
+                "(choose a span in which it stood still)"
+            )
+    else:
+        notes.append("no posture was journalled in the span: azimuth and elevation are site.toml's")
+    spoke = {read.station for read in readings}
+    stations = tuple(station for station in site.site.weather_station if station.name in spoke)
+    if silent := sorted({station.name for station in site.site.weather_station} - spoke):
+        notes.append(f"weather stations that said nothing were left out of site.toml: {', '.join(silent)}")
+    posture = site.site.campaign.model_copy(update=named)
+    return replace(site, site=site.site.model_copy(update={"campaign": posture, "weather_station": stations}))
+
+
+def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples_per_cycle: int, frame: int) -> Shot:
+    return Shot(
+        shot=number,
+        mjd_utc=ticks / TICKS_PER_DAY,
+        ranger=ranger,
+        target=target,
+        cycles=cycles,
+        samples_per_cycle=samples_per_cycle,
+        frame=frame,
+    )
+
+
+def _shots_csv(chosen: list[Chosen], notes: list[str]) -> str:
+    """Shots by their numbers; by their seq where numbers are not each once."""
+    numbers = [shot.number for shot in chosen]
+    if len(set(numbers)) < len(numbers) or min(numbers) < 0:
+        numbers = [shot.seq for shot in chosen]
+        notes.append("shot numbers are not each once: shots.csv has the journal's seq instead")
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Shot.model_fields)
+    for frame, (number, shot) in enumerate(zip(numbers, chosen, strict=True)):
+        row = (number, stamp(shot.ticks), shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, frame)
+        writer.writerow(row)
+    return text.getvalue()
+
+
+def _weather_csv(readings: list[LiveWeather]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(WeatherSample.model_fields)
+    for read in readings:
+        values = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
+        writer.writerow((stamp(read.ticks), read.station, *(repr(float(value)) for value in values)))
+    return text.getvalue()
+
+
+def _write_frames(reader: JournalReader, run: int, chosen: list[Chosen], path: Path) -> None:
+    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time."""
+    width = max(shot.cycles * shot.samples_per_cycle for shot in chosen)
+    rows = {shot.seq: row for row, shot in enumerate(chosen)}
+    frames = np.lib.format.open_memmap(path, mode="w+", dtype="<i2", shape=(len(chosen), width))
+    for seq, entry in reader.shots(run):
+        if seq in rows and entry.shot.samples is not None:
+            frames[rows[seq], : len(entry.shot.samples)] = entry.shot.samples
+    frames.flush()

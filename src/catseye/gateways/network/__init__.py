@@ -1,0 +1,1 @@
+"""An adjusted, planned or compared network on the way out."""

@@ -1,0 +1,217 @@
+"""What moved between two adjusted epochs, as JSON and CSV, in the axes of the first epoch's file."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.estimation.comparison import Comparison as Moved
+from catseye.estimation.congruence import VarianceFactor
+from catseye.estimation.deformation import CongruenceTest, Deformation
+from catseye.gateways.network.findings import Findings, in_file_axes
+from catseye.gateways.network.tables import Formats, cell, table
+from catseye.gateways.writers.objects import plain
+from catseye.gateways.writers.passage import Passage
+
+FORMAT = "catseye-comparison-1"
+NAMED = 8  # points told in sentences
+DISPLACEMENTS: Formats = {
+    "point": "",
+    **dict.fromkeys(("x_m", "y_m", "z_m"), ".10f"),
+    **dict.fromkeys(("dx_mm", "dy_mm", "dz_mm", "length_mm", "u_dx_mm", "u_dy_mm", "u_dz_mm"), ".6f"),
+    **dict.fromkeys(("plain_dx_mm", "plain_dy_mm", "plain_dz_mm"), ".6f"),
+    **dict.fromkeys(("statistic", "p", "p_adjusted", "detectable_mm"), ".6g"),
+    "verdict": "",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two epochs and what moved between them.
+
+    first, second   their adjustments
+    moved           of the common points, in x east, y north, z up
+    """
+
+    first: Findings
+    second: Findings
+    moved: Moved
+
+    @property
+    def deformation(self) -> Deformation:
+        return self.moved.deformation
+
+    @property
+    def variance_factor(self) -> VarianceFactor:
+        """That of both epochs together; known (1) or estimated."""
+        return self.moved.variance_factor
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(n,) rows of the common points in the first epoch."""
+        return np.array([self.first.solution.index[name] for name in self.deformation.names], dtype=int)
+
+    @cached_property
+    def displacement(self) -> np.ndarray:
+        """(n, 3) m in the axes of the file."""
+        return in_file_axes(self.first.network, self.deformation.displacement, self.deformation.covariance)[0]
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(n, 3, 3) m^2 likewise."""
+        return in_file_axes(self.first.network, self.deformation.displacement, self.deformation.covariance)[1]
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """(n, 3) m, standard uncertainties of the displacement."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @cached_property
+    def difference(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) and (n, 3, 3): the plain difference of coordinates and its covariance, in the axes of the file."""
+        return in_file_axes(self.first.network, self.moved.difference, self.moved.difference_covariance)
+
+    @cached_property
+    def length(self) -> np.ndarray:
+        """(n,) m, of what is known of the displacement; nan where nothing is."""
+        known = np.isfinite(self.displacement)
+        size = np.sqrt(np.sum(np.where(known, self.displacement, 0.0) ** 2, axis=1))
+        return np.where(known.any(axis=1), size, np.nan)
+
+    @cached_property
+    def verdicts(self) -> list[str]:
+        """One word or two a point: moved, stable, held, not checked."""
+        d = self.deformation
+        return [
+            "held" if held else "moved" if moved else "stable" if np.isfinite(p) else "not checked"
+            for held, moved, p in zip(d.held, d.moved, d.p, strict=True)
+        ]
+
+
+def comparison_object(compared: Comparison) -> dict[str, Any]:
+    """What moved, as `catseye adjust A B --json` gives it; SI units.
+
+    compared   two epochs
+    """
+    d, factor = compared.deformation, compared.variance_factor
+    columns = zip(
+        d.names,
+        compared.displacement,
+        compared.covariance,
+        compared.u,
+        compared.length,
+        *compared.difference,
+        d.statistic,
+        d.p,
+        d.p_adjusted,
+        d.detectable,
+        compared.verdicts,
+        strict=True,
+    )
+    keys = (
+        "displacement",
+        "covariance",
+        "u",
+        "length",
+        "difference",
+        "difference_covariance",
+        "statistic",
+        "p",
+        "p_adjusted",
+        "detectable",
+        "verdict",
+    )
+    return plain(
+        {
+            "format": FORMAT,
+            "status": d.status,
+            "axes": list(compared.first.network.axis_names),
+            "datum": d.datum,
+            "level": d.level,
+            "power": d.power,
+            "words": list(compared.moved.words),
+            "carried": list(compared.moved.carried),
+            "frame": list(compared.moved.frame),
+            "apart": compared.moved.apart,
+            "homogeneity": compared.moved.homogeneity,
+            "variance_factor": factor.value,
+            "variance_factor_degrees_of_freedom": factor.degrees_of_freedom,  # null: taken as known
+            "congruence": {"all": _test(d.before), "stable": _test(d.after)},
+            "moved": [name for name, verdict in zip(d.names, compared.verdicts, strict=True) if verdict == "moved"],
+            "stable": [name for name, verdict in zip(d.names, compared.verdicts, strict=True) if verdict == "stable"],
+            "steps": [vars(step) for step in d.steps],
+            "points": {
+                name: {**dict(zip(keys, rest, strict=True)), "moved": rest[-1] == "moved"} for name, *rest in columns
+            },
+            "epochs": [_epoch(compared.first), _epoch(compared.second)],
+        }
+    )
+
+
+def _test(test: CongruenceTest) -> dict[str, Any]:
+    return {"statistic": test.pvv, "degrees_of_freedom": test.degrees_of_freedom, "p": test.p}
+
+
+def _epoch(found: Findings) -> dict[str, Any]:
+    solution = found.solution
+    return {
+        "source": found.network.source,
+        "status": solution.status,
+        "datum": solution.datum,
+        "variance_factor": solution.variance_factor,
+        "degrees_of_freedom": solution.degrees_of_freedom,
+        "suspects": found.suspects,
+    }
+
+
+def comparison_passages(compared: Comparison) -> list[Passage]:
+    """What moved and what was assumed, in sentences.
+
+    compared   two epochs
+    """
+    d = compared.deformation
+    told = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
+    for i, (name, word) in enumerate(zip(d.names, compared.verdicts, strict=True)):
+        if word == "moved" and len(told) <= NAMED:
+            parts = ", ".join(
+                f"d{axis} {value / MILLIMETRE:+.3f} (u {u / MILLIMETRE:.3f})"
+                for axis, value, u in zip(
+                    compared.first.network.axis_names, compared.displacement[i], compared.u[i], strict=True
+                )
+                if np.isfinite(value)
+            )
+            told.append(Passage(name, f"{parts} mm; by chance p = {d.p[i]:.2g}."))
+    count = compared.verdicts.count("moved")
+    if count > NAMED:
+        told.append(Passage("And more", f"{count - NAMED} more points moved."))
+    words = [word for word in compared.moved.words if word != d.status]
+    return told + ([Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else [])
+
+
+def displacements_csv(compared: Comparison) -> Iterator[str]:
+    """Every common point: where it was, how far it moved, how sure that is.
+
+    compared   two epochs
+    """
+    d = compared.deformation
+    names, x = [cell(name) for name in d.names], compared.first.x[compared.rows]
+    yield from table(
+        DISPLACEMENTS,
+        len(names),
+        lambda part: [
+            names[part],
+            *x[part].T,
+            *(compared.displacement[part].T / MILLIMETRE),
+            compared.length[part] / MILLIMETRE,
+            *(compared.u[part].T / MILLIMETRE),
+            *(compared.difference[0][part].T / MILLIMETRE),
+            d.statistic[part],
+            d.p[part],
+            d.p_adjusted[part],
+            d.detectable[part] / MILLIMETRE,
+            compared.verdicts[part],
+        ],
+    )

@@ -1,0 +1,225 @@
+"""The report of two epochs: what moved, how far, how sure that is; one HTML page that needs nothing else."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from html import escape
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.estimation.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
+from catseye.gateways.network.comparison import Comparison, comparison_passages
+from catseye.gateways.network.figures import Drawn, file_ticks, looking, point_names, scale_bar, thousands, view_frame
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.network.report import network_cards, provenance_section
+from catseye.gateways.network.summary import quantity, verdict
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, STYLE, nice, svg
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+
+CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "Epochs", "provenance": "Provenance"}
+CONFIDENCE = 0.95
+STILL = "#1f5a99"
+SHARE = 0.12  # of the network's extent that the longest displacement or ellipse is drawn as, about
+
+
+def comparison_report(compared: Comparison, when: datetime, inputs: Mapping[str, str]) -> str:
+    """The whole page.
+
+    compared   two epochs
+    when       UTC
+    inputs     SHA-256 of each file read, by its name
+    """
+    first, second = (found.network.source or word for found, word in ((compared.first, "A"), (compared.second, "B")))
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
+    header = (
+        f"<header><h1>{escape(second)} against {escape(first)}: what moved</h1>"
+        f'<div class="faint">{len(compared.deformation.names)} common points, compared by catseye on '
+        f"{when:%Y-%m-%d %H:%M} UTC; displacements are the second epoch less the first, in the axes of "
+        f"{escape(first)}, u = standard uncertainty, 1σ</div><nav>{links}</nav></header>"
+    )
+    d = compared.deformation
+    settings = {"level of the tests": f"{d.level:g}", "power": f"{d.power:g}", "datums may differ by": d.datum}
+    body = [header, _summary(compared), _displacements(compared), _epochs(compared)]
+    return page(f"catseye: {second} against {first}", "\n".join([*body, provenance_section(when, inputs, settings)]))
+
+
+def _summary(compared: Comparison) -> str:
+    d = compared.deformation
+    moved = [i for i, word in enumerate(compared.verdicts) if word == "moved"]
+    cards = [card("Moved", f"{len(moved)} of {len(d.names)}", ", ".join(d.names[i] for i in moved[:6]) or "no point")]
+    if moved:
+        far = max(moved, key=lambda i: compared.length[i])
+        cards.append(card("Farthest", quantity(float(compared.length[far]), "m"), d.names[far]))
+    cards += [
+        card("All points congruent", f"p = {d.before.p:.2g}", _chance(d.before.p, d.level)),
+        card("Stable points congruent", f"p = {d.after.p:.2g}", _chance(d.after.p, d.level)),
+    ]
+    factor = compared.variance_factor
+    known = (
+        "taken as known"
+        if np.isinf(factor.degrees_of_freedom)
+        else f"{factor.degrees_of_freedom:.0f} degrees of freedom"
+    )
+    cards.append(card("Variance factor", f"{factor.value:.3f}", f"of both epochs, {known}"))
+    seen = d.detectable[np.isfinite(d.detectable)]
+    text = f"{d.status[0].upper()}{d.status[1:]}."
+    if len(seen):
+        text += (
+            f" The test of all points finds a displacement of the usual point from "
+            f"{quantity(float(np.median(seen)), 'm')} on, in the direction seen worst, with probability {d.power:g}."
+        )
+    words = "".join(
+        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>"
+        for p in comparison_passages(compared)
+        if p.title == "Assumed"
+    )
+    return section(
+        "summary",
+        CONTENTS["summary"],
+        paragraph(text),
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{words}</dl>" if words else "",
+    )
+
+
+def _chance(p: float, level: float) -> str:
+    return "more than chance explains" if p < level else "no more than chance explains"
+
+
+def _displacements(compared: Comparison) -> str:
+    d, names = compared.deformation, compared.first.network.axis_names
+    drawn = comparison_figures(compared)
+    order = np.argsort(np.nan_to_num(d.p, nan=2.0), kind="stable").tolist()
+    mm = [compared.displacement / MILLIMETRE, compared.u / MILLIMETRE]
+    rows = [
+        (
+            d.names[i],
+            compared.verdicts[i],
+            *(_cell(v, "+.3f") for v in mm[0][i]),
+            _cell(compared.length[i] / MILLIMETRE, ".3f"),
+            " / ".join(_cell(v, ".3f") for v in mm[1][i]),
+            " / ".join(_cell(v, "+.3f") for v in compared.difference[0][i] / MILLIMETRE),
+            _cell(d.statistic[i], ".2f"),
+            _cell(d.p[i], ".2g"),
+            _cell(d.p_adjusted[i], ".2g"),
+            _cell(d.detectable[i] / MILLIMETRE, ".3f"),
+        )
+        for i in order
+    ]
+    columns = ("point", "", *(f"d{n} (mm)" for n in names), "length (mm)", "u (mm)", "plain difference (mm)")
+    return section(
+        "displacements",
+        CONTENTS["displacements"],
+        *(picture(drawn[key].svg, drawn[key].caption) for key in ("plan", "elevation")),
+        paragraph(
+            "Most significant first. p is the chance of such a displacement or a larger one of a point that did not "
+            "move; p of all is corrected for the number of points; the last column is the smallest displacement that "
+            "the test of all points finds. Displacements are the best estimate if the stable points did not move; the "
+            "plain difference is that of the coordinates."
+        ),
+        table((*columns, "statistic", "p", "p of all", "detectable (mm)"), rows, "ttnnnnnnnnnn"),
+    )
+
+
+def _cell(value: float, form: str) -> str:
+    return format(float(value), form) if np.isfinite(value) else "–"
+
+
+def _epochs(compared: Comparison) -> str:
+    parts = []
+    for title, found in (("First epoch", compared.first), ("Second epoch", compared.second)):
+        good, text = verdict(found)
+        parts += [
+            f"<h3>{title}: {escape(found.network.source)}</h3>",
+            paragraph(text, "" if good else "bad"),
+            paragraph(f"Datum: {found.solution.datum}."),
+            f'<div class="cards">{"".join(network_cards(found))}</div>',
+        ]
+    return section("epochs", CONTENTS["epochs"], *parts)
+
+
+def comparison_figures(compared: Comparison) -> dict[str, Drawn]:
+    """Plan and elevation with displacements and their confidence ellipses.
+
+    compared   two epochs
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {"plan": _view(compared, None), "elevation": _view(compared, looking(compared.first))}
+        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+
+
+def _view(compared: Comparison, bearing: float | None) -> tuple[Figure, str]:
+    d, found = compared.deformation, compared.first
+    axes = PLAN if bearing is None else elevation_view(bearing)
+    flat = found.solution.x @ axes.T
+    if bearing is not None:
+        flat[:, 0] -= flat[compared.rows, 0].min()
+    low, high = flat[compared.rows].min(axis=0), flat[compared.rows].max(axis=0)
+    size = max(float(np.max(high - low)), 1e-3)
+    shift, spread = d.displacement @ axes.T, axes @ d.covariance @ axes.T
+    factor = confidence_scale(CONFIDENCE, 2, compared.variance_factor.degrees_of_freedom)
+    shown = ellipse(spread)
+    longest = np.fmax(np.hypot(*shift.T), factor * shown.major)
+    longest = longest[np.isfinite(longest) & (longest > 0.0)]
+    scale = nice(SHARE * size / float(np.max(longest))) if len(longest) else np.nan
+    figure, ax = view_frame(0.5 * (low + high), high - low + (0.16 + 2.0 * SHARE) * size)
+    scale_bar(ax, nice(0.2 * size), scale, "displacements and ellipses")
+    common = np.zeros(len(flat), dtype=bool)
+    common[compared.rows] = True
+    if not common.all():
+        ax.scatter(*flat[~common].T, s=10, c=FAINT, marker="o", lw=0, zorder=2, label="not compared", alpha=0.6)
+    if np.isfinite(scale):
+        _arrows(ax, compared, (flat[compared.rows], scale * shift), (shown, scale * factor))
+    point_names(ax, found, np.where(common[:, None], flat, np.nan))
+    _labels(ax, found, bearing)
+    figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
+    view = "Plan." if bearing is None else f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
+    if not np.isfinite(scale):
+        return figure, f"{view} No displacement is known in this view."
+    return figure, (
+        f"{view} Arrows: displacements; outlines: their {100 * CONFIDENCE:g} % confidence ellipses about no "
+        f"displacement; both enlarged {thousands(scale)} times. A point is judged by all of its coordinates together."
+    )
+
+
+def _arrows(ax: Any, compared: Comparison, drawn: tuple[np.ndarray, np.ndarray], shape: tuple[Any, float]) -> None:
+    """Displacements and ellipses by verdict."""
+    (base, shift), (shown, scale) = drawn, shape
+    verdicts = np.array(compared.verdicts)
+    for word, colour in (("stable", STILL), ("moved", BAD)):
+        mine = (verdicts == word) & np.isfinite(shift).all(axis=1)
+        if not mine.any():
+            continue
+        ax.add_collection(
+            EllipseCollection(
+                2 * scale * shown.major[mine], 2 * scale * shown.minor[mine], 90.0 - shown.bearing[mine] / DEGREE,
+                units="xy", offsets=base[mine], offset_transform=ax.transData, facecolors=f"{colour}18",
+                edgecolors=colour, linewidths=0.7, zorder=2,
+            )
+        )  # fmt: skip
+        ax.quiver(
+            *base[mine].T, *shift[mine].T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0022,
+            headwidth=4.0, headlength=5.0, headaxislength=4.5, minlength=0.1, zorder=4,
+        )  # fmt: skip
+        ax.scatter(*base[mine].T, s=5, c=colour, lw=0, zorder=3, label=word)
+    for word, marker in (("held", "s"), ("not checked", "o")):
+        mine = verdicts == word
+        if mine.any():
+            ax.scatter(
+                *base[mine].T, s=20, facecolors="white", edgecolors=INK, marker=marker, lw=0.9, zorder=3, label=word
+            )
+
+
+def _labels(ax: Any, found: Findings, bearing: float | None) -> None:
+    if bearing is None:
+        file_ticks(ax.xaxis, found, 0, "east", "west")
+        file_ticks(ax.yaxis, found, 1, "north", "south")
+    else:
+        ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
+        file_ticks(ax.yaxis, found, 2, "up", "down")

@@ -1,0 +1,333 @@
+"""Figures of an adjusted network as SVG text: plan, elevation, residuals, redundancy. Dense parts are rasterised."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.estimation.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
+
+STATION, TARGET, HELD, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
+DENSE = 300  # points or marks from which they are rasterised, and only some are named
+LINES = 2_500  # observations drawn as lines at most
+NAMED = 45  # points named at most
+LOOSE = 20.0  # times the usual ellipse: beyond it none is drawn
+SHARE = 0.05  # of the network's extent that the usual ellipsoid's longest axis is drawn as, where points are few
+RASTER = 144  # dots an inch
+WIDTH = 9.4  # inches, of every figure
+ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (0.8, 0.8), (-0.8, 0.8), (0.8, -0.8), (-0.8, -0.8)])
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure and what its caption has to say."""
+
+    svg: str
+    caption: str
+
+
+def network_figures(found: Findings) -> dict[str, Drawn]:
+    """Plan, elevation, residuals and redundancy by name, in the axes x east, y north, z up.
+
+    found   what is told of a solution
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {"plan": _view(found, None), "elevation": _view(found, looking(found))}
+        if np.isfinite(found.table.standardised).any():
+            drawn |= {"residuals": _residuals(found), "redundancy": _redundancy(found)}
+        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+
+
+def looking(found: Findings) -> float:
+    """Bearing along which the elevation is seen, rad, a whole degree: across the network's longest extent in plan.
+
+    found   what is told of a solution
+    """
+    level = found.solution.x[:, :2] - np.nanmean(found.solution.x[:, :2], axis=0)
+    spread = level.T @ level
+    if not np.isfinite(spread).all():
+        return 0.0
+    longest = 0.5 * np.arctan2(2.0 * spread[0, 1], spread[1, 1] - spread[0, 0])  # clockwise from north
+    round_plan = np.hypot(2.0 * spread[0, 1], spread[1, 1] - spread[0, 0]) < 0.1 * np.trace(spread)
+    across = 0.0 if round_plan else longest - 0.5 * np.pi
+    return float(np.round(across / DEGREE) % 180.0 * DEGREE)
+
+
+def enlargement(found: Findings) -> float:
+    """How many times larger than the network the ellipsoids are drawn, 1, 2 or 5 times a power of ten; nan for none.
+
+    found   what is told of a solution
+
+    The usual ellipsoid's longest axis becomes some hundredths of the network's extent, less where points are many.
+    """
+    longest = found.ellipsoid.semi_axes[:, 0]
+    known = longest[np.isfinite(longest) & (longest > 0.0)]
+    if not len(known):
+        return np.nan
+    share = SHARE / (1.0 + np.sqrt(len(known) / 150.0))
+    return nice(share * max(float(np.ptp(found.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
+
+
+def _view(found: Findings, bearing: float | None) -> tuple[Figure, str]:
+    """Points, lines of observations and ellipses, seen from above or along a bearing."""
+    solution = found.solution
+    axes = PLAN if bearing is None else elevation_view(bearing)
+    flat = solution.x @ axes.T
+    known = np.isfinite(flat).all(axis=1)
+    if bearing is not None:
+        flat[:, 0] -= flat[known, 0].min(initial=np.inf if known.any() else 0.0)
+    low, high = (flat[known].min(axis=0), flat[known].max(axis=0)) if known.any() else (np.zeros(2), np.ones(2))
+    size = max(float(np.max(high - low)), 1e-3)
+    figure, ax = view_frame(0.5 * (low + high), high - low + 0.16 * size)
+    lines = _lines(ax, found, flat)
+    scale = enlargement(found)
+    loose, ellipses = _ellipses(ax, found, flat, ellipse(projected(solution.covariance * found.factor, axes)), scale)
+    scale_bar(ax, nice(0.2 * size), scale)
+    _marks(ax, found, flat, loose)
+    point_names(ax, found, flat)
+    if bearing is None:
+        file_ticks(ax.xaxis, found, 0, "east", "west")
+        file_ticks(ax.yaxis, found, 1, "north", "south")
+        words = "Plan."
+    else:
+        ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
+        file_ticks(ax.yaxis, found, 2, "up", "down")
+        words = f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
+    figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
+    return figure, " ".join([words, ellipses, lines])
+
+
+def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
+    """A figure of the usual width with one pair of axes, equally scaled, that holds a span about a centre."""
+    left, right, low, high = 0.8, 0.15, 0.85, 0.45  # inches beside the axes
+    wide = WIDTH - left - right
+    tall = float(np.clip(wide * span[1] / span[0], 1.6, 8.4))
+    figure = Figure(figsize=(WIDTH, tall + low + high), dpi=RASTER)
+    ax = figure.add_axes((left / WIDTH, low / (tall + low + high), wide / WIDTH, tall / (tall + low + high)))
+    metres = max(span[0] / wide, span[1] / tall)  # to the inch
+    half = 0.5 * metres * np.array([wide, tall])
+    ax.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
+    ax.set_aspect("equal")
+    return figure, ax
+
+
+def file_ticks(axis: Any, found: Findings, k: int, word: str, opposite: str) -> None:
+    """Ticks that read the file's own coordinate, whichever way it counts."""
+    axes = found.network.axes
+    j = int(np.argmax(np.abs(axes[k])))
+    sign = axes[k, j]
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{sign * value + 0.0:g}".replace("-", "\u2212")))
+    axis.set_label_text(f"{found.network.axis_names[j]}, {word if sign > 0.0 else opposite} (m)")
+
+
+def _lines(ax: Any, found: Findings, flat: np.ndarray) -> str:
+    """Thin lines of the active observations; the caption's sentence."""
+    table = found.table
+    start, end = table.ends[table.active, 0], table.ends[table.active, 1]
+    both = (start >= 0) & (end >= 0)
+    pairs = np.unique(np.sort(np.stack([start[both], end[both]], axis=1), axis=1), axis=0)
+    pairs = pairs[np.isfinite(flat[pairs]).all(axis=(1, 2))]
+    if not len(pairs):
+        return "No lines: no observation joins two points."
+    every = max(1, int(np.ceil(len(pairs) / LINES)))
+    # a fixed scatter over the pairs, or a whole station would lose or keep all of its lines
+    drawn = pairs[np.random.default_rng(len(pairs)).permutation(len(pairs))[::every]]
+    few = len(drawn) < DENSE
+    ends = np.full((len(drawn), 3, 2), np.nan)
+    ends[:, :2] = flat[drawn]
+    ax.plot(*ends.reshape(-1, 2).T, color=FAINT, lw=0.7 if few else 0.2, alpha=0.5 if few else 0.35, zorder=1)
+    ax.plot([], [], color=FAINT, lw=0.8, label="observed")
+    return "Thin lines: observations." if every == 1 else f"Thin lines: one in {every} of {len(pairs)} observed pairs."
+
+
+def _ellipses(ax: Any, found: Findings, flat: np.ndarray, shown: Ellipse, scale: float) -> tuple[np.ndarray, str]:
+    """Outlines of the standard ellipsoids to scale; which points (n,) have none, and the caption's sentence."""
+    known = np.isfinite(shown.major)
+    if not np.isfinite(scale):
+        return ~known, "No ellipsoids: nothing is known of the uncertainties."
+    usual = float(np.median(shown.major[known & (shown.major > 0.0)]))
+    loose = ~known | (shown.major > LOOSE * usual)
+    held = np.flatnonzero(~loose & (shown.major > 0.0))
+    colour = np.where(found.stations[held], STATION, TARGET)
+    many = len(held) > DENSE
+    ax.add_collection(
+        EllipseCollection(
+            2 * scale * shown.major[held], 2 * scale * shown.minor[held], 90.0 - shown.bearing[held] / DEGREE,
+            units="xy", offsets=flat[held], offset_transform=ax.transData, facecolors=[f"{c}20" for c in colour],
+            edgecolors=list(colour), linewidths=0.35 if many else 0.7, zorder=3, rasterized=many,
+        )
+    )  # fmt: skip
+    kind = "variance factor applied" if found.scaled else "a priori"
+    return loose, f"Outlines: standard ellipsoids (1σ, {kind}), enlarged {thousands(scale)} times."
+
+
+def thousands(value: float) -> str:
+    return f"{value:,.0f}".replace(",", "\u2009")
+
+
+def scale_bar(ax: Any, length: float, scale: float, what: str = "ellipsoids") -> None:
+    """A bar above the axes with its length on the ground and, in what is enlarged, as it was before."""
+    left, right = ax.get_xlim()
+    share = length / (right - left)
+    box = ax.get_position().height * ax.figure.get_figheight()
+    high = 1.0 + 0.16 / box
+    ax.plot([0.0, share], [high, high], lw=2.2, solid_capstyle="butt", transform=ax.transAxes, clip_on=False, color=INK)
+    text = f"{length:g} m"
+    if np.isfinite(scale):
+        text += f"; in the {what}, enlarged {thousands(scale)} times, {_length(length / scale)}"
+    ax.annotate(
+        text, (share, high), xycoords="axes fraction", xytext=(7, 0), textcoords="offset points", va="center",
+        fontsize=8.5, color=FAINT,
+    )  # fmt: skip
+
+
+def _length(value: float) -> str:
+    """A small length with the unit that suits it.
+
+    >>> _length(2e-4), _length(2e-6)
+    ('0.2 mm', '2 µm')
+    """
+    return f"{value / MILLIMETRE:g} mm" if value >= 0.1 * MILLIMETRE else f"{value * 1e6:g} µm"
+
+
+def _marks(ax: Any, found: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
+    """Stations, targets, held and loose points, each with a mark of its own."""
+    held = found.network.points.fixed.all(axis=1)
+    many = len(flat) > DENSE
+    for mine, marker, colour, area, name in (
+        (~found.stations & ~held & ~loose, "o", TARGET, 4 if many else 12, "target"),
+        (found.stations & ~held & ~loose, "^", STATION, 26, "station"),
+        (~found.stations & held, "s", HELD, 20, "held point"),
+        (found.stations & held, "^", HELD, 26, "held station"),
+    ):
+        if mine.any():
+            ax.scatter(*flat[mine].T, s=area, c=colour, marker=marker, lw=0, zorder=4, label=name, rasterized=many)
+    if loose.any() and found.answered:
+        ax.scatter(
+            *flat[loose].T, s=26, facecolors="white", edgecolors=BAD, lw=1.2, zorder=4,
+            label=f"no ellipsoid: over {LOOSE:g} times the usual",
+        )  # fmt: skip
+    elif loose.any():
+        ax.scatter(*flat[loose].T, s=20, facecolors="white", edgecolors=FAINT, lw=1.0, zorder=4, label="not adjusted")
+    chosen = found.network.points.datum.any(axis=1)
+    if chosen.any() and not chosen.all() and not many:
+        ax.scatter(*flat[chosen].T, s=85, facecolors="none", edgecolors=SERIES[4], lw=0.8, zorder=3, label="datum")
+
+
+def point_names(ax: Any, found: Findings, flat: np.ndarray) -> None:
+    """Names where there is room for them, stations first; each beside its point where it covers least."""
+    order = [*np.flatnonzero(found.stations), *np.flatnonzero(~found.stations)]
+    order = [i for i in order if np.isfinite(flat[i]).all()]
+    chosen = order if len(order) <= NAMED else [i for i in order if found.stations[i]][:NAMED]
+    if not chosen:
+        return
+    where = ax.transData.transform(flat[chosen])
+    outward = where - where.mean(axis=0)
+    outward /= np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
+    point = ax.figure.dpi / 72.0
+    taken = [*np.concatenate([where - 4.0 * point, where + 4.0 * point], axis=1)]  # left, low, right, high
+    for i, at, out in zip(chosen, where, outward, strict=True):
+        half = point * np.array([2.5 * len(found.names[i]), 4.0])
+        centres = at + ROUND * (6.0 * point + half)
+        boxes = np.concatenate([centres - half, centres + half], axis=1)
+        cost = _overlap(boxes, np.array(taken)) - point * ROUND @ out
+        best = int(np.argmin(cost))
+        taken.append(boxes[best])
+        ax.annotate(
+            found.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
+            va="center", fontsize=7.5, zorder=5, color=STATION if found.stations[i] else INK,
+            path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )  # fmt: skip
+
+
+def _overlap(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(k,) area that each of k boxes shares with others; boxes are left, low, right, high."""
+    low = np.maximum(boxes[:, None, :2], others[:, :2])
+    high = np.minimum(boxes[:, None, 2:], others[:, 2:])
+    return np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
+
+
+def _residuals(found: Findings) -> tuple[Figure, str]:
+    """Standardised residuals in the order of the file, and their histogram against the normal distribution."""
+    table = found.table
+    shown = np.flatnonzero(np.isfinite(found.statistic))
+    w = found.statistic[shown]
+    figure = Figure(figsize=(WIDTH, 3.9), dpi=RASTER)
+    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    figure.subplots_adjust(left=0.065, right=0.985, bottom=0.21, top=0.91, wspace=0.17)
+    span = max(1.25 * (found.critical if np.isfinite(found.critical) else 4.0), 4.0)
+    inside = np.abs(w) <= span
+    many = len(w) > 5 * DENSE
+    for k, kind in enumerate(table.kinds):
+        mine = inside & (table.kind[shown] == k)
+        if mine.any():
+            left.scatter(
+                shown[mine], w[mine], s=2 if many else 10, c=SERIES[k % len(SERIES)], lw=0, alpha=0.5 if many else 0.8,
+                rasterized=many, label=kind.replace("_", " "),
+            )  # fmt: skip
+    if not inside.all():
+        far = w[~inside]
+        left.scatter(
+            shown[~inside], np.clip(far, -0.97 * span, 0.97 * span), s=26, c=BAD, marker="D", lw=0, zorder=3,
+            label=f"beyond the edge, to {np.max(np.abs(far)):.3g}",
+        )  # fmt: skip
+    for limit in (-found.critical, found.critical):
+        left.axhline(limit, color=BAD, lw=0.8, ls="--")
+    left.set_ylim(-span, span)
+    left.set_title("Every tested observation")
+    left.set_xlabel("number in the file")
+    left.set_ylabel(f"test statistic {'τ' if found.test == 'tau' else 'w'}")
+    figure.legend(
+        *left.get_legend_handles_labels(),
+        loc="lower left",
+        bbox_to_anchor=(0.05, 0.0),
+        ncols=5,
+        markerscale=3 if many else 1,
+    )
+    step = 0.4 if len(w) < 2000 else 0.2
+    edges = np.arange(-4.0, 4.0 + 1e-9, step)
+    right.hist(np.clip(w, -3.999, 3.999), edges, color=PALE, alpha=0.8, label="observed")
+    t = np.linspace(-4.0, 4.0, 161)
+    right.plot(t, len(w) * step * np.exp(-0.5 * t**2) / np.sqrt(2 * np.pi), color=INK, lw=1.2, label="normal")
+    right.set_title("Against the normal")
+    right.set_xlabel("the same; beyond 4 in the last bins")
+    right.set_ylabel("observations")
+    right.legend(loc="upper left", handlelength=1.2)
+    right.set_ylim(top=right.get_ylim()[1] * 1.25)
+    return figure, (
+        f"Left: test statistics of {len(w)} observations; dashed: ±{found.critical:.2f}, beyond which an observation "
+        f"is suspect (level {found.level:g} for all of them together). Right: their histogram, and the normal "
+        "distribution that the claimed uncertainties predict."
+    )
+
+
+def _redundancy(found: Findings) -> tuple[Figure, str]:
+    """How much of an error each observation would show, kind by kind."""
+    table = found.table
+    active = table.active & np.isfinite(table.redundancy)
+    kinds = [k for k in range(len(table.kinds)) if (active & (table.kind == k)).any()]
+    figure = Figure(figsize=(WIDTH, 2.6))
+    ax = figure.add_axes((0.085, 0.2, 0.9, 0.66))
+    parts = [np.clip(table.redundancy[active & (table.kind == k)], 0.0, 1.0) for k in kinds]
+    colours = [SERIES[k % len(SERIES)] for k in kinds]
+    names = [table.kinds[k].replace("_", " ") for k in kinds]
+    ax.hist(parts, np.linspace(0.0, 1.0, 41).tolist(), stacked=True, color=colours, label=names, alpha=0.85)
+    ax.axvspan(0.0, 0.1, color=GRID, alpha=0.7, zorder=0, lw=0)
+    ax.set_xlim(0.0, 1.0)
+    ax.set_xlabel("redundancy number: share of an error that shows in the observation's own residual")
+    ax.set_ylabel("observations")
+    figure.legend(*ax.get_legend_handles_labels(), loc="upper right", ncols=5)
+    return figure, (
+        "Redundancy numbers. In the grey zone, below 0.1, an observation is hardly checked: nine tenths of an error "
+        "in it would go into the coordinates."
+    )

@@ -1,0 +1,106 @@
+"""All files of an adjusted network, or of two epochs compared, written into a directory."""
+
+import hashlib
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from catseye.gateways.network.comparison import FORMAT as COMPARISON
+from catseye.gateways.network.comparison import Comparison, comparison_object, displacements_csv
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.network.objects import FORMAT, network_json
+from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
+from catseye.gateways.network.xml import network_xml
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.written import Files, Progress, origin, write_files
+
+if TYPE_CHECKING:
+    from catseye.reduction.network import Adjusted
+
+
+def input_hashes(source: Path) -> dict[str, str]:
+    """SHA-256 of a network's file, or of the tables in its folder, by name.
+
+    source   a file, or a folder with points.csv and ranges.csv
+    """
+    files = sorted(source.glob("*.csv")) if source.is_dir() else [source]
+    return {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
+
+
+def write_network(
+    found: Findings,
+    directory: Path,
+    inputs: Mapping[str, str],
+    progress: Progress | None = None,
+    *,
+    treated: "Adjusted | None" = None,
+) -> None:
+    """Tables, objects, report, and last the provenance with the hashes of the others.
+
+    found       what is told of a solution
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    inputs      SHA-256 of each file read, by its name, see `input_hashes`
+    progress    told of each file
+    treated     how observations were treated, where that was asked for
+    """
+    when = datetime.now(UTC)
+    made = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(found)}
+    write_files(_files(found, when, inputs, treated=treated), directory, {**made, **origin(when, inputs)}, progress)
+
+
+def write_comparison(
+    compared: Comparison, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """What moved, then the files of each epoch with its number before their names, last the provenance.
+
+    compared    two epochs
+    directory   exists, and is ours to fill
+    inputs      SHA-256 of each file read, by its name
+    progress    told of each file
+    """
+    from catseye.gateways.network.comparison_report import comparison_report
+
+    when = datetime.now(UTC)
+    files: Files = {
+        "displacements.csv": lambda: displacements_csv(compared),
+        "comparison.json": lambda: [json_page(comparison_object(compared))],
+        "report.html": lambda: [comparison_report(compared, when, inputs)],
+        **_files(compared.first, when, inputs, prefix="epoch-1-"),
+        **_files(compared.second, when, inputs, prefix="epoch-2-"),
+    }
+    d = compared.deformation
+    settings = {
+        **_settings(compared.first),
+        "displacement_level": d.level,
+        "displacement_power": d.power,
+        "datums_may_differ_by": d.datum,
+        "variance_factor": compared.variance_factor.value,
+    }
+    made = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+
+
+def _settings(found: Findings) -> dict[str, Any]:
+    return {"level": found.level, "scaled": found.scaled, "test": found.test, "datum": found.solution.datum}
+
+
+def _files(
+    found: Findings,
+    when: datetime,
+    inputs: Mapping[str, str],
+    *,
+    prefix: str = "",
+    treated: "Adjusted | None" = None,
+) -> Files:
+    from catseye.gateways.network.report import network_report  # matplotlib is heavy
+
+    files: Files = {
+        "coordinates.csv": lambda: coordinates_csv(found),
+        "observations.csv": lambda: observations_csv(found),
+        "parameters.csv": lambda: parameters_csv(found),
+        "adjustment.json": lambda: network_json(found, lines=True, treated=treated),
+        "adjustment.xml": lambda: network_xml(found),
+        "report.html": lambda: [network_report(found, when, inputs, prefix=prefix, treated=treated)],
+    }
+    return {prefix + name: pieces for name, pieces in files.items()}

@@ -1,0 +1,244 @@
+"""An adjusted network as JSON: SI units, in the axes of its file; null for what is not a number or not known.
+
+Written in pieces of some thousand rows, so that a million observations need no more memory than their columns.
+"""
+
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catseye.estimation.adjustment import NONCENTRALITY
+from catseye.gateways.network.findings import MEASURES, ROLES, Findings
+from catseye.gateways.writers.objects import plain
+
+if TYPE_CHECKING:
+    from catseye.reduction.network import Adjusted
+
+FORMAT = "catseye-adjustment-1"
+PIECE = 5_000  # rows of a piece
+
+
+def network_object(found: Findings, treated: "Adjusted | None" = None) -> dict[str, Any]:
+    """An adjusted network as `catseye adjust --json` gives it, whole.
+
+    found     what is told of a solution
+    treated   how its observations were treated, where that was asked for
+
+    Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test at 0.1 % with
+    power 80 %; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of tests. `from`, `to`,
+    `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters stand in x east, y north,
+    z up.
+    """
+    points = {name: value for low in _starts(len(found.names)) for name, value in _points(found, low)}
+    observations = [
+        dict(zip(columns, values, strict=True))
+        for low in _starts(len(found.table))
+        if (columns := _observations(found, low, treated))
+        for values in zip(*columns.values(), strict=True)
+    ]
+    return {**_head(found, treated), "points": points, "observations": observations}
+
+
+def network_json(found: Findings, *, lines: bool = False, treated: "Adjusted | None" = None) -> Iterator[str]:
+    """The text of `network_object` in pieces.
+
+    found     what is told of a solution
+    treated   how its observations were treated, where that was asked for
+    lines     a line for each entry, for reading; else all on one line, for programs
+
+    >>> from itertools import chain
+    >>> list(chain(_joined(iter([["a", "b"], ["c"]]), ", ")))
+    ['a, b', ', c']
+    """
+    end, deep = ("\n", "    ") if lines else ("", "")
+    comma = f",{end}{deep}" if lines else ", "
+    head = (",\n  " if lines else ", ").join(f"{json.dumps(k)}: {_text(v)}" for k, v in _head(found, treated).items())
+    yield f'{{{end}{"  " if lines else ""}{head},{end or " "}{"  " if lines else ""}"points": {{{end}{deep}'
+    points = ([f"{json.dumps(k)}: {_text(v)}" for k, v in _points(found, low)] for low in _starts(len(found.names)))
+    yield from _joined(points, comma)
+    yield f'{end}{"  " if lines else ""}}},{end or " "}{"  " if lines else ""}"observations": [{end}{deep}'
+    yield from _joined((_row_texts(_observations(found, low, treated)) for low in _starts(len(found.table))), comma)
+    yield f"{end}{'  ' if lines else ''}]{end}}}{end}"
+
+
+_text = json.JSONEncoder(allow_nan=False).encode
+_quoted = json.encoder.encode_basestring_ascii
+
+
+def _joined(pieces: Iterator[list[str]], comma: str) -> Iterator[str]:
+    first = True
+    for piece in pieces:
+        yield ("" if first else comma) + comma.join(piece)
+        first = False
+
+
+def _starts(count: int) -> range:
+    return range(0, count, PIECE)
+
+
+def _head(found: Findings, treated: "Adjusted | None") -> dict[str, Any]:
+    """All but the points and the observations."""
+    solution, whole = found.solution, found.whole
+    degrees = solution.degrees_of_freedom
+    return plain(
+        {
+            "format": FORMAT,
+            "source": found.network.source,
+            "description": found.network.description,
+            "status": solution.status,
+            "datum": solution.datum,
+            "axes": list(found.network.axis_names),
+            "iterations": solution.iterations,
+            "approximate": list(solution.approximate),
+            "variance_factor": solution.variance_factor,
+            "degrees_of_freedom": degrees,
+            "scaled": found.scaled,
+            "chi_square": {
+                "statistic": whole.factor * degrees,
+                "degrees": degrees,
+                "lower": whole.lower * degrees,
+                "upper": whole.upper * degrees,
+                "p": whole.p,
+                "passed": whole.lower <= whole.factor <= whole.upper if np.isfinite(whole.p) else None,
+                "level": found.level,
+                "verdict": whole.verdict,
+            },
+            "critical": {
+                "test": found.test,
+                "level": found.level,
+                "level_single": found.level_single,
+                "value": found.critical,
+                "noncentrality": NONCENTRALITY,
+            },
+            "treatment": None if treated is None else _treatment(found, treated),
+            "relative": [
+                {
+                    "from": r.first,
+                    "to": r.second,
+                    "distance": r.distance,
+                    "u_distance": r.u_distance,
+                    "covariance": r.covariance,
+                    "ellipsoid": {"semi_axes": r.ellipsoid.semi_axes, "directions": r.ellipsoid.directions.T},
+                }
+                for r in found.relative
+            ],
+            "suspects": found.suspects,
+            "unchecked": np.flatnonzero(found.table.active & ~found.table.checked),
+            "parameters": {
+                p.name: {"value": value, "u": u, "unit": p.unit, "prior_u": p.sigma}
+                for p, value, u in zip(found.network.parameters, solution.parameters, found.u_parameters, strict=True)
+            },
+        }
+    )
+
+
+def _treatment(found: Findings, treated: "Adjusted") -> dict[str, Any]:
+    """What was left out or weighed down, by rows of the observations; and estimated components of variance."""
+    sign, components = found.table.sign, treated.components
+    rejections = []
+    for rejection in treated.rejections:
+        row = found.row_of(rejection.group, rejection.row)
+        rejections.append(
+            {
+                "observation": row,
+                "statistic": sign[row] * rejection.statistic,
+                "estimated_error": sign[row] * rejection.estimated_error,
+                "margin": rejection.margin,
+                "rival": None if rejection.rival is None else found.row_of(*rejection.rival),
+            }
+        )
+    return {
+        "method": treated.treatment,
+        "rejected": np.flatnonzero(found.in_table(treated.rejected)),
+        "undecided": np.flatnonzero(found.in_table(treated.undecided)),
+        "rejections": rejections,
+        "variance_components": None
+        if components is None
+        else {
+            name: {"value": value, "u": u}
+            for name, value, u in zip(components.names, components.values, components.u, strict=True)
+        },
+        "notes": list(treated.notes),
+    }
+
+
+def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and object of the points from row `low` on, a piece of them."""
+    part = slice(low, low + PIECE)
+    axes, names = np.abs(found.network.axes), np.array(found.network.axis_names)
+    fixed, datum = ((flags[part] @ axes) > 0.0 for flags in (found.network.points.fixed, found.network.points.datum))
+    columns = (
+        found.names[part],
+        _numbers(found.x[part]),
+        _numbers(found.u[part]),
+        _numbers(found.covariance[part]),
+        _numbers(found.ellipsoid.semi_axes[part]),
+        _numbers(np.swapaxes(found.ellipsoid.directions[part], 1, 2)),
+        fixed,
+        datum,
+        found.seen[part].tolist(),
+    )
+    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, seen in zip(*columns, strict=True):
+        yield (
+            name,
+            {
+                "x": x,
+                "y": y,
+                "z": z,
+                "u": u,
+                "covariance": covariance,
+                "ellipsoid": {"semi_axes": semi_axes, "directions": directions},
+                "fixed": names[held].tolist(),
+                "datum": names[chosen].tolist(),
+                "observations": seen,
+            },
+        )
+
+
+def _observations(found: Findings, low: int, treated: "Adjusted | None") -> dict[str, list[Any]]:
+    """Columns of the observations from row `low` on, a piece of them."""
+    table, part = found.table, slice(low, low + PIECE)
+    names = [*found.names, None]  # the last one for none, which is -1
+    columns: dict[str, list[Any]] = {"kind": [table.kinds[k] for k in table.kind[part].tolist()]}
+    for role, end in zip(ROLES, table.ends.T, strict=True):
+        if role in ROLES[:2] or np.any(end >= 0):
+            columns[role] = [names[i] for i in end[part].tolist()]
+    if np.any(table.component != ""):
+        columns["component"] = [c or None for c in table.component[part].tolist()]
+    columns["unit"] = table.unit[part].tolist()
+    columns |= {name: _numbers(getattr(table, name)[part]) for name in MEASURES}
+    columns |= {"test": _numbers(found.statistic[part]), "p": _numbers(found.p[part])}
+    columns |= {"active": table.active[part].tolist(), "checked": table.checked[part].tolist()}
+    if treated is not None:
+        columns["weight"] = _numbers(found.in_table(treated.weights)[part])
+    groups, places = [g.name for g in found.network.groups], found.network.places
+    at = list(zip(table.group[part].tolist(), table.row[part].tolist(), strict=True))
+    columns["group"] = [groups[g] for g, _ in at]
+    columns["place"] = [places[g][r] if places and places[g] else None for g, r in at]
+    return columns
+
+
+def _row_texts(columns: dict[str, list[Any]]) -> list[str]:
+    """The rows of columns as JSON objects, a template filled: three times as fast as an object each."""
+    codes, texts = zip(*(_column_texts(values) for values in columns.values()), strict=True)
+    template = "{" + ", ".join(f"{json.dumps(key)}: {code}" for key, code in zip(columns, codes, strict=True)) + "}"
+    return [template % row for row in zip(*texts, strict=True)]
+
+
+def _column_texts(values: list[Any]) -> tuple[str, list[Any]]:
+    """How a column of numbers, truths or texts, with None, is written in JSON, and what is put there."""
+    types = set(map(type, values))
+    if types == {float}:
+        return "%r", values
+    if types == {bool}:
+        return "%s", ["true" if value else "false" for value in values]
+    return "%s", ["null" if v is None else repr(v) if isinstance(v, float) else _quoted(v) for v in values]
+
+
+def _numbers(values: np.ndarray) -> list[Any]:
+    """Nested lists, None for what is not finite."""
+    if np.isfinite(values).all():
+        return values.tolist()
+    return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()

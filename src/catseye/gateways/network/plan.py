@@ -1,0 +1,322 @@
+"""A planned network as JSON, CSV and a report: what it will be worth, where it is weak, what to measure next."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.estimation.monte_carlo import Scatter
+from catseye.estimation.plan import Candidate, Plan
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.network.objects import network_object
+from catseye.gateways.network.summary import direction_words, quantity
+from catseye.gateways.network.tables import coordinates_csv
+from catseye.gateways.writers.objects import json_page, plain
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.written import Files, origin, write_files
+
+FORMAT = "catseye-plan-1"
+LISTED = 10  # weakest points, and observations that hold most, in text and report
+CONTENTS = {
+    "summary": "Summary",
+    "network": "Network",
+    "weakest": "Weakest points",
+    "next": "What to measure next",
+    "observations": "What each observation holds",
+    "paper": "Measured on paper",
+    "provenance": "Provenance",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PlanFindings:
+    """What is told of a plan.
+
+    found     of its predicted solution
+    plan      see there
+    picked    the schedule of further ranges, empty where no budget was given
+    scatter   of measuring on paper, where asked
+    """
+
+    found: Findings
+    plan: Plan
+    picked: tuple[Candidate, ...]
+    scatter: Scatter | None
+
+    @property
+    def weakest(self) -> np.ndarray:
+        """(k,) rows of the points, the least known first; held ones left out."""
+        order = np.argsort(-self.plan.weakest, kind="stable")
+        return order[self.plan.weakest[order] > 0.0]
+
+    @property
+    def worth(self) -> np.ndarray:
+        """(m,) m, of every observation in the order of the table."""
+        offset = np.cumsum([0, *(len(w) for w in self.plan.worth)])
+        return np.concatenate([np.zeros(0), *self.plan.worth])[offset[self.found.table.group] + self.found.table.row]
+
+
+def plan_object(told: PlanFindings) -> dict[str, Any]:
+    """A plan as `catseye plan --json` gives it: the keys of an adjustment, predicted, and those of the plan."""
+    plan, found = told.plan, told.found
+    base = network_object(found)
+    for row, worth in zip(base["observations"], plain(told.worth.tolist()), strict=True):
+        for key in ("observed", "residual", "standardised", "estimated_error", "test", "p"):
+            row[key] = None  # not measured yet
+        row["worth"] = worth
+    names, axes = found.names, found.network.axes
+    extra = {
+        "format": FORMAT,
+        "status": "planned",
+        "suspects": [],
+        "variance_factor": None,
+        "mean_u": plan.mean_u,
+        "interest": [name for name, chosen in zip(names, plan.interest, strict=True) if chosen],
+        "weakest": [
+            {"point": names[i], "u": plan.weakest[i], "direction": (plan.direction[i] @ axes).tolist()}
+            for i in told.weakest
+        ],
+        "candidates": [_candidate(c, scheduled=False) for c in plan.candidates],
+        "best_next": _candidate(plan.candidates[0], scheduled=False) if plan.candidates else None,
+        "schedule": [_candidate(c, scheduled=True) for c in told.picked],
+        "monte_carlo": _scatter(told.scatter),
+    }
+    for key in ("chi_square", "critical", "iterations"):
+        base.pop(key, None)
+    return {**base, **plain(extra)}
+
+
+def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
+    found = {"kind": "slope_distance", "from": c.from_, "to": c.to, "u": c.u, "mean_u": c.mean_u, "gain": c.gain}
+    return {**found, "at_s": c.at_s} if scheduled else found
+
+
+def _scatter(scatter: Scatter | None) -> dict[str, Any] | None:
+    if scatter is None:
+        return None
+    return {
+        "runs": scatter.runs,
+        "asked": scatter.asked,
+        "ratio": scatter.ratio,
+        "rms": float(np.sqrt(np.mean(scatter.rms**2))),
+        "predicted": float(np.sqrt(np.mean(scatter.predicted**2))),
+        "blunders_found": scatter.found,
+        "good_lost": scatter.false,
+    }
+
+
+def plan_json(told: PlanFindings) -> Iterator[str]:
+    """Its text, on one line."""
+    yield json.dumps(plan_object(told), allow_nan=False)
+
+
+def plan_passages(told: PlanFindings) -> list[Passage]:
+    """Worth, weak points, single points of failure, what to measure next, and what measuring on paper said."""
+    plan, found = told.plan, told.found
+    u = quantity(plan.mean_u, "m")
+    passages = [
+        Passage(
+            "The plan",
+            f"{len(found.table)} observations of {len(found.names)} points would give the coordinates of "
+            f"{int(plan.interest.sum())} points with a standard uncertainty of {u}, root mean square; "
+            f"datum: {found.solution.datum}.",
+        )
+    ]
+    weak = [
+        f"{found.names[i]} {quantity(plan.weakest[i], 'm')} {direction_words(found, int(i))}" for i in told.weakest[:3]
+    ]
+    if weak:
+        passages.append(Passage("Weakest", "; ".join(weak) + "."))
+    table, worth = found.table, told.worth
+    needed = np.flatnonzero(np.isinf(worth))
+    unchecked = int(np.sum(~table.checked))
+    text = f"{len(needed)} observations cannot be spared: without one of them a point floats"
+    text += f", first {found.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
+    text = text if len(needed) else "No single observation is indispensable."
+    if unchecked:
+        text += f" {unchecked} are checked by no other: an error there would not show."
+    else:
+        detectable = table.mdb[np.isfinite(table.mdb) & (table.unit == "m")]
+        if len(detectable):
+            text += (
+                f" An error of {quantity(float(np.median(detectable)), 'm')} in a length would usually be found, "
+                f"in the worst one {quantity(float(detectable.max()), 'm')} (power 80 %, level 0.1 %)."
+            )
+    passages.append(Passage("The checks", text))
+    if plan.candidates:
+        best = plan.candidates[0]
+        passages.append(
+            Passage(
+                "Best next",
+                f"a range {best.from_} - {best.to} (u {quantity(best.u, 'm')}) would lower it to "
+                f"{quantity(best.mean_u, 'm')}, by {quantity(best.gain, 'm')}; then "
+                + ", ".join(f"{c.from_} - {c.to}" for c in plan.candidates[1:4])
+                + ".",
+            )
+        )
+    if told.picked:
+        last = told.picked[-1]
+        order = ", ".join(f"{c.from_} - {c.to}" for c in told.picked[:6])
+        more = f" and {len(told.picked) - 6} more" if len(told.picked) > 6 else ""
+        passages.append(
+            Passage(
+                "In the time",
+                f"{len(told.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
+            )
+        )
+    if told.scatter is not None:
+        passages.append(Passage("On paper", scatter_words(told.scatter)))
+    return passages
+
+
+def scatter_words(s: Scatter) -> str:
+    """What measuring on paper said."""
+    text = (
+        f"measured {s.asked} times, {s.runs} of them with an answer: departures are {s.ratio:.2f} of the claimed "
+        "standard uncertainties, root mean square"
+    )
+    text += "." if s.ratio < 1.2 else ": what was put in beside the claimed noise shows."
+    if np.isfinite(s.found):
+        text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
+    return text
+
+
+def candidates_csv(told: PlanFindings) -> Iterator[str]:
+    """Further ranges, the best first, then the schedule."""
+    yield "list,from,to,u_mm,mean_u_mm,gain_um,at_s\n"
+    for name, rows in (("candidate", told.plan.candidates), ("schedule", told.picked)):
+        for c in rows:
+            at = f"{c.at_s:g}" if np.isfinite(c.at_s) else ""
+            yield (
+                f"{name},{_cell(c.from_)},{_cell(c.to)},{c.u / MILLIMETRE:.6f},{c.mean_u / MILLIMETRE:.6f},"
+                f"{c.gain * 1e6:.6f},{at}\n"
+            )
+
+
+def _cell(text: str) -> str:
+    return f'"{text.replace(chr(34), 2 * chr(34))}"' if any(c in text for c in ',"\n') else text
+
+
+def plan_report(told: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
+    """The whole page."""
+    from catseye.gateways.network.figures import network_figures
+    from catseye.gateways.network.report import provenance_section
+
+    found, plan = told.found, told.plan
+    drawn = network_figures(found)
+    name = found.network.source or "network"
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
+    header = (
+        f"<header><h1>{escape(name)}: plan of a network</h1>"
+        f'<div class="faint">{len(found.table)} observations of {len(found.names)} points, predicted by catseye on '
+        f"{when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
+        f"<nav>{links}</nav></header>"
+    )
+    told_ = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(told))
+    cards = [
+        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
+        card(
+            "Weakest point",
+            found.names[told.weakest[0]] if len(told.weakest) else "none",
+            f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
+        ),
+        card("Indispensable", str(int(np.isinf(told.worth).sum())), "observations without which a point floats"),
+        card("Unchecked", str(int(np.sum(~found.table.checked))), "observations whose error would not show"),
+    ]
+    weakest = table(
+        ("point", "longest axis (mm)", "towards"),
+        [
+            (found.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(found, int(i)))
+            for i in told.weakest[: 5 * LISTED]
+        ],
+        "tnt",
+    )
+    order = np.argsort(-told.worth, kind="stable")[: 5 * LISTED]
+    holds = table(
+        ("observation", "worth (µm)", "redundancy", "detectable"),
+        [
+            (
+                found.label(int(k)),
+                "∞" if np.isinf(told.worth[k]) else f"{told.worth[k] * 1e6:.4f}",
+                f"{found.table.redundancy[k]:.3f}",
+                quantity(found.table.mdb[k], str(found.table.unit[k])) if np.isfinite(found.table.mdb[k]) else "never",
+            )
+            for k in order
+        ],
+        "tnnn",
+    )
+    following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add: none are planned.")
+    scheduled = (
+        "<h3>In the time given, one after the other</h3>" + _ranges(told.picked, scheduled=True) if told.picked else ""
+    )
+    scatter = (
+        paragraph(scatter_words(told.scatter)[0].upper() + scatter_words(told.scatter)[1:]) if told.scatter else ""
+    )
+    body = [
+        header,
+        section("summary", CONTENTS["summary"], f'<div class="cards">{"".join(cards)}</div>', f"<dl>{told_}</dl>"),
+        section(
+            "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
+        ),
+        section("weakest", CONTENTS["weakest"], weakest),
+        section(
+            "next",
+            CONTENTS["next"],
+            paragraph(
+                "Each further range alone, the best first: what it would lower the mean standard uncertainty to. "
+                "Visibility is not known here: a pair may be hidden."
+            ),
+            following,
+            scheduled,
+        ),
+        section(
+            "observations",
+            CONTENTS["observations"],
+            paragraph("Worth: how much the mean standard uncertainty would grow were the observation left out."),
+            holds,
+        ),
+        section("paper", CONTENTS["paper"], scatter or paragraph("Not asked for (--runs).", "faint")),
+        provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
+    ]
+    return page(f"catseye plan: {name}", "\n".join(body))
+
+
+def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
+    columns = ("from", "to", "u (mm)", "mean u then (mm)", "gain (µm)", *(("done at (s)",) if scheduled else ()))
+    lines = [
+        (
+            c.from_,
+            c.to,
+            f"{c.u / MILLIMETRE:.4f}",
+            f"{c.mean_u / MILLIMETRE:.5f}",
+            f"{c.gain * 1e6:.4f}",
+            *((f"{c.at_s:g}",) if scheduled else ()),
+        )
+        for c in rows
+    ]
+    return table(columns, lines, "ttnnn" + ("n" if scheduled else ""))
+
+
+def write_plan(
+    told: PlanFindings,
+    directory: Path,
+    inputs: Mapping[str, str],
+    progress: Callable[[str, int, int], None] | None = None,
+) -> None:
+    """Report, tables and object of a plan, and last the provenance with the hashes of the others."""
+    when = datetime.now(UTC)
+    files: Files = {
+        "report.html": lambda: plan_report(told, when, inputs),
+        "points.csv": lambda: "".join(coordinates_csv(told.found)),
+        "candidates.csv": lambda: "".join(candidates_csv(told)),
+        "plan.json": lambda: json_page(plan_object(told)),
+    }
+    made = {"format": FORMAT, "made_by": "catseye plan"}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)

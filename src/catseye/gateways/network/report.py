@@ -1,0 +1,307 @@
+"""The report of an adjusted network: one HTML page that needs nothing else."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.network.figures import Drawn, network_figures
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.network.summary import passages, quantity, treatment_passages, verdict
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+
+if TYPE_CHECKING:
+    from catseye.reduction.network import Adjusted
+
+CONTENTS = {
+    "summary": "Summary",
+    "network": "Network",
+    "observations": "Observations",
+    "reliability": "Reliability",
+    "points": "Points",
+    "datum": "Datum and parameters",
+    "provenance": "Provenance",
+}
+WORST = 100  # observations listed
+EVERY = 500  # points up to which all are listed
+WEAKEST = 200  # points listed of more than that
+UNCHECKED = 100  # unchecked observations named
+
+
+def network_report(
+    found: Findings,
+    when: datetime,
+    inputs: Mapping[str, str],
+    *,
+    prefix: str = "",
+    treated: "Adjusted | None" = None,
+) -> str:
+    """The whole page.
+
+    found    what is told of a solution
+    when     UTC
+    inputs   SHA-256 of each file read, by its name
+    prefix   of the names of the tables beside the report
+    treated  how observations were treated, where that was asked for
+    """
+    drawn = network_figures(found)
+    name = found.network.source or "network"
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
+    axes = ", ".join(found.network.axis_names)
+    header = (
+        f"<header><h1>{escape(name)}: network adjustment</h1>"
+        f'<div class="faint">{len(found.table)} observations of {len(found.names)} points, adjusted by catseye '
+        f"on {when:%Y-%m-%d %H:%M} UTC; coordinates in the file's own axes ({escape(axes)}), u = standard uncertainty, "
+        f"1σ{', variance factor applied' if found.scaled else ', as claimed before'}</div><nav>{links}</nav></header>"
+    )
+    body = [
+        header,
+        _summary(found, treated),
+        _network(drawn),
+        _observations(found, drawn, f"{prefix}observations.csv"),
+        _reliability(found, drawn),
+        _points(found, f"{prefix}coordinates.csv"),
+        _datum(found),
+        provenance_section(
+            when, inputs, {"level of the tests": f"{found.level:g}", "variance factor applied": str(found.scaled)}
+        ),
+    ]
+    return page(f"catseye: {name}", "\n".join(body))
+
+
+def _summary(found: Findings, treated: "Adjusted | None") -> str:
+    axis = found.ellipsoid.semi_axes[:, 0]
+    known = axis[np.isfinite(axis) & (axis > 0.0)]
+    good, text = verdict(found)
+    cards = network_cards(found)
+    if len(known):
+        usual, worst = quantity(float(np.median(known)), "m"), quantity(float(known.max()), "m")
+        cards.insert(1, card("Points known to", usual, f"longest axis of the usual ellipsoid; worst {worst}"))
+    told = [*passages(found)[1:], *([] if treated is None else treatment_passages(treated, found))]
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in told)
+    own = found.network.description.strip()
+    return section(
+        "summary",
+        CONTENTS["summary"],
+        paragraph(text, "" if good else "bad"),
+        f'<div class="cards">{"".join(cards)}</div>',
+        f"<dl>{words}</dl>",
+        folded("The file's own words", *(paragraph(part) for part in own.split("\n\n"))) if own else "",
+    )
+
+
+def network_cards(found: Findings) -> list[str]:
+    """The numbers that matter first.
+
+    found   what is told of a solution
+    """
+    whole, active = found.whole, found.table.active
+    unchecked = int(np.sum(active & ~found.table.checked)) if found.answered else 0
+    interval = f"expected {whole.lower:.3f} to {whole.upper:.3f}" if np.isfinite(whole.p) else "not tested"
+    degrees = found.solution.degrees_of_freedom
+    suspects = str(len(found.suspects)) if found.answered else "unknown"
+    return [
+        card(
+            "Variance factor",
+            f"{whole.factor:.3f}" if np.isfinite(whole.p) else "unknown",
+            f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
+        ),
+        card("Suspect observations", suspects, f"of {int(active.sum())}, level {found.level:g} for all"),
+        card(
+            "Unchecked observations", str(unchecked) if found.answered else "unknown", "an error there would not show"
+        ),
+    ]
+
+
+def _network(drawn: dict[str, Drawn]) -> str:
+    return section(
+        "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
+    )
+
+
+def _observations(found: Findings, drawn: dict[str, Drawn], file: str) -> str:
+    rows = found.table.worst_first[:WORST]
+    total = len(found.table)
+    told = (
+        f"The {len(rows)} worst of {total}; all are in {file}." if len(rows) < total else f"All {total}, worst first."
+    )
+    return section(
+        "observations",
+        CONTENTS["observations"],
+        picture(drawn["residuals"].svg, drawn["residuals"].caption) if "residuals" in drawn else "",
+        paragraph(
+            f"{told} The residual is observed minus adjusted; the test statistic is the residual in units of its own "
+            "uncertainty; the estimated error is what would explain it best if nothing else were wrong."
+        ),
+        observation_rows(found, rows),
+    )
+
+
+def observation_rows(found: Findings, rows: Sequence[int] | np.ndarray) -> str:
+    """A table of observations; lengths in mm, angles in arc seconds.
+
+    found   what is told of a solution
+    rows    of its table
+    """
+    t, suspect = found.table, set(found.suspects.tolist())
+    fine = {"m": (MILLIMETRE, "mm"), "rad": (ARCSECOND, "″")}
+    lines = []
+    for i in rows:
+        scale, unit = fine.get(str(t.unit[i]), (1.0, ""))
+        what = "suspect" if i in suspect else "left out" if not t.active[i] else ""
+        what = "unchecked" if found.answered and t.active[i] and not t.checked[i] else what
+        lines.append(
+            (
+                found.label(int(i)),
+                *(_number(float(v[i]) / scale, form) for v, form in ((t.residual, "+.4g"), (t.u, ".4g"))),
+                unit,
+                _number(float(found.statistic[i]), "+.2f"),
+                _number(float(found.p[i]), ".2g"),
+                _number(float(t.redundancy[i]), ".3f"),
+                *(_number(float(v[i]) / scale, form) for v, form in ((t.estimated_error, "+.4g"), (t.mdb, ".4g"))),
+                what,
+            )
+        )
+    columns = (
+        "observation", "residual", "u", "unit", f"{found.test} statistic", "p of all", "redundancy", "estimated error",
+        "detectable error", "",
+    )  # fmt: skip
+    return table(columns, lines, "tnntnnnnnt")
+
+
+def _reliability(found: Findings, drawn: dict[str, Drawn]) -> str:
+    if not found.answered:
+        return section("reliability", CONTENTS["reliability"], paragraph("Unknown without an answer."))
+    rows = np.flatnonzero(found.table.active & ~found.table.checked)
+    parts = [picture(drawn["redundancy"].svg, drawn["redundancy"].caption)] if "redundancy" in drawn else []
+    if not len(rows):
+        parts.append(paragraph("Every observation is checked by others."))
+    else:
+        more = f", the first {UNCHECKED} here" if len(rows) > UNCHECKED else ""
+        parts.append(
+            paragraph(
+                f"{len(rows)} observations are checked by no other; an error in one of them would not show{more}."
+            )
+        )
+        parts.append(observation_rows(found, rows[:UNCHECKED]))
+    return section("reliability", CONTENTS["reliability"], *parts)
+
+
+def _points(found: Findings, file: str) -> str:
+    count = len(found.names)
+    rows, told = np.arange(count), ""
+    if count > EVERY:
+        rows = np.argsort(-np.nan_to_num(found.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
+        told = f"The {WEAKEST} weakest of {count}; all are in {file}. "
+    names = found.network.axis_names
+    points = found.network.points
+    roles = np.where(points.datum.any(axis=1), "datum", "")
+    roles = np.where(points.fixed.any(axis=1), np.where(points.fixed.all(axis=1), "held", "partly held"), roles)
+    u, axis = found.u / MILLIMETRE, found.ellipsoid.semi_axes / MILLIMETRE
+    lines = [
+        (
+            found.names[i],
+            "station" if found.stations[i] else "target",
+            str(roles[i]),
+            *(_number(float(v), ".7f") for v in found.x[i]),
+            *(_number(float(v), ".4f") for v in u[i]),
+            " / ".join(_number(float(v), ".4g") for v in axis[i]),
+            str(found.seen[i]),
+        )
+        for i in rows.tolist()
+    ]
+    columns = (
+        "point", "kind", "role", *(f"{n} (m)" for n in names), *(f"u {n} (mm)" for n in names), "semi-axes (mm)",
+        "seen",
+    )  # fmt: skip
+    return section(
+        "points",
+        CONTENTS["points"],
+        paragraph(
+            f"{told}Semi-axes are those of the standard ellipsoid (1σ), “seen” is by how many observations. "
+            f"Covariances are in {file}."
+        ),
+        table(columns, lines, "tttnnnnnnnn"),
+        _relative(found),
+    )
+
+
+def _relative(found: Findings) -> str:
+    """The pairs asked for."""
+    if not found.relative:
+        return ""
+    rows = [
+        (
+            f"{r.first} - {r.second}",
+            _number(r.distance, ".7f"),
+            _number(r.u_distance / MILLIMETRE, ".4f"),
+            " / ".join(_number(float(v) / MILLIMETRE, ".4g") for v in r.ellipsoid.semi_axes),
+        )
+        for r in found.relative
+    ]
+    return "<h3>From point to point</h3>" + table(
+        ("pair", "distance (m)", "u (mm)", "semi-axes of the relative ellipsoid (mm)"), rows, "tnnn"
+    )
+
+
+def _datum(found: Findings) -> str:
+    solution, parameters = found.solution, found.network.parameters
+    parts = [
+        paragraph(f"Datum: {solution.datum}. {solution.iterations} iterations. Status: {solution.status}."),
+    ]
+    rows = [
+        (p.name, *parameter_cells(float(v), float(u), p.unit), _prior(p.start, p.sigma, p.unit))
+        for p, v, u in zip(parameters, solution.parameters, found.u_parameters, strict=True)
+    ]
+    if rows:
+        axes = "" if np.array_equal(found.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
+        parts.append(paragraph(f"{len(rows)} parameters beside the points.{axes}"))
+        parts.append(table(("parameter", "value", "u", "prior"), rows, "tnnt"))
+    return section("datum", CONTENTS["datum"], *parts)
+
+
+def parameter_cells(value: float, u: float, unit: str) -> tuple[str, str]:
+    """A parameter and its uncertainty: angles in degrees and arc seconds, lengths in mm, ratios in ppm.
+
+    value, u   in the unit
+    unit       "m", "rad" or "1"
+
+    >>> parameter_cells(1e-3, 1e-5, "m"), parameter_cells(2e-6, 1e-7, "1")
+    (('+1.0000 mm', '0.0100 mm'), ('+2.0000 ppm', '0.1000 ppm'))
+    """
+    if unit == "rad":
+        return f"{np.degrees(value):.6f}°", f"{u / ARCSECOND:.3f}″"
+    scale, name = (MILLIMETRE, "mm") if unit == "m" else (1e-6, "ppm")
+    return f"{value / scale:+.4f} {name}", f"{u / scale:.4f} {name}"
+
+
+def _prior(start: float, sigma: float, unit: str) -> str:
+    if np.isinf(sigma):
+        return "free"
+    value, u = parameter_cells(start, sigma, unit)
+    return f"{value}, u {u}" if sigma > 0.0 else f"held at {value}"
+
+
+def provenance_section(when: datetime, inputs: Mapping[str, str], settings: Mapping[str, str]) -> str:
+    """Files read, programs and settings.
+
+    when       UTC
+    inputs     SHA-256 by name
+    settings   by what they are
+    """
+    return section(
+        "provenance",
+        CONTENTS["provenance"],
+        paragraph(f"Adjusted {when:%Y-%m-%d %H:%M:%S} UTC. The same, for programs, is in provenance.json."),
+        table(("input", "SHA-256"), list(inputs.items()), "th"),
+        table(("setting", "value"), list(settings.items()), "tt"),
+        table(("part", "version"), list(versions().items()), "tt"),
+    )
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if np.isfinite(value) else "–"

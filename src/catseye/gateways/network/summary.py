@@ -1,0 +1,238 @@
+"""An adjusted network told in sentences: is it good, what is worst, what floats."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.estimation.reliability import TOO_LARGE, TOO_SMALL
+from catseye.gateways.network.findings import Findings
+from catseye.gateways.writers.passage import Passage
+
+if TYPE_CHECKING:
+    from catseye.reduction.network import Adjusted
+
+NAMED = 5  # names in a sentence at most
+WEAK = 5.0  # times the usual uncertainty: such a point is named
+
+
+def quantity(value: float, unit: str) -> str:
+    """A small value with three digits in the unit that suits it: mm, arc seconds, or as it is.
+
+    >>> quantity(0.000123456, "m"), quantity(1.5e-5, "rad"), quantity(2e-6, "1"), quantity(float("nan"), "m")
+    ('0.123 mm', '3.09″', '2e-06', 'unknown')
+    """
+    if not np.isfinite(value):
+        return "unknown"
+    if unit == "m":
+        return f"{value / MILLIMETRE:.3g} mm"
+    return f"{value / ARCSECOND:.3g}″" if unit == "rad" else f"{value:.3g}"
+
+
+def verdict(found: Findings) -> tuple[bool, str]:
+    """Whether the adjustment can be trusted as it is, and a few plain words why.
+
+    found   what is told of a solution
+    """
+    status, whole = found.solution.status, found.whole
+    if not found.answered:
+        return False, f"No answer: {status}."
+    if status != "converged":
+        return False, f"Not to be trusted: {status}."
+    if not np.isfinite(whole.p):
+        return False, "Unchecked: nothing was measured twice, so nothing would show an error."
+    if whole.verdict == TOO_LARGE:
+        more = 100.0 * (np.sqrt(whole.factor) - 1.0)
+        text = f"Doubtful: the observations scatter {more:.0f} % more than their uncertainties claim."
+        return False, text + _suspects(found)
+    if len(found.suspects):
+        return False, "Good but for single observations: the whole agrees with the claimed uncertainties." + _suspects(
+            found
+        )
+    if whole.verdict == TOO_SMALL:
+        less = 100.0 * (1.0 - np.sqrt(whole.factor))
+        text = f"Good, and better than claimed: the observations scatter {less:.0f} % less than claimed."
+    else:
+        text = "Good: the observations agree with each other as their uncertainties claim."
+    unchecked = int(np.sum(found.table.active & ~found.table.checked))
+    return True, text + (f" But {unchecked} of them are checked by no other." if unchecked else "")
+
+
+def _suspects(found: Findings) -> str:
+    count = len(found.suspects)
+    if not count:
+        return " No single observation stands out."
+    noun = "observation is" if count == 1 else "observations are"
+    return f" {count} {noun} suspect, first {observation_words(found, int(found.suspects[0]))}."
+
+
+def observation_words(found: Findings, row: int) -> str:
+    """An observation, its residual and its test, in words.
+
+    found   what is told of a solution
+    row     of its table
+    """
+    table, unit = found.table, str(found.table.unit[row])
+    words = f"{found.label(row)}: residual {quantity(table.residual[row], unit)}"
+    if np.isfinite(found.statistic[row]):
+        words += f", {abs(found.statistic[row]):.2f} of its standard uncertainties"
+        words += f", as if it were wrong by {quantity(table.estimated_error[row], unit)}"
+    return words
+
+
+def passages(found: Findings) -> list[Passage]:
+    """Verdict, network, points, observations, and what is not checked.
+
+    found   what is told of a solution
+    """
+    told = [Passage("Verdict", verdict(found)[1]), Passage("The network", _network(found))]
+    if found.answered:
+        told += [
+            Passage("The points", _points(found)),
+            Passage("The fit", _observations(found)),
+            Passage("The checks", _checks(found)),
+        ]
+    return told
+
+
+def treatment_passages(treated: "Adjusted", found: Findings) -> list[Passage]:
+    """What was left out or weighed down, and which uncertainties the observations themselves ask for.
+
+    treated   how observations were treated
+    found     what is told of the solution
+    """
+    told = []
+    rejected, undecided = (np.flatnonzero(found.in_table(part)) for part in (treated.rejected, treated.undecided))
+    if treated.treatment != "plain":
+        how = (
+            "Left out"
+            if treated.treatment == "rejected"
+            else f"Robust weights ({treated.treatment}); given next to none"
+        )
+        text = f"{how}: {_listed([found.label(int(i)) for i in rejected[:NAMED]], len(rejected)) or 'no observation'}."
+        if len(undecided):
+            names = _listed([found.label(int(i)) for i in undecided[:NAMED]], len(undecided))
+            text += f" Contradicted by others, and nothing says which is wrong: {names}."
+        told.append(Passage("The treatment", text))
+    if treated.components is not None:
+        told.append(Passage("The claims", _claims(treated)))
+    return told + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
+
+
+def _claims(treated: "Adjusted") -> str:
+    """Estimated components of variance; those of rangers are squares of a constant, m, and of a ratio."""
+    components = treated.components
+    assert components is not None
+    roots, u = components.roots()
+    words = []
+    for name, variance, root, u_root in zip(components.names, components.values, roots, u, strict=True):
+        if "^2 of " not in name:
+            words.append(f"{name} {variance:.3g} times the claimed variance")
+            continue
+        scale, unit = (1e6, "µm") if name.startswith("constant") else (1e6, "ppm")
+        spread = f" (u {u_root * scale:.2g})" if np.isfinite(u_root) else ""
+        words.append(f"{name.replace('^2 of', ' of').replace('  ', ' ')} {root * scale:.3g} {unit}{spread}")
+    return f"The observations themselves ask for: {_listed(words)}."
+
+
+def _network(found: Findings) -> str:
+    solution, table = found.solution, found.table
+    stations, total = int(found.stations.sum()), len(found.names)
+    counts = np.bincount(table.kind, minlength=len(table.kinds))
+    kinds = ", ".join(f"{k.replace('_', ' ')} {n}" for k, n in zip(table.kinds, counts, strict=True))
+    text = f"{total} points, stations among them: {stations}. {len(table)} observations: {kinds or 'none'}."
+    out = int(np.sum(~table.active))
+    text += f" {out} were left out." if out else ""
+    if found.answered:
+        text += f" Datum: {solution.datum}."
+    if solution.approximate:
+        text += f" Approximate coordinates were found, not given, for {_listed(solution.approximate)}."
+    if solution.assumed:
+        text += f" Nothing says on which side these lie; it was assumed: {_listed(solution.assumed)}."
+    if solution.replaced:
+        named = _listed(solution.replaced)
+        text += f" Given coordinates that the observations contradict grossly were no start: {named}."
+    lonely = [found.names[i] for i in np.flatnonzero(found.seen == 0)]
+    return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
+
+
+def _points(found: Findings) -> str:
+    axis = found.ellipsoid.semi_axes[:, 0]
+    known = np.flatnonzero(np.isfinite(axis) & (axis > 0.0))
+    if not len(known):
+        return "Every point is held."
+    usual, worst = float(np.median(axis[known])), int(known[np.argmax(axis[known])])
+    text = (
+        f"Along the longest axis of its ellipsoid the usual point is known to {quantity(usual, 'm')} (1σ), the worst, "
+        f"{found.names[worst]}, to {quantity(axis[worst], 'm')}, {direction_words(found, worst)}."
+    )
+    weak = known[axis[known] > WEAK * usual]
+    weak = weak[np.argsort(-axis[weak], kind="stable")]
+    if len(weak) > 1:
+        text += (
+            f" {len(weak)} points are over {WEAK:g} times worse than usual: {_listed([found.names[i] for i in weak])}."
+        )
+    for r in found.relative:
+        text += (
+            f" {r.first} - {r.second}: {r.distance:.5f} m, u {quantity(r.u_distance, 'm')}; its relative ellipsoid has "
+            f"the semi-axes {', '.join(quantity(float(v), 'm') for v in r.ellipsoid.semi_axes)}."
+        )
+    return text + (
+        " The variance factor is applied."
+        if found.scaled
+        else " These rest on the claimed uncertainties of the observations."
+    )
+
+
+def direction_words(found: Findings, point: int) -> str:
+    """The longest axis of a point's ellipsoid in words.
+
+    found   what is told of a solution
+    point   its row
+    """
+    east, north, up = found.network.axes @ found.ellipsoid.directions[point, :, 0]
+    steep = np.arcsin(min(abs(up), 1.0)) / DEGREE
+    if steep > 60.0:
+        return "mostly in height"
+    azimuth = np.arctan2(east, north) / DEGREE % 180.0
+    tilt = f", tilted {steep:.0f}°" if steep > 20.0 else ""
+    return f"towards azimuth {azimuth:.0f}° and back{tilt}"
+
+
+def _observations(found: Findings) -> str:
+    whole, table = found.whole, found.table
+    if not np.isfinite(whole.p):
+        return "Nothing is left over to compare them with."
+    text = (
+        f"Variance factor {whole.factor:.3f} with {found.solution.degrees_of_freedom:.0f} degrees of freedom; by "
+        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {found.level:g}): {whole.verdict}."
+    )
+    text += _suspects(found) if len(found.suspects) else ""
+    if np.isfinite(table.standardised).any() and not len(found.suspects):
+        text += f" No observation is suspect; the worst is {observation_words(found, int(table.worst_first[0]))}."
+    return text
+
+
+def _checks(found: Findings) -> str:
+    table = found.table
+    active = int(table.active.sum())
+    unchecked = np.flatnonzero(table.active & ~table.checked)
+    text = f"All {active} observations are checked by others." if not len(unchecked) else ""
+    if len(unchecked):
+        names = _listed([found.label(int(i)) for i in unchecked[:NAMED]], len(unchecked))
+        text = f"{len(unchecked)} of {active} observations are checked by no other, where an error would not show: "
+        text += f"{names}."
+    mdb = [
+        f"{quantity(float(np.median(table.mdb[mine])), str(table.unit[np.argmax(mine)]))} of a {kind.replace('_', ' ')}"
+        for k, kind in enumerate(table.kinds)
+        if (mine := (table.kind == k) & table.checked).any()
+    ]
+    if mdb:
+        text += f" The smallest error that the test (0.1 %, power 80 %) usually finds: {', '.join(mdb)}."
+    return text
+
+
+def _listed(names: list[str] | tuple[str, ...], total: int | None = None) -> str:
+    count = len(names) if total is None else total
+    text = ", ".join(names[:NAMED])
+    return text + (f" and {count - NAMED} more" if count > NAMED else "")

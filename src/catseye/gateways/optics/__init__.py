@@ -1,0 +1,1 @@
+"""Beams, glass, retroreflectors, coatings and laser safety on the way out."""

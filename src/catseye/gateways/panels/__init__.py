@@ -1,0 +1,1 @@
+"""The panel setting instrument on the way out."""

@@ -1,0 +1,1 @@
+"""Poses and pointing models on the way out."""

@@ -1,0 +1,102 @@
+"""Figures of a pose as SVG text: what the points do beside moving as one, and what makes the pointing offset."""
+
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.pose.objects import PoseResult
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
+from catseye.reduction.pose.pointing_offsets import PointingOffset
+
+NAMED = 14  # points up to which each is named
+LENGTH = 0.12  # of the group's size, drawn for the largest residual
+
+
+def pose_figures(found: PoseResult) -> dict[str, str]:
+    """Every figure of the report by its name."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        drawn = {"residuals": svg(_residuals(found))}
+        if found.beam is not None:
+            drawn["terms"] = svg(_terms(found.beam))
+        return drawn
+
+
+def _residuals(found: PoseResult) -> Figure:
+    """Arrows in the two longer extents of the group, colour across them."""
+    pose, places = found.pose.pose, found.pose.places
+    residual = pose.motion.residual / MILLIMETRE
+    extent = np.ptp(places, axis=0)
+    i, j = sorted(np.argsort(-extent, kind="stable")[:2].tolist())
+    k = 3 - i - j
+    figure = Figure(figsize=(9.4, 6.2), layout="constrained")
+    ax = figure.add_subplot()
+    largest = float(np.hypot(residual[:, i], residual[:, j]).max(initial=0.0))
+    size = float(max(extent[i], extent[j]))
+    top = max(float(np.abs(residual[:, k]).max(initial=0.0)), 1e-9)
+    dots = ax.scatter(
+        places[:, i],
+        places[:, j],
+        c=residual[:, k],
+        cmap="RdBu_r",
+        vmin=-top,
+        vmax=top,
+        s=34,
+        lw=0.6,
+        ec=FAINT,
+        zorder=3,
+    )
+    if largest > 0.0:
+        unit = LENGTH * size / largest
+        style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": INK, "width": 0.0018, "zorder": 2}
+        ax.quiver(places[:, i], places[:, j], residual[:, i] * unit, residual[:, j] * unit, **style)
+        key = nice(largest)
+        x0, y0 = places[:, i].min() - 0.06 * size, places[:, j].min() - 0.12 * size
+        ax.quiver([x0], [y0], [key * unit], [0.0], **style)
+        ax.annotate(f"{key:g} mm", (x0 + key * unit, y0), xytext=(5, -3), textcoords="offset points", fontsize=8)
+    if len(pose.names) <= NAMED:
+        for name, place in zip(pose.names, places, strict=True):
+            ax.annotate(name, (place[i], place[j]), xytext=(5, 5), textcoords="offset points", fontsize=7.5)
+    ax.plot(*pose.pivot[[i, j]], "+", color=BAD, ms=11, mew=1.6, label="pivot", zorder=4, ls="none")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.12)
+    ax.set_xlabel(f"{'xyz'[i]}, {pose.frame} (m)")
+    ax.set_ylabel(f"{'xyz'[j]}, {pose.frame} (m)")
+    figure.colorbar(dots, ax=ax, label=f"residual along {'xyz'[k]} (mm)", shrink=0.8)
+    ax.legend(loc="upper right")
+    return figure
+
+
+def _terms(beam: PointingOffset) -> Figure:
+    """Bars: each term's part of azimuth times cos E and of elevation, and the sum with its uncertainty."""
+    figure = Figure(figsize=(9.4, 2.2 + 0.34 * len(beam.terms)), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    names = [*beam.terms, "together"]
+    for axis, (ax, title) in enumerate(zip(panels, ("azimuth times cos E", "elevation"), strict=True)):
+        values = np.array([*(part[axis] for part in beam.terms.values()), beam.offset[axis]]) / ARCSECOND
+        u = float(np.sqrt(max(beam.covariance[axis, axis], 0.0))) / ARCSECOND
+        colours = [SERIES[0]] * len(beam.terms) + [SERIES[1]]
+        rows = np.arange(len(names))
+        ax.barh(rows, values, color=colours, height=0.62)
+        ax.errorbar(values[-1:], rows[-1:], xerr=[2 * u], fmt="none", ecolor=INK, elinewidth=1.2, capsize=3)
+        ax.axvline(0.0, color=FAINT, lw=0.8)
+        for row, value in zip(rows, values, strict=True):
+            right = value >= 0.0
+            bar = 2 * u if row == rows[-1] else 0.0
+            ax.annotate(
+                f"{value:+.2f}",
+                (value + (bar if right else -bar), row),
+                xytext=(4 if right else -4, 0),
+                textcoords="offset points",
+                ha="left" if right else "right",
+                va="center",
+                fontsize=7.5,
+            )
+        ax.margins(x=0.22)
+        ax.set_title(title)
+        ax.set_xlabel("offset of the beam (arcsec); bar of the sum: 2 u")
+        ax.set_yticks(rows, names)
+    panels[0].invert_yaxis()
+    return figure

@@ -1,0 +1,217 @@
+"""The files of a pointing fit and of a track profile."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE
+from catseye.gateways.pose.pointing_series_objects import (
+    FORMAT,
+    TRACK,
+    Observed,
+    fit_object,
+    fit_rows,
+    fit_words,
+    model_record,
+    track_object,
+)
+from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
+from catseye.gateways.writers.written import Files, csv_text, origin, write_files
+from catseye.records.pointing_model import FORMAT as MODEL
+from catseye.records.toml_text import record_toml
+from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.track_profile import TrackProfile
+
+OBSERVATIONS = (
+    "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",
+    "residual_azimuth_cos_e_arcsec", "residual_elevation_arcsec", "w_azimuth", "w_elevation", "used",
+)  # fmt: skip
+
+
+def write_fit(
+    fit: PointingFit,
+    observed: Observed,
+    compared: SeriesComparison | None,
+    directory: Path,
+    settings: Mapping[str, Any],
+) -> None:
+    """Table, object, model, report, and last the provenance."""
+    when = datetime.now(UTC)
+    files: Files = {
+        "observations.csv": lambda: observations_csv(fit, observed),
+        "pointing.json": lambda: json_page(fit_object(fit, observed, compared)),
+        "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {observed.where[0].split(' line ')[0]}")),
+        "report.html": lambda: fit_report(fit, observed, compared, when),
+    }
+    made = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
+    write_files(files, directory, {**made, **origin(when, observed.hashes)})
+    series = SamplerTable(
+        "SERIES",
+        {
+            "TERM": SamplerColumn("", np.array(fit.series.terms)),
+            "VALUE": SamplerColumn("rad", fit.series.values),
+            "COVARIANCE": SamplerColumn("rad2", fit.series.covariance, "a row a term"),
+        },
+        comment="pointing series, encoders less sky",
+    )
+    join_tables(directory, tables={"SERIES": series})
+
+
+def write_model(fit: PointingFit, path: Path) -> None:
+    """The series alone, whole or not at all."""
+    with whole_file(path, "--write", f'format = "{MODEL}"') as pieces:
+        pieces.append(record_toml(model_record(fit, path.stem)))
+
+
+def observations_csv(fit: PointingFit, observed: Observed) -> str:
+    """Every observation with what the fit leaves of it."""
+    rows = [
+        (
+            where,
+            f"{fit.azimuth[k] / DEGREE:.7f}",
+            f"{fit.elevation[k] / DEGREE:.7f}",
+            *(f"{v / ARCSECOND:.4f}" for v in (*fit.observed[k], *fit.residual[k])),
+            *(f"{v:.2f}" if np.isfinite(v) else "" for v in fit.w[k]),
+            "yes" if fit.used[k] else "no",
+        )
+        for k, where in enumerate(observed.where)
+    ]
+    return csv_text(OBSERVATIONS, rows)
+
+
+def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, when: datetime) -> str:
+    """The whole page."""
+    from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
+
+    drawn = fit_figures(fit)
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(fit, observed, compared))
+    u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
+    cards = [
+        card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
+        for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
+    ]
+    heads = ["term", "arcsec", "u"] + (["less the other", "u"] if compared is not None else [])
+    body = [
+        _header(f"Pointing series from {observed.source}", when),
+        section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
+        section(
+            "terms",
+            "Terms",
+            table(heads, fit_rows(fit, compared), "t" + "n" * (len(heads) - 1)),
+            paragraph("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
+            paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders less sky."),
+            picture(drawn["correlation"], "Correlations: terms near ±1 cannot be told apart by these directions."),
+        ),
+        section(
+            "residuals",
+            "Residuals",
+            picture(drawn["residuals"], "What the series leaves, by azimuth and elevation."),
+            picture(drawn["sky"], "The same on the sky, the zenith in the middle."),
+        ),
+        _provenance(observed.hashes, when),
+    ]
+    return page("catseye: pointing", "\n".join(body))
+
+
+def _header(title: str, when: datetime) -> str:
+    return (
+        f"<header><h1>{escape(title)}</h1>"
+        f'<div class="faint">fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div>'
+        "</header>"
+    )
+
+
+def _provenance(hashes: Mapping[str, str], when: datetime) -> str:
+    facts = [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()]
+    return section(
+        "provenance",
+        "Provenance",
+        table(("file read", "SHA-256"), list(hashes.items()), "th"),
+        table(("what", "value"), facts, "tt"),
+    )
+
+
+def write_track(found: TrackProfile, directory: Path, hashes: Mapping[str, str]) -> None:
+    """Table, object, report, and last the provenance."""
+    when = datetime.now(UTC)
+    files: Files = {
+        "tilt.csv": lambda: tilt_csv(found),
+        "track.json": lambda: json_page(track_object(found)),
+        "report.html": lambda: track_report(found, hashes, when),
+    }
+    settings = {"harmonics": found.series.harmonics}
+    made = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
+    write_files(files, directory, {**made, **origin(when, hashes)})
+    join_tables(directory, frame="alidade turned about east and north of the ground")
+
+
+def tilt_csv(found: TrackProfile) -> str:
+    """The tilt every five degrees."""
+    azimuth = np.arange(0.0, 360.0, 5.0)
+    tilt, spread = found.series.at(azimuth * DEGREE)
+    rows = [
+        [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
+        for a, t, q in zip(azimuth, tilt, spread, strict=True)
+    ]
+    return csv_text(("azimuth_deg", "tilt_east_arcsec", "tilt_north_arcsec", "u_east_arcsec", "u_north_arcsec"), rows)
+
+
+def track_rows(found: TrackProfile) -> list[tuple[str, str, str]]:
+    """Coefficient, value, u in arcsec."""
+    u = np.sqrt(np.diag(found.series.covariance)) / ARCSECOND
+    return [
+        (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}")
+        for name, v, w in zip(found.series.names, found.series.values, u, strict=True)
+    ]
+
+
+def track_words(found: TrackProfile) -> list[tuple[str, str]]:
+    """Titles and sentences for people, in order."""
+    (an, aw), spread = found.series.axis
+    readings = len(found.azimuth) - found.poses
+    made = [
+        ("Observed", f"{found.poses} poses, {readings} inclinometer readings"),
+        (
+            "Axis",
+            f"AN {an / ARCSECOND:+.2f} ± {spread[0, 0] ** 0.5 / ARCSECOND:.2f}, "
+            f"AW {aw / ARCSECOND:+.2f} ± {spread[1, 1] ** 0.5 / ARCSECOND:.2f} arcsec: leans north, west above zero",
+        ),
+    ]
+    if found.zero is not None:
+        zero, u = found.zero[0] / ARCSECOND, np.sqrt(np.diag(found.zero[1])) / ARCSECOND
+        made.append(
+            ("Zero", f"of the inclinometer {zero[0]:+.2f} ± {u[0]:.2f}, {zero[1]:+.2f} ± {u[1]:.2f} arcsec about x, y")
+        )
+    if found.degrees_of_freedom:
+        made.append(
+            ("Fit", f"chi-square {found.pvv:.1f} with {found.degrees_of_freedom} degrees of freedom, p {found.p:.2g}")
+        )
+    return made
+
+
+def track_report(found: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
+    """The whole page."""
+    from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
+
+    drawn = track_figures(found)
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(found))
+    body = [
+        _header("Track and azimuth bearing", when),
+        section("summary", "Summary", f"<dl>{words}</dl>"),
+        section(
+            "tilt",
+            "Tilt by azimuth",
+            picture(drawn["tilt"], "Turn of the alidade about east and north; dotted: the mean, the axis's lean."),
+            table(("coefficient", "arcsec", "u"), track_rows(found), "tnn"),
+            picture(drawn["left"], "What the series leaves of poses and inclinometer."),
+        ),
+        _provenance(hashes, when),
+    ]
+    return page("catseye: track profile", "\n".join(body))

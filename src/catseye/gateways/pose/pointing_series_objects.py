@@ -1,0 +1,226 @@
+"""Pointing fits, comparisons and track profiles as plain objects for JSON and as text for people; what they read."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE
+from catseye.errors import InputError
+from catseye.gateways.pose.objects import FORMAT as POSE
+from catseye.geometry.pointing_series import PointingSeries, published
+from catseye.records.pointing_model import PointingModel, Term
+from catseye.records.reading import Folder, read_record
+from catseye.records.star_offsets import StarOffsets, read_star_offsets
+from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.track_profile import TrackProfile
+
+FORMAT = "catseye-pointing-1"
+TRACK = "catseye-track-profile-1"
+PUBLISHED = "published"
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Corrections to fit: from a TPOINT file, or from poses of `catseye pose --pointing`.
+
+    source      "stars" or "metrology"
+    azimuth, elevation  (n,) rad
+    correction  (n, 2) rad
+    covariance  (2n, 2n) rad^2 of metrology; None of stars
+    where       n places for messages
+    stars       the file's, where it is one
+    hashes      SHA-256 by name
+    """
+
+    source: str
+    azimuth: np.ndarray
+    elevation: np.ndarray
+    correction: np.ndarray
+    covariance: np.ndarray | None
+    where: tuple[str, ...]
+    stars: StarOffsets | None
+    hashes: dict[str, str]
+
+
+def read_observed(files: Sequence[Path]) -> Observed:
+    """One TPOINT file, or several pose.json with pointing in them; InputError for a mixture."""
+    json_files = [f for f in files if f.suffix == ".json"]
+    if not json_files:
+        if len(files) != 1:
+            raise InputError(f"{files[1]}: a second file of stars (expected one TPOINT file, or poses as .json)")
+        stars = read_star_offsets(files[0])
+        where = tuple(f"{stars.file} line {k}" for k in stars.line)
+        hashes = {stars.file: stars.digest}
+        return Observed("stars", stars.azimuth, stars.elevation, stars.correction, None, where, stars, hashes)
+    if len(json_files) != len(files):
+        other = next(f for f in files if f not in json_files)
+        raise InputError(f"{other}: is no .json beside poses (expected one TPOINT file, or poses only)")
+    folders = [Folder(f.parent) for f in files]
+    rows = [_pose(folder, f) for folder, f in zip(folders, files, strict=True)]
+    q = np.zeros((2 * len(rows), 2 * len(rows)))
+    for k, (_, _, spread) in enumerate(rows):
+        q[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = spread
+    hashes = {str(f): d for folder, f in zip(folders, files, strict=True) for d in folder.hashes.values()}
+    angles = np.array([r[0] for r in rows])
+    values = np.array([r[1] for r in rows])
+    return Observed("metrology", angles[:, 0], angles[:, 1], values, q, tuple(map(str, files)), None, hashes)
+
+
+def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, np.ndarray]:
+    """Azimuth and elevation (rad), correction (2,) and covariance (2, 2) of a pose.json with pointing."""
+    try:
+        found = json.loads(folder.text(path.name))
+    except (ValueError, RecursionError) as problem:
+        raise InputError(f"{path}: is not JSON: {problem}") from problem
+    if not isinstance(found, dict) or found.get("format") != POSE:
+        raise InputError(f"{path}: is no pose (expected format '{POSE}', as catseye pose --out writes it)")
+    if not found.get("pointing") or not found.get("posture"):
+        raise InputError(f"{path}: has no pointing or no posture (expected both: catseye pose --pointing prime --out)")
+    try:
+        told, posture = found["pointing"], found["posture"]
+        angles = float(posture["azimuth_deg"]) * DEGREE, float(posture["elevation_deg"]) * DEGREE
+        value = np.array(told["correction"], dtype=float)[:2]
+        spread = np.array(told["covariance"], dtype=float)[:2, :2]
+    except (KeyError, TypeError, ValueError, IndexError) as problem:
+        raise InputError(f"{path}: pointing cannot be read: {problem}") from problem
+    if value.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*angles, *value, *spread.ravel()]).all():
+        raise InputError(f"{path}: pointing has other sizes (expected 3 numbers and 3 x 3, finite)")
+    return angles, value, spread
+
+
+def read_series(text: str) -> tuple[PointingSeries, dict[str, str]]:
+    """A series by name ("published") or from its TOML file, and the SHA-256 of what was read."""
+    if text == PUBLISHED:
+        return published(), {}
+    path = Path(text)
+    folder = Folder(path.parent)
+    record = folder.record(path.name, PointingModel) if path.suffix == ".toml" else read_record(path, PointingModel)
+    return record.series, dict(folder.hashes)
+
+
+def series_object(series: PointingSeries) -> dict[str, Any]:
+    """Terms in arcsec with covariance; null where nothing is known of it."""
+    known = bool(np.any(series.covariance != 0.0))
+    u = np.sqrt(np.diag(series.covariance)) / ARCSECOND
+    return {
+        "terms": list(series.terms),
+        "values_arcsec": dict(zip(series.terms, series.values / ARCSECOND, strict=True)),
+        "u_arcsec": dict(zip(series.terms, u, strict=True)) if known else None,
+        "covariance_arcsec2": series.covariance / ARCSECOND**2 if known else None,
+    }
+
+
+def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> dict[str, Any]:
+    """A fit as `catseye pointing fit --json` gives it."""
+    return {
+        "format": FORMAT,
+        "source": observed.source,
+        "sign": "correction: encoders less sky; azimuth times cos E and elevation",
+        **series_object(fit.series),
+        "correlation": fit.correlation,
+        "observations": len(fit.azimuth),
+        "used": int(fit.used.sum()),
+        "rejected": [where for where, used in zip(observed.where, fit.used, strict=True) if not used],
+        "sky_rms_arcsec": fit.sky_rms / ARCSECOND,
+        "chi2": fit.pvv,
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "variance_factor": fit.variance_factor,
+        "scaled_by_variance_factor": fit.scaled,
+        "condition": fit.condition,
+        "weak": [
+            {"parts": w.parts, "u_arcsec": w.u / ARCSECOND, "u_on_the_sky_arcsec": w.u_on_the_sky / ARCSECOND}
+            for w in fit.weak
+        ],
+        "comparison": None if compared is None else comparison_object(compared),
+    }
+
+
+def comparison_object(found: SeriesComparison) -> dict[str, Any]:
+    """This fit less the other."""
+    u = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)) / ARCSECOND
+    return {
+        "difference_arcsec": dict(zip(found.terms, found.difference / ARCSECOND, strict=True)),
+        "u_difference_arcsec": dict(zip(found.terms, u, strict=True)),
+        "chi2": found.chi2,
+        "degrees_of_freedom": len(found.terms),
+        "p": found.p,
+        "rms_on_the_sky_arcsec": found.rms_on_the_sky / ARCSECOND,
+        "u_rms_on_the_sky_arcsec": float(np.sqrt(np.mean(np.sum(found.u_on_the_sky**2, axis=1)))) / ARCSECOND,
+    }
+
+
+def fit_words(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> list[tuple[str, str]]:
+    """Titles and sentences for people, in order."""
+    told = f"{int(fit.used.sum())} of {len(fit.used)} observations used, from {observed.source}"
+    made = [("Observed", told)]
+    made += [("Left out", where) for where, used in zip(observed.where, fit.used, strict=True) if not used]
+    scatter = "uncertainties are from the scatter" if fit.scaled else f"variance factor {fit.variance_factor:.2f}"
+    made.append(
+        ("Sky rms", f"{fit.sky_rms / ARCSECOND:.2f} arcsec, {fit.degrees_of_freedom} degrees of freedom; {scatter}")
+    )
+    made += [("Weak", w.text) for w in fit.weak]
+    if compared is not None:
+        agree = f"; chi-square {compared.chi2:.1f} of {len(compared.terms)} terms, p {compared.p:.2g}"
+        made.append(
+            (
+                "Compared",
+                f"{compared.rms_on_the_sky / ARCSECOND:.2f} arcsec rms apart on the sky between 10 and 80 degrees of "
+                f"elevation{agree if np.isfinite(compared.chi2) else ''}",
+            )
+        )
+    return made
+
+
+def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[str, ...]]:
+    """Term, value, u, and where compared the difference with its u; arcsec."""
+    u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
+    rows: list[tuple[str, ...]] = []
+    for k, term in enumerate(fit.series.terms):
+        row = [term, f"{fit.series.values[k] / ARCSECOND:+.2f}", f"{u[k]:.2f}"]
+        if compared is not None:
+            i = compared.terms.index(term) if term in compared.terms else -1
+            apart = np.sqrt(np.maximum(np.diag(compared.covariance), 0.0)) / ARCSECOND
+            row += [f"{compared.difference[i] / ARCSECOND:+.2f}", f"{apart[i]:.2f}"] if i >= 0 else ["", ""]
+        rows.append(tuple(row))
+    return rows
+
+
+def model_record(fit: PointingFit, name: str) -> PointingModel:
+    """The fit as a record, rounded to a micro arc second."""
+    q = fit.series.covariance / ARCSECOND**2
+    return PointingModel(
+        format="catseye-pointing-series-1",
+        name=name[:200] or "pointing",
+        terms=cast("tuple[Term, ...]", fit.series.terms),
+        values_arcsec=tuple(round(float(v), 6) for v in fit.series.values / ARCSECOND),
+        covariance_arcsec2=tuple(tuple(float(f"{v:.12g}") for v in row) for row in 0.5 * (q + q.T)),
+        sky_rms_arcsec=round(fit.sky_rms / ARCSECOND, 6),
+    )
+
+
+def track_object(found: TrackProfile) -> dict[str, Any]:
+    """A track profile as `catseye pointing track --json` gives it: rad."""
+    series = found.series
+    axis, spread = series.axis
+    return {
+        "format": TRACK,
+        "frame": "ground: turns of the alidade about east and north",
+        "harmonics": series.harmonics,
+        "coefficients": dict(zip(series.names, series.values, strict=True)),
+        "u_coefficients": dict(zip(series.names, np.sqrt(np.diag(series.covariance)), strict=True)),
+        "covariance": series.covariance,
+        "AN": axis[0],
+        "AW": axis[1],
+        "covariance_AN_AW": spread,
+        "inclinometer_zero": None if found.zero is None else found.zero[0],
+        "u_inclinometer_zero": None if found.zero is None else np.sqrt(np.diag(found.zero[1])),
+        "poses": found.poses,
+        "readings": len(found.azimuth) - found.poses,
+        "chi2": found.pvv,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "p": found.p,
+    }

@@ -1,0 +1,1 @@
+"""Mirrors, servos, tracks and the sky on the way out."""

@@ -1,0 +1,1 @@
+"""A flexible telescope on the way out."""

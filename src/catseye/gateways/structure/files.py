@@ -1,0 +1,220 @@
+"""All files of a structure's model or of its vibration: tables, object, report, samplers, provenance."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.gateways.structure.figures import motion_figure, residual_figure, spectrum_figure
+from catseye.gateways.structure.objects import FORMAT, structure_samplers, vibration_object, vibration_samplers
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
+from catseye.gateways.writers.written import Files, Progress, cell, csv_text, origin, write_files
+from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.series import Prediction, StructureFit
+from catseye.reduction.structure.vibration import Vibration
+
+
+def write_structure(
+    fit: StructureFit,
+    directory: Path,
+    *,
+    told: Mapping[str, Any],
+    check: LeaveOut | None,
+    predicted: Prediction | None,
+    inputs: Mapping[str, str],
+    progress: Progress | None = None,
+) -> None:
+    """The files of a fit.
+
+    fit, check, predicted   as for `structure_object`
+    directory               ours to fill: see `output.whole_directory`
+    told                    what `structure_object` gave
+    inputs                  SHA-256 of each file read, by its name
+    progress                told of each file
+    """
+    when = datetime.now(UTC)
+    asked = told.get("prediction") or {}
+    files: Files = {
+        "coefficients.csv": lambda: coefficients_csv(fit),
+        "residuals.csv": lambda: residuals_csv(fit, check),
+        "structure.json": lambda: json_page({"format": FORMAT, **told}),
+        "report.html": lambda: _structure_page(fit, told, check, predicted),
+    }
+    if predicted is not None:
+        files = {"prediction.csv": lambda: prediction_csv(predicted, asked), **files}
+    made = {"format": FORMAT, "made_by": "catseye structure", "model": vars(fit.model) | {"group": fit.series.group}}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, asked))
+
+
+def write_vibration(
+    found: Vibration, directory: Path, *, zero_mjd: float, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """The files of a vibration; arguments as for `write_structure`; zero_mjd is the MJD of 0 s."""
+    when = datetime.now(UTC)
+    files: Files = {
+        "spectra.csv": lambda: spectra_csv(found),
+        "vibration.json": lambda: json_page({"format": FORMAT, **vibration_object(found)}),
+        "report.html": lambda: _vibration_page(found),
+    }
+    made = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    join_samplers(directory, SAMPLERS, vibration_samplers(found, zero_mjd))
+
+
+def coefficients_csv(fit: StructureFit) -> str:
+    """The group's shift and turn for a unit of each function."""
+    six, q = fit.six_of()
+    u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
+    names = [f"shift_{a}_mm" for a in "xyz"] + [f"turn_{a}_arcsec" for a in "xyz"]
+    units = np.repeat([MILLIMETRE, ARCSECOND], 3)
+    rows = [
+        (name, *(f"{v:.6f}" for v in six[:, k] / units), *(f"{v:.6f}" for v in u[:, k] / units))
+        for k, name in enumerate(fit.model.functions)
+    ]
+    return csv_text(("function", *names, *(f"u_{name}" for name in names)), rows)
+
+
+def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
+    """Every point in every epoch against the model; and against one that did not see the epoch."""
+    s = fit.series
+    e, warm = (np.asarray(v, dtype=float) for v in (s.posture.elevation, s.posture.temperature_c))
+    head = ["epoch", "mjd_utc", "elevation_deg", "temperature_c", "way", "point"]
+    head += [f"residual_{a}_mm" for a in "xyz"]
+    head += [f"left_out_{a}_mm" for a in "xyz"] + [f"u_left_out_{a}_mm" for a in "xyz"] if check is not None else []
+    rows = []
+    for t, p in zip(*np.nonzero(np.isfinite(fit.fit.residual).all(axis=2)), strict=True):
+        row = [
+            s.labels[t],
+            cell(s.mjd[t], ".8f"),
+            f"{e[t] / DEGREE:.6f}",
+            cell(warm[t], ".3f"),
+            f"{s.way[t]:+.0f}",
+        ]
+        row += [s.names[p], *(f"{v:.4f}" for v in fit.fit.residual[t, p] / MILLIMETRE)]
+        if check is not None:
+            row += [cell(v, ".4f") for v in check.residual[t, p] / MILLIMETRE]
+            row += [cell(v, ".4f") for v in np.sqrt(np.diag(check.covariance[t, p])) / MILLIMETRE]
+        rows.append(row)
+    return csv_text(head, rows)
+
+
+def prediction_csv(predicted: Prediction, asked: Mapping[str, Any]) -> str:
+    """Where the points will be."""
+    rows = []
+    for k, e in enumerate(asked["elevation_deg"]):
+        for i, name in enumerate(predicted.names):
+            u = np.sqrt(np.diag(predicted.covariance[k, i])) / MILLIMETRE
+            place = (f"{v:.7f}" for v in predicted.place[k, i])
+            rows.append((f"{e:.6f}", cell(asked["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
+    head = ("elevation_deg", "temperature_c", "point", "x_m", "y_m", "z_m", "u_x_mm", "u_y_mm", "u_z_mm")
+    return csv_text(head, rows)
+
+
+def spectra_csv(found: Vibration) -> str:
+    """Densities with their bands."""
+    f, density, band = found.spectrum.frequency_hz, found.spectrum.density, found.spectrum.interval(0.95)
+    rows = [
+        (s.name, f"{x:.6f}", f"{density[k, a]:.6e}", f"{band[k, a, 0]:.6e}", f"{band[k, a, 1]:.6e}")
+        for a, s in enumerate(found.series)
+        for k, x in enumerate(f)
+    ]
+    return csv_text(("series", "frequency_hz", "density_m2_per_hz", "low_95_m2_per_hz", "high_95_m2_per_hz"), rows)
+
+
+def _structure_page(
+    fit: StructureFit, told: Mapping[str, Any], check: LeaveOut | None, predicted: Prediction | None
+) -> str:
+    s = fit.series
+    cards = [
+        card("Epochs", str(len(s)), f"{len(s.names)} points of {s.group}, frame {s.frame}"),
+        card("Variance factor", f"{fit.fit.variance_factor:.2f}", f"{fit.fit.degrees_of_freedom} degrees of freedom"),
+        card(
+            "New in each epoch",
+            f"{1e3 * np.linalg.norm(fit.scatter.u_six[:3]):.2f} mm",
+            f"of the group's shift, and {fit.scatter.u_point * 1e3:.3f} mm of each coordinate: not foretold",
+        ),
+    ]
+    if check is not None:
+        cards.append(card("Epochs left out", f"{check.rms * 1e3:.3f} mm rms", f"{check.ratio:.2f} of what was claimed"))
+    six, q = fit.six_of()
+    u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
+    units = np.repeat([MILLIMETRE, ARCSECOND], 3)
+    rows = [
+        [name, *(f"{v:.3f} ± {w:.3f}" for v, w in zip(six[:, k] / units, u[:, k] / units, strict=True))]
+        for k, name in enumerate(fit.model.functions)
+    ]
+    head = ["function", *(f"shift {a}, mm" for a in "xyz"), *(f"turn {a}, arcsec" for a in "xyz")]
+    parts = [
+        f"<header><h1>Structure: {s.group}</h1></header>",
+        '<div class="cards">' + "".join(cards) + "</div>",
+        *(paragraph(note) for note in told["notes"]),
+        section(
+            "motion",
+            "How the group moves",
+            picture(
+                motion_figure(fit),
+                "Shift and turn about the pivot from the mean of the epochs, at the reference temperature; the band is "
+                "two standard uncertainties of an epoch to come. Points are the epochs, temperature and way taken off.",
+            ),
+            table(head, rows, "tnnnnnn"),
+        ),
+        section(
+            "residuals",
+            "What is left",
+            picture(residual_figure(fit, check), "Measured less model, of each point in each epoch, 98 % within."),
+        ),
+    ]
+    if predicted is not None:
+        asked = told["prediction"]
+        lines = [
+            [f"{e:g}", name, *(f"{v:.5f}" for v in predicted.place[k, i]),
+             *(f"{v * 1e3:.3f}" for v in np.sqrt(np.diag(predicted.covariance[k, i])))]
+            for k, e in enumerate(asked["elevation_deg"])
+            for i, name in enumerate(predicted.names)
+        ]  # fmt: skip
+        warned = [paragraph(text, "bad") for text in predicted.outside]
+        columns = ["elevation, degrees", "point", "x, m", "y, m", "z, m", "u x, mm", "u y, mm", "u z, mm"]
+        parts.append(section("prediction", "Where the points will be", *warned, table(columns, lines, "ntnnnnnn")))
+    return page(f"Structure: {s.group}", "\n".join(parts))
+
+
+def _vibration_page(found: Vibration) -> str:
+    names = [s.name for s in found.series]
+    rows = [
+        [
+            f"{p.peak.frequency_hz:.3f}",
+            f"{p.likely_hz:.3f}" if p.decided else "open",
+            ", ".join(f"{f:.2f}" for f in p.may_be_hz),
+            f"{p.peak.over:.1f}",
+            "" if p.shape is None else f"{p.shape.rms.max() * 1e6:.1f} ({names[int(np.argmax(p.shape.rms))]})",
+        ]
+        for p in found.peaks
+    ]
+    modes = [
+        [f"{m.frequency_hz:.4f} ± {m.u_frequency_hz:.4f}", f"{m.damping_ratio:.4f} (× or ÷ {np.exp(m.u_damping):.2f})",
+         f"{np.sqrt(m.covariance[0, 0]) * 1e6:.1f}"]
+        for m in found.modes
+    ]  # fmt: skip
+    head = ["shown at, Hz", "is at, Hz", "may be, Hz", "times the background", "largest rms in the band, µm"]
+    parts = [
+        "<header><h1>Vibration</h1></header>",
+        *(paragraph(note) for note in found.notes),
+        section(
+            "spectra",
+            "Spectra",
+            picture(
+                spectrum_figure(found),
+                "One-sided density of each range; the band holds the first one's true density with 95 %. Red: half the "
+                "rate. A question mark: it may be an alias.",
+            ),
+            table(head, rows, "nntnt"),
+        ),
+        section("modes", "Modes", table(["frequency, Hz", "damping ratio", "rms, µm"], modes, "nnn")),
+    ]
+    return page("Vibration", "\n".join(parts))

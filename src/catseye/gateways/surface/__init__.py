@@ -1,0 +1,1 @@
+"""A dish's surface on the way out."""

@@ -1,0 +1,89 @@
+"""All files of a surface, and the table of its actuators."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from catseye.errors import InputError
+from catseye.gateways.surface.objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
+from catseye.gateways.surface.report import SurfaceResult, surface_report
+from catseye.gateways.surface.tables import (
+    ACTUATOR_MARK,
+    actuators_csv,
+    actuators_table,
+    change_csv,
+    epochs_csv,
+    lookup_csv,
+    prisms_csv,
+    zernike_csv,
+)
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
+from catseye.gateways.writers.written import Files, Progress, origin, write_files
+from catseye.reduction.surface.actuators import rows_of
+
+
+def surface_object(found: SurfaceResult) -> dict[str, Any]:
+    """A surface as `catseye surface --json` gives it: the epoch's keys, or `epochs`, `change`, `lookup`."""
+    made: dict[str, Any] = {"format": FORMAT}
+    if len(found.shapes) == 1:
+        made |= shape_object(found.shapes[0])
+    else:
+        made["epochs"] = [shape_object(shape) for shape in found.shapes]
+    made["change"] = None if found.change is None else change_object(found.change)
+    made["lookup"] = None if found.lookup is None else lookup_object(found.lookup)
+    made["actuators"] = None if found.actuators is None else actuators_object(found.actuators)
+    return made
+
+
+def write_surface(
+    found: SurfaceResult, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+) -> None:
+    """Tables, object, report, and last the provenance with the hashes of the others.
+
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    inputs      SHA-256 of each file read, by its name
+    progress    told of each file
+    """
+    when = datetime.now(UTC)
+    files: dict[str, Any] = {}
+    for k, shape in enumerate(found.shapes):
+        tail = f"-{k + 1}" if len(found.shapes) > 1 else ""
+        files[f"prisms{tail}.csv"] = lambda shape=shape: prisms_csv(shape)
+        files[f"zernike{tail}.csv"] = lambda shape=shape: zernike_csv(shape.expansion, shape.settings.numbering)
+    change, lookup, actuators = found.change, found.lookup, found.actuators
+    if change is not None:
+        files["change.csv"] = lambda: change_csv(change)
+        files["change-zernike.csv"] = lambda: zernike_csv(change.expansion, change.settings.numbering)
+    if lookup is not None:
+        files["lookup.csv"] = lambda: lookup_csv(lookup)
+        files["epochs.csv"] = lambda: epochs_csv(lookup)
+    if actuators is not None:
+        files["actuators.csv"] = lambda: actuators_csv(rows_of(actuators))
+    files["surface.json"] = lambda: json_page(surface_object(found))
+    files["report.html"] = lambda: surface_report(found, when, inputs)
+    made: Files = files
+    told = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(found.shapes[-1].settings)}
+    write_files(made, directory, {**told, **origin(when, inputs)}, progress)
+    join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
+
+
+def write_actuators(found: SurfaceResult, path: Path) -> None:
+    """The actuators' table by the ending of its name, .csv or .fits; whole or not at all.
+
+    Raises InputError for another ending and where another's file would be lost.
+    """
+    if found.actuators is None:
+        raise InputError(f"--actuators {path}: nothing was computed for them")
+    rows = rows_of(found.actuators)
+    ending = path.suffix.lower()
+    if ending == ".csv":
+        with whole_file(path, "--actuators", ACTUATOR_MARK) as pieces:
+            pieces.append(actuators_csv(rows))
+    elif ending == ".fits":
+        write_samplers(path, {"ACTUATORS": actuators_table(rows)}, option="--actuators")
+    else:
+        raise InputError(f"--actuators {path}: ends in {ending!r} (expected .csv or .fits)")

@@ -1,0 +1,177 @@
+"""The report of a surface: one HTML page that needs nothing else."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from html import escape
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.gateways.surface.figures import actuator_map, elevation_terms, surface_map, zernike_bars
+from catseye.gateways.surface.objects import actuators_passage, change_passages, lookup_passages, root, shape_passages
+from catseye.gateways.writers.objects import versions
+from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
+from catseye.optics.zernike import number
+from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.lookup import Lookup
+from catseye.reduction.surface.shape import Expansion, MeanSquare, Shape, ShapeSettings
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceResult:
+    """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators."""
+
+    shapes: tuple[Shape, ...]
+    change: Change | None = None
+    lookup: Lookup | None = None
+    actuators: Actuators | None = None
+
+
+def surface_report(found: SurfaceResult, when: datetime, inputs: Mapping[str, str]) -> str:
+    """The whole page.
+
+    when     UTC
+    inputs   SHA-256 of each file read, by its name
+    """
+    body = [_header(found, when)]
+    if found.lookup is not None:
+        body.append(_lookup(found.lookup))
+    if found.change is not None:
+        body.append(_change(found.change))
+    body += [_shape(shape, k + 1, len(found.shapes)) for k, shape in enumerate(found.shapes)]
+    if found.actuators is not None:
+        body.append(_actuators(found.actuators, found.shapes[-1]))
+    rows = [(name, digest) for name, digest in inputs.items()]
+    told = ", ".join(f"{k} {v}" for k, v in versions().items())
+    body.append(section("origin", "Origin", paragraph(told, "faint"), table(("file", "SHA-256"), rows, "th")))
+    return page("catseye: surface", "\n".join(body))
+
+
+def _header(found: SurfaceResult, when: datetime) -> str:
+    names = ", ".join(shape.prisms.source for shape in found.shapes)
+    return (
+        f"<header><h1>The surface</h1><div class='faint'>{escape(names)}; by catseye on {when:%Y-%m-%d %H:%M} UTC; "
+        "deviations along the normal, above zero towards the focus; half-path errors are half of what they shorten the "
+        "path by; u = standard uncertainty, 1σ</div></header>"
+    )
+
+
+def _told(passages: list[Passage]) -> str:
+    return "<dl>" + "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages) + "</dl>"
+
+
+def _cards(square: MeanSquare, extra: list[str]) -> str:
+    own = root(square.own)
+    text = "not above the noise" if own is None else f"{own / MILLIMETRE:.3f} mm"
+    first = card("Half-path rms", text, "under the illumination, without the measurement's noise")
+    return f'<div class="cards">{first}{"".join(extra)}</div>'
+
+
+def _shape(shape: Shape, epoch: int, of: int) -> str:
+    title = "The dish" if of == 1 else f"Epoch {epoch}: {shape.prisms.source}"
+    gains = [
+        card(f"Gain at {g.frequency / 1e9:g} GHz", f"{g.ruze:.3f}", f"± {g.u_ruze:.3f} of the perfect surface's, Ruze")
+        for g in shape.gains
+    ]
+    u = float(np.median(np.sqrt(np.diag(shape.fit.deviation_covariance)))) / MILLIMETRE
+    local = shape.fit.local
+    return section(
+        f"epoch-{epoch}",
+        title,
+        _cards(shape.square, gains),
+        _told(shape_passages(shape)),
+        picture(
+            surface_map(local, shape.fit.half_path, shape.aperture, "half-path error (mm)", shape.prisms.names),
+            f"Half-path errors off the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
+            "prisms are plain interpolation in triangles. Dashed: the aperture.",
+        ),
+        *_terms(shape.expansion, shape.settings),
+    )
+
+
+def _change(change: Change) -> str:
+    return section(
+        "change",
+        "The change",
+        _cards(change.square, []),
+        _told(change_passages(change)),
+        picture(
+            surface_map(change.local, change.half_path, change.aperture, "change of half path (mm)", change.names),
+            "Second epoch less first, after the dish's motion as its prisms show it in all three coordinates.",
+        ),
+        *_terms(change.expansion, change.settings),
+    )
+
+
+def _terms(expansion: Expansion, settings: ShapeSettings) -> list[str]:
+    u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
+    rows = [
+        (
+            str(number(term, settings.numbering)),
+            term.name,
+            f"{expansion.value[k] / MILLIMETRE:+.4f}",
+            f"{u[k] / MILLIMETRE:.4f}",
+            f"{round(100.0 * float(expansion.share[k]))} %",
+            *_cell(expansion.joint[k], u_joint[k]),
+        )
+        for k, term in enumerate(expansion.terms)
+    ]
+    columns = (settings.numbering, "term", "left (mm)", "u (mm)", "taken by the fit", "term itself (mm)", "u (mm)")
+    return [
+        picture(zernike_bars(expansion, settings), "Zernike terms of the half-path errors as the fit leaves them."),
+        table(columns, rows, "ntnnnnn"),
+        paragraph(
+            "Left: what the errors hold of a term. Taken: what of the term's square the fitted paraboloid, or the "
+            "dish's motion, takes for itself. The term itself: estimated together with the paraboloid; empty where the "
+            "paraboloid stands for it.",
+            "faint",
+        ),
+    ]
+
+
+def _cell(value: float, u: float) -> tuple[str, str]:
+    return (f"{value / MILLIMETRE:+.4f}", f"{u / MILLIMETRE:.4f}") if np.isfinite(u) else ("", "")
+
+
+def _lookup(lookup: Lookup) -> str:
+    numbering = lookup.shapes[0].settings.numbering
+    rows = [
+        (
+            str(number(model.term, numbering)),
+            model.term.name,
+            *(
+                f"{v / MILLIMETRE:+.4f} ± {model.raised * np.sqrt(s) / MILLIMETRE:.4f}"
+                for v, s in zip(model.value, np.diag(model.covariance), strict=True)
+            ),
+            f"{model.variance_factor:.2f}" if np.isfinite(model.variance_factor) else "",
+        )
+        for model in lookup.models
+    ]
+    columns = ("term", "name", *(f"{name} (mm)" for name in lookup.columns), "variance factor")
+    return section(
+        "elevation",
+        "Terms by elevation",
+        _told(lookup_passages(lookup)),
+        picture(
+            elevation_terms(lookup),
+            "The terms that elevation moves most. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
+        ),
+        table(columns, rows, "nt" + "n" * (len(lookup.columns) + 1)),
+        paragraph(
+            "Thermal: mm for a degree. Hysteresis: what a term is more when elevation rises than when it falls. Where "
+            "epochs scatter more than they claim (variance factor above 1), u is raised by its root.",
+            "faint",
+        ),
+    )
+
+
+def _actuators(found: Actuators, shape: Shape) -> str:
+    return section(
+        "actuators",
+        "Actuators",
+        _told([actuators_passage(found)]),
+        picture(actuator_map(found, shape.aperture), "Corrections, and how well they are known."),
+    )

@@ -1,0 +1,1 @@
+"""Triplet units on the way out."""

@@ -1,0 +1,93 @@
+"""All files of the calibration of some triplets: a sheet each as text, page and object, and one table of all."""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from catseye.errors import InputError
+from catseye.gateways.calibrations.certificate_record import FORMAT
+from catseye.gateways.triplet.objects import triplet_object
+from catseye.gateways.triplet.sheet import html_sheet, text_sheet
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.output import PROVENANCE
+from catseye.gateways.writers.written import origin, write_files
+from catseye.reduction.triplet.result import TripletReduction
+
+COLUMNS = (
+    "file", "triplet", "h_corr_mm", "u_h_corr_mm", "l_mpbc_mm", "u_l_mpbc_mm", "difference_mm", "u_difference_mm",
+    "accepted", "conformity_probability", "placements", "p",
+)  # fmt: skip
+Progress = Callable[[str, int, int], None]
+
+
+def write_triplets(
+    units: Mapping[Path, TripletReduction],
+    directory: Path,
+    hashes: Mapping[Path, str],
+    progress: Progress | None = None,
+) -> None:
+    """NAME.txt, NAME.html, NAME.json for each sheet NAME.toml, triplets.csv, and the provenance with their hashes.
+
+    units       calibrations by the file of their sheet
+    directory   exists, and is ours to fill: see `output.whole_directory`
+    hashes      SHA-256 of each file
+    progress    told of each file
+
+    Raises InputError where two sheets have one name, or one has the name of the provenance.
+    """
+    refuse_namesakes(list(units))
+    when = datetime.now(UTC)
+    files: dict[str, Callable[[], str]] = {}
+    for path, found in units.items():
+        files[f"{path.stem}.txt"] = partial(text_sheet, found, path.name)
+        files[f"{path.stem}.html"] = partial(html_sheet, found, path.name, when, hashes[path])
+        files[f"{path.stem}.json"] = partial(_object_page, found, path.name)
+    files["triplets.csv"] = lambda: triplets_csv({path.name: found for path, found in units.items()})
+    made = {"format": FORMAT, "made_by": "catseye triplet"}
+    inputs = {path.name: hashes[path] for path in units}
+    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+
+
+def _object_page(found: TripletReduction, name: str) -> str:
+    return json_page(triplet_object(found, name))
+
+
+def refuse_namesakes(paths: list[Path]) -> None:
+    """Two sheets of one name would write over each other, one sheet twice is a slip; PROVENANCE is ours."""
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if f"{path.stem}.json" == PROVENANCE:
+            raise InputError(f"{path}: {PROVENANCE} of --out would be written twice (expected a sheet of another name)")
+        if path.stem in seen:
+            raise InputError(
+                f"{path}: has the name of {seen[path.stem]} (expected sheets of different names for --out)"
+            )
+        seen[path.stem] = path
+
+
+def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
+    """A row a unit, lengths in mm; an empty cell is unknown.
+
+    units   calibrations by the name of their sheet
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(_row(file, found) for file, found in units.items())
+    return stream.getvalue()
+
+
+def _row(file: str, f: TripletReduction) -> tuple[Any, ...]:
+    lengths = (f.h_corr, f.u_h_corr, f.l_mpbc, f.u_l_mpbc, f.difference, f.u_difference)
+    told = (_plain(1e3 * x) for x in lengths)
+    accepted = "yes" if f.accepted else "no"
+    return (file, f.measurement.triplet, *told, accepted, _plain(f.conformity_probability), len(f.h), _plain(f.p))
+
+
+def _plain(value: float) -> str:
+    return f"{value:.6f}" if math.isfinite(value) else ""

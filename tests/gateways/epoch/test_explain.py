@@ -1,0 +1,157 @@
+"""A shot explained for programs and for people: the same numbers in the object, the lines and the page."""
+
+import dataclasses
+import json
+from html import escape
+
+import numpy as np
+import pytest
+
+from catseye.gateways.epoch.explain import budget_lines, explanation_object, explanation_passages
+from catseye.gateways.epoch.explain_page import MARK, explanation_page, figures
+from catseye.gateways.writers.objects import json_line
+from catseye.reduction.budget import Assumptions, explain_shot
+
+KEYS = {
+    "shot", "ranger", "target", "mjd_utc", "status", "reason", "range", "u_range", "expanded_uncertainty",
+    "coverage_factor", "effective_degrees_of_freedom", "cycles", "margin", "slip_probability", "inputs",
+    "correlations", "monte_carlo", "adjusted",
+}  # fmt: skip
+INPUT_KEYS = {
+    "name", "value", "unit", "standard_uncertainty", "distribution", "degrees_of_freedom", "sensitivity",
+    "contribution", "share", "source",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def explained(reduction):
+    """Function shot -> explanation with a short Monte Carlo."""
+    known = {}
+
+    def of(shot):
+        if shot not in known:
+            known[shot] = explain_shot(reduction.campaign, shot, draws=20_000, reduction=reduction)
+        return known[shot]
+
+    return of
+
+
+def told(found):
+    """The object after its way through JSON, in which NaN would not survive."""
+    return json.loads(json_line(explanation_object(found, 1)), parse_constant=pytest.fail)
+
+
+def text_of(found):
+    return "\n".join([*(f"{p.title}: {p.text}" for p in explanation_passages(found)), *budget_lines(found)])
+
+
+@pytest.mark.parametrize("shot", [3, 700, 94, 1, 19])
+def test_the_object_has_the_contracts_keys_for_every_status(explained, shot):
+    found = told(explained(shot))
+    assert set(found) >= KEYS
+    assert found["shot"] == shot
+    for entry in found["inputs"]:
+        assert set(entry) == INPUT_KEYS
+
+
+def test_the_inputs_of_the_object_give_its_uncertainty_again(explained):
+    found = told(explained(3))
+    parts = [entry["sensitivity"] * entry["standard_uncertainty"] for entry in found["inputs"]]
+    assert [entry["contribution"] for entry in found["inputs"]] == pytest.approx(parts)
+    assert found["u_range"] == pytest.approx(np.sqrt(np.sum(np.square(parts))))
+    assert sum(entry["share"] for entry in found["inputs"]) == pytest.approx(1.0)
+    assert found["expanded_uncertainty"] == pytest.approx(found["coverage_factor"] * found["u_range"])
+    assert found["correlations"] == []
+    sheets = {entry["name"]: entry["degrees_of_freedom"] for entry in found["inputs"]}
+    assert sheets["distance of the cube D0"] is None
+    assert sheets["noise of the target"] == 127.0
+
+
+def test_the_monte_carlo_stands_beside_with_its_draws_and_seed(explained):
+    found = told(explained(3))
+    beside = found["monte_carlo"]
+    assert (beside["draws"], beside["seed"]) == (20_000, 1)
+    assert beside["standard_uncertainty"] == pytest.approx(found["u_range"], rel=0.03)
+    assert beside["low"] < found["range"] < beside["high"]
+    assert beside["agrees"] is True
+
+
+def test_an_interval_that_disagrees_is_said_to(explained):
+    found = explained(3)
+    wider = dataclasses.replace(found.scattered, high=found.scattered.high + 3.0 * found.budget.u)
+    doubted = dataclasses.replace(found, scattered=wider)
+    assert told(doubted)["monte_carlo"]["agrees"] is False
+    assert "believe this one" in text_of(doubted)
+    assert "believe this one" not in text_of(found)
+
+
+def test_correlated_inputs_are_named(reduction):
+    alike = Assumptions(thermometer_correlation=0.5)
+    found = explain_shot(reduction.campaign, 3, assumptions=alike, reduction=reduction)
+    (pair,) = told(found)["correlations"]
+    assert pair["correlation"] == 0.5
+    assert {pair["first"], pair["second"]} == {"offset of thermometer WX1", "offset of thermometer WX2"}
+    assert "+0.50" in text_of(found)
+
+
+def test_a_shot_without_a_range_says_why_and_what_came_back(explained):
+    blocked, reference = explained(19), explained(1)
+    for found in (told(blocked), told(reference)):
+        assert found["range"] is None
+        assert found["inputs"] == []
+        assert found["monte_carlo"] is None
+        assert found["amplitude"] > 0.0
+    assert "blocked: return 0.0025 V" in text_of(blocked)
+    assert "nothing came back" in text_of(blocked)
+    assert "internal cube" in text_of(reference)
+    assert budget_lines(blocked) == []
+
+
+def test_a_rejected_shot_is_explained_with_a_warning(explained):
+    text = text_of(explained(94))
+    assert "reflected" in text
+    assert "knows nothing of what this shot was rejected for" in text
+    assert "4855 µm less than between the adjusted points" in text
+    assert text.count("light from elsewhere in the return") == 1
+
+
+def test_the_table_is_sorted_and_adds_up(explained):
+    found = explained(3)
+    lines = budget_lines(found)
+    shares = [float(line.split()[0]) for line in lines[1:-2]]
+    assert shares == sorted(shares, reverse=True)
+    assert float(lines[-1].split()[0]) == 100.0
+    assert sum(float(line.split()[0]) for line in lines[1:-1]) == pytest.approx(100.0, abs=0.1)
+    assert float(lines[-1].split()[1]) == pytest.approx(found.budget.u * 1e6, abs=0.006)
+    assert all(len(line) <= 110 for line in lines)
+
+
+def test_the_page_stands_alone_and_names_every_input(explained, reduction):
+    from datetime import UTC, datetime
+
+    found = explained(3)
+    html = explanation_page(found, reduction.campaign, datetime(2026, 1, 2, tzinfo=UTC))
+    assert MARK in html[:4096]
+    assert "http://" not in html.replace("http://www.w3.org", "")
+    assert "<script" not in html
+    for item in found.items:
+        assert item.given.name in html
+        assert escape(item.source) in html
+    assert html.count("<img") == 2
+    assert all(digest in html for digest in reduction.campaign.hashes.values())
+
+
+def test_the_page_of_a_shot_without_a_range_has_no_figures(explained, reduction):
+    from datetime import UTC, datetime
+
+    html = explanation_page(explained(19), reduction.campaign, datetime(2026, 1, 2, tzinfo=UTC))
+    assert "blocked: return" in html
+    assert "<img" not in html
+
+
+def test_figures_are_drawn_the_same_each_time(explained):
+    found = explained(94)
+    first, second = figures(found), figures(found)
+    assert first == second
+    assert set(first) == {"contributions", "histogram"}
+    assert set(figures(dataclasses.replace(found, scattered=None))) == {"contributions"}

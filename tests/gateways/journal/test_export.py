@@ -1,0 +1,360 @@
+"""A journal's runs as tables and as a campaign: nothing invented, nothing lost in silence, all or nothing."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catseye.coordinator.journal import Journal
+from catseye.coordinator.journal_entries import AnsweredShot, Run, Solution
+from catseye.coordinator.journal_reader import JournalReader
+from catseye.errors import InputError
+from catseye.gateways.journal.campaign import export_campaign
+from catseye.gateways.journal.export import FORMAT, TABLES, export_tables, stamp
+from catseye.gateways.writers import output
+from catseye.records.campaign import read_campaign
+from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
+from catseye.simulator.world_clock import ManualClock
+from journal_scene import START, scene_entries, scene_run, scene_shot
+
+HALF_TICK = 0.5 / TICKS_PER_DAY
+SECOND = TICKS_PER_DAY // 86_400
+
+
+def written(path, entries, **more):
+    with Journal.open(path, run=scene_run(), clock=ManualClock(START / 1e8), **more) as journal:
+        for entry in entries:
+            journal.append(entry)
+    return path
+
+
+def rows(path):
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def epoch(ticks, covariance):
+    answer = {"number": 3, "names": ["ZEG1", "ZEG2"], "x": [[1.0, 2.0, 1 / 3], [4.0, 5.0, None]], "pose": {"a": 1}}
+    return Solution(ticks, {**answer, "variance_factor": 1.1, "degrees_of_freedom": None}, covariance)
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    """Two runs and what was exported of both."""
+    from astropy.io import fits
+
+    folder = tmp_path_factory.mktemp("tables")
+    covariance = np.diag([1e-6, 4e-6, 9e-6, 1e-8, 1e-8, 1e-8])
+    covariance[0, 1] = covariance[1, 0] = 1e-6
+    entries = [*scene_entries(20), epoch(START + 7, covariance), epoch(START + 8, None)]
+    written(folder / "j.db", entries)
+    written(folder / "j.db", scene_entries(2, seed=9))
+    with JournalReader(folder / "j.db") as reader:
+        counts = export_tables(reader, folder / "out", runs=[1, 2])
+    read = {}
+    for name in TABLES:
+        with fits.open(folder / "out" / f"{name}.fits", checksum=True) as pages:
+            read[name] = (pages[1].data.copy(), pages[1].columns, pages[1].header.copy())
+    return folder, entries, counts, read
+
+
+def test_every_entry_is_a_row_with_its_run_seq_and_exact_time(tables):
+    folder, entries, counts, _ = tables
+    kinds = {"shots": AnsweredShot, "weather": LiveWeather, "postures": LivePosture, "happenings": Happening}
+    for name, kind in kinds.items():
+        found = rows(folder / "out" / f"{name}.csv")
+        wanted = [(1, seq, e) for seq, e in enumerate(entries, 1) if isinstance(e, kind)]
+        wanted += [(2, seq, e) for seq, e in enumerate(scene_entries(2, seed=9), 1) if isinstance(e, kind)]
+        ticks = [e.shot.ticks if kind is AnsweredShot else e.ticks for _, _, e in wanted]
+        assert [(int(r["run"]), int(r["seq"])) for r in found] == [(run, seq) for run, seq, _ in wanted]
+        assert [int(r["mjd_utc"].replace(".", "")) for r in found] == ticks
+        assert counts[name] == len(found) > 0
+    shot = rows(folder / "out" / "shots.csv")[4]
+    taken = [e for e in entries if isinstance(e, AnsweredShot)][4]
+    assert (shot["ranger"], shot["target"], shot["status"]) == ("ZY105", "ZEG41040L", "used")
+    assert float(shot["range_m"]) == taken.range_
+    assert float(shot["phase_rad"]) == taken.shot.phase
+    assert float(shot["u_range_mm"]) == pytest.approx(0.031, rel=1e-12)
+    silent = [r["pressure_hpa"] for r in rows(folder / "out" / "weather.csv")[:4]]
+    assert silent == ["930.86", "", "", "930.86"]
+
+
+def test_fits_says_the_same_in_units_of_its_own(tables):
+    folder, _, counts, read = tables
+    for name, (data, columns, header) in read.items():
+        found = rows(folder / "out" / f"{name}.csv")
+        assert len(data) == counts[name] == len(found)
+        assert (header["EXTNAME"], header["TIMESYS"]) == (name.upper(), "UTC")
+        assert columns["DMJD"].unit == "d"
+        assert data["TICKS"].tolist() == [int(r["mjd_utc"].replace(".", "")) for r in found]
+        assert np.abs(data["DMJD"] - data["TICKS"] / TICKS_PER_DAY).max(initial=0.0) < 1e-11  # a double's step
+    weather = read["weather"][0]
+    celsius = [float(r["temperature_c"]) for r in rows(folder / "out" / "weather.csv")]
+    np.testing.assert_allclose(weather["TEMPERATURE"] - 273.15, celsius, atol=1e-12)
+    np.testing.assert_allclose(weather["HUMIDITY"], 0.704, rtol=1e-15)
+    assert np.isnan(weather["PRESSURE"]).sum() == sum(r["pressure_hpa"] == "" for r in rows(folder / "out/weather.csv"))
+    assert [read["weather"][1][n].unit for n in ("TEMPERATURE", "PRESSURE", "HUMIDITY")] == ["K", "hPa", None]
+    shots, columns, _ = read["shots"]
+    assert shots["RANGE"][3] == float(rows(folder / "out" / "shots.csv")[3]["range_m"])
+    assert [columns[n].unit for n in ("RANGE", "U_RANGE", "PHASE", "AMPLITUDE", "IFFREQ")] == [
+        "m",
+        "mm",
+        "rad",
+        "V",
+        "Hz",
+    ]
+    assert np.degrees(2.5) == pytest.approx(read["postures"][0]["AZIMUTH"][0], abs=1e-12)
+    assert read["happenings"][0]["TEXT"][0] == "ZY105 lost \\xb5"
+
+
+def test_astropy_takes_the_units_for_what_they_are(tables):
+    from astropy.table import QTable
+
+    folder, *_ = tables
+    for name in TABLES:
+        table = QTable.read(folder / "out" / f"{name}.fits", format="fits")  # a unit it does not know would warn
+        assert len(table) > 0
+
+
+def test_coordinates_come_with_the_block_of_the_covariance_that_is_theirs(tables):
+    folder, entries, _, read = tables
+    found = rows(folder / "out" / "coordinates.csv")
+    assert [(r["seq"], r["point"]) for r in found] == [
+        (str(len(entries) - 1 + late), point) for late in (0, 1) for point in ("ZEG1", "ZEG2")
+    ]
+    one, two, bare, _ = found
+    assert [float(one[key]) for key in ("x_m", "y_m", "z_m")] == [1.0, 2.0, 1 / 3]
+    assert [float(one[f"u_{axis}_mm"]) for axis in "xyz"] == pytest.approx([1.0, 2.0, 3.0])
+    assert [float(one[f"cov_{pair}_mm2"]) for pair in ("xy", "xz", "yz")] == pytest.approx([1.0, 0.0, 0.0])
+    assert [float(two[f"u_{axis}_mm"]) for axis in "xyz"] == pytest.approx([0.1, 0.1, 0.1])
+    assert (two["z_m"], bare["u_x_mm"]) == ("", "")
+    assert np.isnan(read["coordinates"][0]["Z"][1])
+    last = rows(folder / "out" / "solutions.csv")[-3]
+    assert (last["number"], last["variance_factor"], last["degrees_of_freedom"], last["points"]) == (
+        "3",
+        "1.1",
+        "",
+        "2",
+    )
+
+
+def test_the_provenance_names_journal_runs_and_every_file(tables):
+    import hashlib
+
+    folder, *_ = tables
+    said = json.loads((folder / "out" / "provenance.json").read_text())
+    assert (said["format"], said["journal"], sorted(said["runs"])) == (FORMAT, "j.db", ["1", "2"])
+    files = {path.name for path in (folder / "out").iterdir()} - {"provenance.json"}
+    assert files == {f"{name}.{form}" for name in TABLES for form in ("csv", "fits")} == set(said["outputs"])
+    for name, digest in said["outputs"].items():
+        assert hashlib.sha256((folder / "out" / name).read_bytes()).hexdigest() == digest
+
+
+def test_runs_span_and_forms_are_chosen(tables, tmp_path):
+    folder, _entries, *_ = tables
+    span = (START + 200 * 5, START + 200 * 8)
+    with JournalReader(folder / "j.db") as reader:
+        export_tables(reader, tmp_path / "a", runs=[1], forms=["csv"], span=span)
+        with pytest.raises(InputError, match="names 0 runs"):
+            export_tables(reader, tmp_path / "b", runs=[1, 7])
+        with pytest.raises(InputError, match="no run or no form"):
+            export_tables(reader, tmp_path / "b", runs=[])
+    assert [int(r["number"]) for r in rows(tmp_path / "a" / "shots.csv")] == [5, 6, 7]
+    assert not list((tmp_path / "a").glob("*.fits"))
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_a_quantity_that_nobody_told_is_an_empty_table(tmp_path):
+    from astropy.io import fits
+
+    written(tmp_path / "j.db", [scene_shot(1)])
+    with JournalReader(tmp_path / "j.db") as reader:
+        counts = export_tables(reader, tmp_path / "out", runs=[1])
+    assert counts == {**dict.fromkeys(TABLES, 0), "shots": 1}
+    assert (tmp_path / "out" / "happenings.csv").read_text() == "run,seq,mjd_utc,severity,who,kind,text,details\n"
+    with fits.open(tmp_path / "out" / "happenings.fits") as pages:
+        assert len(pages[1].data) == 0
+
+
+def test_an_earlier_export_is_replaced_and_a_strangers_folder_is_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(output, "FORMATS", (*output.FORMATS, FORMAT))
+    written(tmp_path / "j.db", campaign_entries())
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "thesis.txt").write_text("x")
+    with JournalReader(tmp_path / "j.db") as reader:
+        for _ in range(2):
+            export_tables(reader, tmp_path / "out", runs=[1], forms=["csv"])
+            export_campaign(reader, tmp_path / "campaign", run=1)
+        with pytest.raises(InputError, match=r"thesis.txt"):
+            export_tables(reader, tmp_path / "theirs", runs=[1])
+        with pytest.raises(InputError, match="is, holds or lies in the input"):
+            export_campaign(reader, tmp_path / "j.db", run=1)
+    assert {path.name for path in tmp_path.iterdir()} == {"j.db", "theirs", "out", "campaign"}
+
+
+# A campaign ----------------------------------------------------------------------------------------------------------
+
+
+def full_shot(number, ranger="ZY105", target="ZEG41040L", *, ticks=None, **more):
+    """A shot as site.toml of night-01 has it."""
+    codes = np.random.default_rng(number).integers(-30000, 30000, 8192, dtype=np.int16)
+    when = START + SECOND * number if ticks is None else ticks
+    return replace(LiveShot(ranger, target, when, 128, 64, 1000, 10.0 / 32768.0, codes, number=number), **more)
+
+
+def campaign_entries(count=6):
+    entries = []
+    for k in range(1, count):
+        entries += [
+            LivePosture(START + SECOND * k, np.radians((359.9995 + 0.001 * (k % 2)) % 360.0), np.radians(41.25)),
+            full_shot(k),
+            LiveWeather(f"WX{k % 2 + 1}", START + SECOND * k, 10.0 + 0.1 * k, 930.1, 70.0),
+        ]
+    return entries
+
+
+def exported(tmp_path, entries, **more):
+    written(tmp_path / "j.db", entries)
+    with JournalReader(tmp_path / "j.db") as reader:
+        done = export_campaign(reader, tmp_path / "out", run=1, **more)
+    return done, read_campaign(tmp_path / "out")
+
+
+def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_01):
+    """Every sample and reading of the example night; times to the half of a tick that a ZY's stamp has."""
+    night, adc = night_01, night_01.site.adc
+    shots = night.shots
+    with Journal.open(tmp_path / "j.db", run=Run(night), clock=ManualClock(52889.125), compress=True) as journal:
+        weather = zip(
+            night.weather.mjd_utc,
+            night.weather.station,
+            night.weather.temperature_c,
+            night.weather.pressure_hpa,
+            night.weather.humidity_percent,
+            strict=True,
+        )
+        for mjd, station, *values in weather:
+            journal.append(LiveWeather(station, round(mjd * TICKS_PER_DAY), *values))
+        for k in np.random.default_rng(4).permutation(len(shots)):  # a journal has them as they arrived
+            size = int(shots.cycles[k] * shots.samples_per_cycle[k])
+            sampling = int(shots.cycles[k]), int(shots.samples_per_cycle[k]), round(night.site.ranging.if_hz)
+            ticks = round(float(shots.mjd_utc[k]) * TICKS_PER_DAY)
+            samples = night.frames[shots.frame[k], :size]
+            volts = adc.full_scale_volt / 32768.0
+            shot = LiveShot(
+                shots.ranger[k], shots.target[k], ticks, *sampling, volts, samples, number=int(shots.shot[k])
+            )
+            journal.append(shot)
+    with JournalReader(tmp_path / "j.db") as reader:
+        done = export_campaign(reader, tmp_path / "out", run=1)
+    again = read_campaign(tmp_path / "out")
+    assert (done.shots, done.readings, done.left_out) == (len(shots), len(night.weather), {})
+    assert done.notes == ("no posture was journalled in the span: azimuth and elevation are site.toml's",)
+    order = np.argsort(again.shots.shot)
+    assert np.array_equal(again.shots.shot[order], np.sort(shots.shot))
+    first = np.argsort(shots.shot)
+    assert [again.shots.ranger[k] for k in order] == [shots.ranger[k] for k in first]
+    assert [again.shots.target[k] for k in order] == [shots.target[k] for k in first]
+    assert np.abs(again.shots.mjd_utc[order] - shots.mjd_utc[first]).max() <= HALF_TICK + 1e-11
+    assert np.array_equal(again.frames[again.shots.frame[order]], night.frames[shots.frame[first]])
+    assert np.array_equal(again.weather.temperature_c, night.weather.temperature_c)
+    assert np.array_equal(again.weather.humidity_percent, night.weather.humidity_percent)
+    assert again.targets == night.targets
+    assert again.mirrors == night.mirrors
+
+
+def test_it_stands_as_the_telescope_stood(tmp_path):
+    done, campaign = exported(tmp_path, campaign_entries())
+    posture = campaign.site.campaign
+    assert posture.start_mjd_utc == (START + SECOND) / TICKS_PER_DAY
+    assert posture.azimuth_deg == pytest.approx(0.0005, abs=1e-9)  # the median of a telescope about north
+    assert posture.elevation_deg == pytest.approx(41.25, abs=1e-12)
+    assert (done.shots, done.notes) == (5, ())
+
+
+def test_a_campaign_that_could_not_be_read_does_not_appear(tmp_path):
+    """A telescope that says it looks into the ground: site.toml may not say so."""
+    still = [e for e in campaign_entries() if not isinstance(e, LivePosture)]
+    with pytest.raises(InputError, match="elevation_deg"):
+        exported(tmp_path, [*still, LivePosture(START + SECOND * 2, 1.0, -1.0)])
+    assert [path.name for path in tmp_path.iterdir()] == ["j.db"]
+
+
+def test_a_telescope_that_moved_is_told(tmp_path):
+    moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5) for k in (1, 2, 5)]
+    still = [e for e in campaign_entries() if not isinstance(e, LivePosture)]
+    done, campaign = exported(tmp_path, [*still, *moved])
+    assert done.notes[0].startswith("the telescope moved by 2.292 deg")  # 0.04 rad
+    assert campaign.site.campaign.azimuth_deg == pytest.approx(np.degrees(1.02))
+
+
+def test_what_a_campaign_cannot_hold_is_told_and_left_out(tmp_path):
+    whole = campaign_entries()
+    last = START + SECOND * 5
+    strange = {
+        "a shot not later than its ranger's last": full_shot(20, target="ZEG20440L", ticks=START + SECOND * 3),
+        "a shot without samples": full_shot(21, samples=None),
+        "a shot with samples missing": full_shot(22, cycles=127),
+        "a shot of or at what the site does not have": full_shot(23, "ZY999"),
+        "a shot with another if_hz or volts a code than site.toml's": full_shot(24, if_hz=2000),
+        "a shot without weather within 1 h": full_shot(25, ticks=last + 3700 * SECOND),
+        "a reading with a silent sensor": LiveWeather("WX1", last + 1, 10.0, float("nan"), 50.0),
+        "a reading of a station that site.toml does not name": LiveWeather("WX9", last, 10.0, 930.0, 50.0),
+        "a reading not later than its station's last": LiveWeather("WX1", START + SECOND * 2, 10.0, 930.0, 50.0),
+        "a reading out of a thermometer's, barometer's or hygrometer's range": LiveWeather(
+            "WX1", last, 10.0, 93.0, 50.0
+        ),
+    }
+    done, campaign = exported(tmp_path, [*whole, *strange.values()])
+    assert done.left_out == dict.fromkeys(strange, 1)
+    assert (done.shots, len(campaign.shots), done.readings) == (5, 5, 5)
+    for reason in strange:
+        assert any(note.startswith(f"left out 1: {reason} (") for note in done.notes)
+    assert json.loads((tmp_path / "out" / "provenance.json").read_text())["notes"] == list(done.notes)
+    assert f"(WX1 at {stamp(last + 1)})" in next(note for note in done.notes if "silent" in note)
+
+
+def test_the_first_few_of_many_are_named(tmp_path):
+    done, _ = exported(tmp_path, [*campaign_entries(), *(full_shot(k, samples=None) for k in range(30, 40))])
+    assert (
+        "left out 10: a shot without samples (shot 30 of ZY105, shot 31 of ZY105, shot 32 of ZY105, ...)" in done.notes
+    )
+
+
+def test_a_part_of_a_run(tmp_path):
+    span = (START + SECOND * 2, START + SECOND * 4)
+    done, campaign = exported(tmp_path, campaign_entries(), span=span)
+    assert campaign.shots.shot.tolist() == [2, 3]
+    assert done.readings == 5  # the weather an hour around it
+
+
+def test_buffers_of_different_lengths_stand_in_one_array(tmp_path):
+    short = replace(full_shot(50), cycles=64, samples=full_shot(50).samples[:4096])
+    _, campaign = exported(tmp_path, [*campaign_entries(), short])
+    assert np.array_equal(campaign.frames[5, :4096], short.samples)
+    assert not campaign.frames[5, 4096:].any()
+
+
+def test_numbers_that_are_not_each_once_give_way_to_seq(tmp_path):
+    entries = campaign_entries()
+    again = replace(full_shot(2, ranger="ZY106"), number=2)
+    done, campaign = exported(tmp_path, [*entries, again])
+    assert any("the journal's seq" in note for note in done.notes)
+    assert sorted(campaign.shots.shot.tolist()) == [2, 5, 8, 11, 14, 16]
+
+
+@pytest.mark.parametrize("kind", [LiveWeather, LiveShot])
+def test_a_run_without_shots_or_weather_is_refused_and_leaves_nothing(tmp_path, kind):
+    rest = [entry for entry in campaign_entries() if not isinstance(entry, kind)]
+    with pytest.raises(InputError, match="run 1 has no"):
+        exported(tmp_path, rest)
+    assert [path.name for path in tmp_path.iterdir()] == ["j.db"]
+
+
+def test_a_station_that_never_spoke_is_left_out_of_the_site(tmp_path):
+    entries = [e for e in campaign_entries() if not (isinstance(e, LiveWeather) and e.station == "WX1")]
+    done, campaign = exported(tmp_path, entries)
+    assert [station.name for station in campaign.site.weather_station] == ["WX2"]
+    assert done.notes == ("weather stations that said nothing were left out of site.toml: WX1",)
