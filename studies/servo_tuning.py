@@ -14,10 +14,10 @@ from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
-from catseye.simulator.motion_chip import MotionChip
-from catseye.simulator.motor import AxisDesign
-from catseye.simulator.servo import TRACKING_SAMPLES, ServoAxis, Settling, Trace
-from catseye.simulator.tuning import (
+from catseye.simulator.servo.axis import TRACKING_SAMPLES, ServoAxis, Settling, Trace
+from catseye.simulator.servo.motion_chip import MotionChip
+from catseye.simulator.servo.motor import AxisDesign
+from catseye.simulator.servo.tuning import (
     Filter,
     closed_loop,
     design_filter,

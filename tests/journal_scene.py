@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.coordinator.journal_entries import AnsweredShot, Command, Document, Run, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Run, Solution
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import read_site
 from repository import ROOT

@@ -10,9 +10,9 @@ from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
 from catseye.reduction.live.live import EpochAnswer, Live, LiveSettings
 from catseye.reduction.live.shots import ShotAnswer
 from catseye.reduction.site.motion import ground_from
-from catseye.simulator.twin import Twin
-from catseye.simulator.twin_faults import Fault, FaultBoard
-from catseye.simulator.twin_motion import Motion
+from catseye.simulator.twin.faults import Fault, FaultBoard
+from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.site import Twin
 from repository import ROOT
 
 START = 60635.125  # MJD, 22 h local mean time at Green Bank

@@ -14,16 +14,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.link.settings import Address
 from catseye.coordinator.parts import TICKS_PER_SECOND, PlannedShot, Round
-from catseye.coordinator.vantage import vantages_of
+from catseye.coordinator.visibility.vantage import vantages_of
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer
 from catseye.ranger.line import nanoseconds_to_ticks
 from catseye.records.live import TICKS_PER_DAY
 from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
 from catseye.records.target import Target
-from catseye.simulator.world_clock import SystemClock
+from catseye.simulator.clock.world_clock import SystemClock
 from repository import ROOT
 
 VOLTS_PER_CODE = 10.0 / 32768

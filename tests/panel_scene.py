@@ -12,7 +12,7 @@ from catseye.records.panel_readings import PanelReadings, PanelSurvey, read_pane
 from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
 from catseye.reduction.panels.model import corner_places
-from catseye.simulator.panels import SolidPanels, screwed, solid_panels
+from catseye.simulator.laboratory.panels import SolidPanels, screwed, solid_panels
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "panels"

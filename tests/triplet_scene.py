@@ -8,7 +8,7 @@ import numpy as np
 from catseye.atmosphere.air import group_refractivity
 from catseye.records.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletReadings
-from catseye.simulator.triplet import POST, TripletScenes, TripletSheets, random_scenes, triplet_sheets
+from catseye.simulator.laboratory.triplet import POST, TripletScenes, TripletSheets, random_scenes, triplet_sheets
 from repository import ROOT
 
 SHEET = ROOT / "examples" / "triplets" / "TR99.toml"

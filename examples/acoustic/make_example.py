@@ -9,7 +9,7 @@ import numpy as np
 
 from catseye.records.recording import wav_bytes
 from catseye.signal.waveform import chirp
-from catseye.simulator.acoustic import Recorder, SoundPath
+from catseye.simulator.laboratory.acoustic import Recorder, SoundPath
 
 HERE = Path(__file__).parent
 SEED = 20261121

@@ -2,8 +2,8 @@
 
     python examples/panels/make_example.py
 
-A twin made the readings (catseye.simulator.panels): solid panels with twists and bumps, a tool on shafts that lean.
-One reading of as-found.csv is 120 µm wrong: its line is said at the end.
+A twin made the readings (catseye.simulator.laboratory.panels): solid panels with twists and bumps, a tool on shafts
+that lean. One reading of as-found.csv is 120 µm wrong: its line is said at the end.
 """
 
 import math
@@ -19,7 +19,7 @@ from catseye.records.reading import read_record
 from catseye.records.site_folder import read_site
 from catseye.reduction.panels.heights import reduce_panels
 from catseye.reduction.panels.maps import fitted_map
-from catseye.simulator.panels import Crew, screwed, solid_panels, taken
+from catseye.simulator.laboratory.panels import Crew, screwed, solid_panels, taken
 
 HERE = Path(__file__).parent
 TIERS = ("T20", "T21", "T22")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.atmosphere.air import group_refractivity
-from catseye.simulator.triplet import TripletScenes, random_scenes, triplet_sheets
+from catseye.simulator.laboratory.triplet import TripletScenes, random_scenes, triplet_sheets
 
 HERE = Path(__file__).parent
 SPACERS = (0.0, 0.0254, 0.0508)

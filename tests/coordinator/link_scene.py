@@ -5,15 +5,15 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from catseye.coordinator.link import RangerLink
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.link.ranger import RangerLink
+from catseye.coordinator.link.settings import Address
 from catseye.coordinator.parts import PlannedShot, ticks_now
 from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.line import Request
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer
-from catseye.simulator.virtual_time import MemoryNetwork, VirtualLoop
+from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualLoop
 from ranger.ranger_scene import CUBES, GEOMETRY, PLACES, ZRG, phase_of
 from ranger.scripted_head import ScriptedHead
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from catseye.coordinator.parts import SiteState
-from catseye.coordinator.vantage import retros_of, vantages_of
+from catseye.coordinator.visibility.vantage import retros_of, vantages_of
 from catseye.ranger.initialisation import mount_from_reflector
 from catseye.records.keep_out import KeepOut
 from catseye.records.live import TICK_SECONDS, LivePosture

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.coordinator.firing import Firing
 from catseye.coordinator.parts import TICKS_PER_SECOND, PlannedShot, Round
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 from simulator.living_scene import site
 
 NOW = 60_635.125  # MJD

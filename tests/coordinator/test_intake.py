@@ -9,7 +9,7 @@ from catseye.coordinator.herald import Herald
 from catseye.coordinator.intake import Intake
 from catseye.coordinator.parts import NotDurable
 from catseye.records.live import Happening, LiveWeather
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 
 CLOCK = ManualClock(60_635.125)
 NOTE = Happening(1, "ZY101", "ready", "ZY101 is ready")

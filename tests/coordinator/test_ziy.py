@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from catseye.coordinator.journal_entries import AnsweredShot, Command, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Command, Solution
 from catseye.errors import EstimationError, InputError
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
 from coordinator.link_scene import COMMANDS, MemoryJournal, run, until

@@ -4,10 +4,10 @@ import numpy as np
 
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.motion_units import SAMPLE_TIME
-from catseye.simulator.motion_chip import POSITION, VELOCITY, MotionChip
-from catseye.simulator.motor import AxisDesign, Motor
-from catseye.simulator.servo import ServoAxis
-from catseye.simulator.servo_kernel import CompiledAxes
+from catseye.simulator.servo.axis import ServoAxis
+from catseye.simulator.servo.kernel import CompiledAxes
+from catseye.simulator.servo.motion_chip import POSITION, VELOCITY, MotionChip
+from catseye.simulator.servo.motor import AxisDesign, Motor
 
 RESET, DFH, SIP, STT, UDF, PORT8 = 0x00, 0x02, 0x03, 0x01, 0x04, 0x05
 WORDS = {0x1A: 1, 0x1B: 1, 0x1D: 1}  # of data that a command takes; LFIL and LTRJ say it in their first

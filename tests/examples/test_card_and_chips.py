@@ -5,7 +5,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.ranger.head import Sampling
-from catseye.simulator.motor import AxisDesign
+from catseye.simulator.servo.motor import AxisDesign
 from examples.byte_chip import ByteChip, Hardware, IrigClock
 from ranger.head_conformance import HeadConformance
 from repository import ROOT

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.records.live import Happening
 from catseye.records.site_folder import SiteFolder, read_site
 from catseye.service.comparison import EpochComparison, TwinComparison
@@ -19,7 +19,7 @@ from catseye.service.running import FastLoop
 from catseye.service.simulation import addresses_of
 from catseye.service.warm import WarmingClock
 from catseye.service.world import World, twin_heads
-from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock
+from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
 from repository import ROOT
 
 START = 60635.125  # MJD, 22 h local mean time at Green Bank

@@ -3,8 +3,8 @@
 import sys
 import threading
 
-from catseye.coordinator.journal import Journal
-from catseye.simulator.world_clock import ManualClock
+from catseye.coordinator.journal.writer import Journal
+from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import scene_answer, scene_run
 
 AT_ONCE = 12  # appends under way

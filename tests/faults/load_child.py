@@ -16,10 +16,10 @@ import numpy as np
 from catseye.ranger.server import LOOPBACK
 from catseye.service.warm import WarmingClock, warm
 from catseye.service.world import World, twin_heads
-from catseye.simulator.site_feed import SiteFeed
-from catseye.simulator.twin_faults import FaultBoard
-from catseye.simulator.twin_site import TwinSite
-from catseye.simulator.world_clock import SystemClock
+from catseye.simulator.clock.world_clock import SystemClock
+from catseye.simulator.twin.faults import FaultBoard
+from catseye.simulator.twin.feed import SiteFeed
+from catseye.simulator.twin.servers import TwinSite
 from load_scene import MOTION, NOISE, START_MJD, VARIANTS, FastHead, load_site
 
 

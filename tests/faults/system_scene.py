@@ -12,15 +12,15 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from catseye.coordinator.journal_reader import JournalReader
-from catseye.coordinator.replay import replay
-from catseye.coordinator.samplers import rows_of
-from catseye.coordinator.server import PUSHED
+from catseye.coordinator.clients.samplers import rows_of
+from catseye.coordinator.clients.server import PUSHED
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.replay import replay
 from catseye.ranger.addresses import ranger_addresses
 from catseye.records.site_folder import read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
-from catseye.simulator.world_clock import SystemClock
+from catseye.simulator.clock.world_clock import SystemClock
 from cli.living_scene import PATIENCE, RUN, small_site
 
 START = 60_635.125  # MJD; night at Green Bank

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from catseye.simulator.twin_faults import Fault
+from catseye.simulator.twin.faults import Fault
 from faults.fault_scene import ARM, GROUND, Told, night
 
 HONEST = 3.0  # chi-square a coordinate: ten bodies and airs, not points, are what a night draws; 99.9 % of chi2_10 / 10

@@ -11,13 +11,13 @@ from contextlib import contextmanager
 
 import pytest
 
-from catseye.coordinator import journal as journal_module
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal import writer as journal_module
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.writer import Journal
 from catseye.coordinator.parts import NotDurable
 from catseye.errors import InputError
 from catseye.records.live import Happening
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, scene_answer, scene_run
 
 

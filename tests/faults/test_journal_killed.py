@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_reader import JournalReader
-from catseye.simulator.world_clock import ManualClock
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.writer import Journal
+from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, PostgresServer, plainly, scene_answer, scene_run
 
 CHILD = Path(__file__).with_name("journal_child.py")

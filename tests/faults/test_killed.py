@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from catseye.coordinator.journal import PATIENCE as PATIENCE_OF_JOURNAL
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_reader import JournalReader
-from catseye.simulator.world_clock import ManualClock
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.writer import PATIENCE as PATIENCE_OF_JOURNAL
+from catseye.coordinator.journal.writer import Journal
+from catseye.simulator.clock.world_clock import ManualClock
 from cli.living_scene import PATIENCE, small_site, started
 from faults.system_scene import GROUPS, RANGERS, free_base, living_site, replays, stretches, told_of
 from journal_scene import PostgresServer, scene_run

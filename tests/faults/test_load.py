@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import pytest
 
-from catseye.coordinator.guard import SafetyGuard
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_entries import AnsweredShot, Run
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.journal.entries import AnsweredShot, Run
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.writer import Journal
 from catseye.coordinator.ziy import Coordinator
 from catseye.reduction.live.live import Live
 from catseye.service.solver import SolverProcess

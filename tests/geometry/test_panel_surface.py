@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from catseye.geometry.panel_surface import axes, cosine_of_slope, panels_under, shares, warps
 from catseye.geometry.panel_tool import observed_freedoms, turned
-from catseye.simulator.panels import panel_at
+from catseye.simulator.laboratory.panels import panel_at
 from panel_scene import dish
 
 F = 60.0

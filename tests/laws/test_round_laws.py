@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.coordinator.guard import SafetyGuard
-from catseye.coordinator.round import RoundPlanner
-from catseye.coordinator.surroundings import KeepClear
-from catseye.coordinator.sweep import nearest
-from catseye.coordinator.value import Knowledge
-from catseye.coordinator.vantage import Vantage
+from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.plan.round import RoundPlanner
+from catseye.coordinator.plan.value import Knowledge
+from catseye.coordinator.visibility.surroundings import KeepClear
+from catseye.coordinator.visibility.sweep import nearest
+from catseye.coordinator.visibility.vantage import Vantage
 from catseye.geometry.pointing import Station
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request

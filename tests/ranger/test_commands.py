@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import InputError
 from catseye.ranger.commands import COMMANDS, ROWS, schedule_of
-from catseye.ranger.handlers_table import HANDLERS
+from catseye.ranger.handlers.table import HANDLERS
 from catseye.ranger.line import Request, parse_request
 
 KNOWN = frozenset(

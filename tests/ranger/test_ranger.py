@@ -9,7 +9,7 @@ import pytest
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.pointing import beam
-from catseye.ranger.handlers_table import replace_file
+from catseye.ranger.handlers.table import replace_file
 from catseye.ranger.line import TICK_NS, format_reply, nanoseconds_of, stamp_text, ticks_of
 from catseye.ranger.ranging import HALF_WAVE_MM, distance_mm, group_index
 from catseye.ranger.status import Status

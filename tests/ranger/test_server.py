@@ -13,7 +13,7 @@ from catseye.ranger.commands import COMMANDS
 from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, Connection, ZyServer
-from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
+from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from ranger.clocked_head import ClockedHead
 from ranger.ranger_scene import READY, REFERENCE_PHASE, ready
 

@@ -14,7 +14,7 @@ from catseye.reduction.budget.explanation import budget_of, scatter_of
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.places import places_of
-from catseye.simulator import Conditions, simulate_night
+from catseye.simulator import Conditions, simulate_night, write_night
 
 DRAWS = 100_000  # a u from so many is good to 0.22 %
 AGREED = 0.02  # the issue's
@@ -224,7 +224,7 @@ def squares_of_night(seed, directory, count=12):
     The second column has the thermometers' true offsets taken out, error and budget alike.
     """
     night = any_night(seed)
-    campaign = read_campaign(night.write(directory / f"night-{seed}"))
+    campaign = read_campaign(write_night(night, directory / f"night-{seed}"))
     phases = measure_phases(campaign, Settings())
     wrong = follow_electronics(campaign, phases)[1]
     places = places_of(campaign)

@@ -13,7 +13,7 @@ from catseye.geometry.frame import Transforms
 from catseye.records.live import TICKS_PER_DAY
 from catseye.reduction.live.live import LiveSettings
 from catseye.reduction.site.motion import ground_from
-from catseye.simulator.twin_beam import TracedDish
+from catseye.simulator.twin.beam import TracedDish
 from live_scene import Night, begun, deviations, lasting, site
 
 TRACK, NIGHTS, FEWER, EPOCHS = "track 145.3 45", 60, 20, 8

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from catseye.reduction.panels.heights import conformity, meetings, reduce_panels
-from catseye.simulator.panels import Crew, solid_panels, taken
+from catseye.simulator.laboratory.panels import Crew, solid_panels, taken
 from panel_scene import patch, read, standing_by_chance, survey, tool
 
 RUNS = [pytest.param(30, id="quick"), pytest.param(600, id="long", marks=pytest.mark.slow)]

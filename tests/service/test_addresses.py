@@ -2,7 +2,7 @@
 
 import pytest
 
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
 from catseye.service.addresses import read_addresses
 from simulator.living_scene import site

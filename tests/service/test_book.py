@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.gateways.writers.objects import json_line
 from catseye.records.live import Happening, LivePosture, LiveShot
 from catseye.service.book import LiveBook

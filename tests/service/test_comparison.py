@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.records.live import LiveShot
 from catseye.service.comparison import TwinComparison
 from simulator.living_scene import only, site, twin

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.journal.entries import Solution
 from catseye.records.live import Happening, LiveWeather
 from catseye.service.logs import LiveLog
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 
 ALARM = Happening(5288963344910, "ZY105", "hung", "VER was not\nanswered", "alarm", {"seconds": float("nan")})
 

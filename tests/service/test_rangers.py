@@ -11,8 +11,8 @@ from catseye.ranger.status import Status
 from catseye.service.rangers import LateSockets, RangersServed
 from catseye.service.warm import WarmingClock
 from catseye.service.world import World, twin_heads
-from catseye.simulator.virtual_time import MemoryNetwork
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.virtual_time import MemoryNetwork
+from catseye.simulator.clock.world_clock import ManualClock
 from simulator.living_scene import site
 
 

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 
 from catseye.records.site_folder import SiteFolder, read_site
-from catseye.simulator.faults import EFFECTS
-from catseye.simulator.twin import Twin
-from catseye.simulator.twin_conditions import LIVING_EFFECTS, LIVING_NIGHT, LivingPlanted
-from catseye.simulator.twin_motion import Motion
+from catseye.simulator.night.faults import EFFECTS
+from catseye.simulator.twin.conditions import LIVING_EFFECTS, LIVING_NIGHT, LivingPlanted
+from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.site import Twin
 from repository import ROOT
 
 START = 60_000.1  # MJD; 21 h local mean time at Green Bank

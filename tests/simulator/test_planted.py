@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError, ValidityError
-from catseye.simulator import EFFECTS, SUMMER_DAY, WINTER, Faults, Planted, Schedule, simulate_night
+from catseye.simulator import EFFECTS, SUMMER_DAY, WINTER, Faults, Planted, Schedule, simulate_night, write_night
 
 
 def changed_shots(night, other):
@@ -17,7 +17,7 @@ def changed_shots(night, other):
 
 
 def files(night, directory):
-    written = night.write(directory)
+    written = write_night(night, directory)
     return {p.relative_to(written): p.read_bytes() for p in written.rglob("*") if p.is_file() and p.suffix != ".npy"}
 
 

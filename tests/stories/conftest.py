@@ -7,7 +7,7 @@ import pytest
 
 from catseye.records.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import Faults, simulate_night
+from catseye.simulator import Faults, simulate_night, write_night
 
 SEED = 4711
 CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, wrong_position_mm=0.0)
@@ -17,7 +17,7 @@ CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, w
 def written(tmp_path_factory):
     """Function night -> campaign, by way of its files."""
     root, count = tmp_path_factory.mktemp("stories"), itertools.count()
-    return lambda night: read_campaign(night.write(root / f"night-{next(count)}"))
+    return lambda night: read_campaign(write_night(night, root / f"night-{next(count)}"))
 
 
 @pytest.fixture(scope="session")

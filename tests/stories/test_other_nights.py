@@ -7,7 +7,7 @@ import pytest
 
 from catseye.records.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import SUMMER_DAY, WINTER, simulate_night
+from catseye.simulator import SUMMER_DAY, WINTER, simulate_night, write_night
 
 SEED = 815
 WORDS = re.compile(r"\b(ZY|ZP|TR|DP|ZBM|ZEG|ZAG|WX)(\d+[A-Z]*)\b")
@@ -31,7 +31,7 @@ def renamed(text):
 @pytest.fixture(scope="module")
 def summer(tmp_path_factory):
     night = simulate_night(SEED, azimuth_deg=12.0, elevation_deg=71.0, conditions=SUMMER_DAY)
-    directory = night.write(tmp_path_factory.mktemp("summer") / "night")
+    directory = write_night(night, tmp_path_factory.mktemp("summer") / "night")
     return night, directory, reduce_epoch(read_campaign(directory))
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.intake import Intake
-from catseye.coordinator.journal_entries import AnsweredShot
-from catseye.coordinator.link import RangerLink
+from catseye.coordinator.journal.entries import AnsweredShot
+from catseye.coordinator.link.ranger import RangerLink
 from catseye.coordinator.modes import Suspensions
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, LiveReduction, PlannedShot, Round, ticks_now
 from catseye.errors import CatseyeError

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from catseye.coordinator.herald import Herald
-from catseye.coordinator.journal_entries import EPOCH_BEGUN, AnsweredShot, Command, Document, Solution
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Command, Document, Solution
 from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather

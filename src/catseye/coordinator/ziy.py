@@ -10,13 +10,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from catseye.coordinator.decode import measurement_of, shot_of
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
+from catseye.coordinator.guard.vigil import Vigil
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.intake import Entry, Intake, Solver
-from catseye.coordinator.link import RangerLink
-from catseye.coordinator.link_settings import Address, LinkSettings, Wanted
+from catseye.coordinator.link.decode import measurement_of, shot_of
+from catseye.coordinator.link.ranger import RangerLink
+from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.modes import Mode
 from catseye.coordinator.parts import (
     TICKS_PER_SECOND,
@@ -29,7 +30,6 @@ from catseye.coordinator.parts import (
     SiteState,
     ticks_now,
 )
-from catseye.coordinator.vigil import Vigil
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request

@@ -13,7 +13,7 @@ from pathlib import Path
 from catseye.errors import CatseyeError, InputError
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.commands import COMMANDS
-from catseye.ranger.handlers_table import HANDLERS, scan_rounds, stream_shots, watch_sun
+from catseye.ranger.handlers.table import HANDLERS, scan_rounds, stream_shots, watch_sun
 from catseye.ranger.head import Head
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks, parse_request
 from catseye.ranger.state import VERSION, Outgoing, RangerState, Values, Work

@@ -11,7 +11,7 @@ ports = [5240, 5241]                                  # these unless said
 
 from pathlib import Path
 
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.link.settings import Address
 from catseye.ranger.server import PORTS
 from catseye.records.reading import Folder, toml_of
 from catseye.records.refusal import refusal, shown

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.estimation.datum import motions
 from catseye.records.site_folder import SiteFolder
 from catseye.reduction.site.bodies import bodies_of, lasting_names
 from catseye.reduction.site.motion import GROUND, frames_of, ground_from
-from catseye.simulator.twin import Twin
-from catseye.simulator.twin_beam import TracedDish
+from catseye.simulator.twin.beam import TracedDish
+from catseye.simulator.twin.site import Twin
 
 Array = NDArray[np.float64]
 FEWEST_SHOTS = 3

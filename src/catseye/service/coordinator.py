@@ -12,16 +12,16 @@ from typing import Any, Literal
 
 import numpy as np
 
+from catseye.coordinator.clients.server import ZiyServer
 from catseye.coordinator.feed import MotionScript
-from catseye.coordinator.guard import SafetyGuard
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_entries import Run
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.journal.entries import Run
+from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.link.settings import Address
 from catseye.coordinator.modes import Mode
 from catseye.coordinator.parts import Clock
-from catseye.coordinator.round import RoundPlanner, RoundSettings
-from catseye.coordinator.server import ZiyServer
-from catseye.coordinator.surroundings import KeepClear
+from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
+from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.journal.entries import Solution
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.gateways.writers.objects import plain
 from catseye.geometry.time_tag import MJD_EPOCH

@@ -15,11 +15,11 @@ from catseye.ranger.head import Head
 from catseye.ranger.network import Network, SocketListener, Sockets
 from catseye.records.site_folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
-from catseye.simulator.site_feed import SiteFeed
-from catseye.simulator.twin import Twin
-from catseye.simulator.twin_faults import FaultBoard
-from catseye.simulator.twin_site import TwinSite
-from catseye.simulator.world_clock import Clock
+from catseye.simulator.clock.world_clock import Clock
+from catseye.simulator.twin.faults import FaultBoard
+from catseye.simulator.twin.feed import SiteFeed
+from catseye.simulator.twin.servers import TwinSite
+from catseye.simulator.twin.site import Twin
 
 
 @dataclass(frozen=True)

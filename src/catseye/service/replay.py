@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.coordinator.journal_entries import Solution
-from catseye.coordinator.journal_reader import JournalReader, StoredRun
-from catseye.coordinator.replay import Replayed, replay
+from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.reader import JournalReader, StoredRun
+from catseye.coordinator.journal.replay import Replayed, replay
 from catseye.errors import InputError
 from catseye.records.site_folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live

@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine
 from types import FrameType
 from typing import Any, Generic, TypeVar
 
-from catseye.simulator.virtual_time import VirtualLoop
+from catseye.simulator.clock.virtual_time import VirtualLoop
 
 T = TypeVar("T")
 LONGEST_END = 4.5  # s from the signal until the process is gone: the contract allows five

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from catseye.constants import DEGREE
 from catseye.coordinator.firing import OF_THE_LINE
-from catseye.coordinator.journal_entries import Solution
+from catseye.coordinator.journal.entries import Solution
 from catseye.gateways.writers.interruption import undone_when_interrupted
 from catseye.records.live import Happening
 from catseye.service.book import GOOD, LiveBook

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from catseye.coordinator.journal_entries import plain
+from catseye.coordinator.journal.entries import plain
 from catseye.errors import InputError
 from catseye.reduction.live.live import LiveSettings
 

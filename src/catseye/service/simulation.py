@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from catseye.coordinator.link_settings import Address
+from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE
 from catseye.records.site_folder import SiteFolder
@@ -19,7 +19,7 @@ from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.warm import WarmingClock
 from catseye.service.world import World, twin_heads
-from catseye.simulator.virtual_time import MemoryNetwork, VirtualClock
+from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
 
 LONGEST_QUIET = 120.0  # s until the first round: rangers that were not warmed take half a minute
 LOOK = 0.1  # s

@@ -8,8 +8,8 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from catseye.coordinator.guard import SafetyGuard
-from catseye.coordinator.preparation import Preparation
+from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.link.preparation import Preparation
 from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
@@ -18,7 +18,7 @@ from catseye.ranger.ranger import Ranger
 from catseye.records.live import LivePosture
 from catseye.records.site_folder import SiteFolder
 from catseye.reduction.site.places import places_of
-from catseye.simulator.world_clock import Clock
+from catseye.simulator.clock.world_clock import Clock
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two looks at a ranger that is busy

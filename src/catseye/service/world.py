@@ -3,16 +3,16 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from catseye.coordinator.vantage import pace_by
+from catseye.coordinator.visibility.vantage import pace_by
 from catseye.errors import InputError
 from catseye.records.site_folder import SiteFolder
-from catseye.simulator.twin import Twin
-from catseye.simulator.twin_conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
-from catseye.simulator.twin_faults import Fault, FaultBoard
-from catseye.simulator.twin_head import TwinHead
-from catseye.simulator.twin_mirror import MirrorTuning, travel_of
-from catseye.simulator.twin_motion import Motion
-from catseye.simulator.world_clock import Clock, SystemClock
+from catseye.simulator.clock.world_clock import Clock, SystemClock
+from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
+from catseye.simulator.twin.faults import Fault, FaultBoard
+from catseye.simulator.twin.head import TwinHead
+from catseye.simulator.twin.mirror import MirrorTuning, travel_of
+from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.site import Twin
 
 CONDITIONS = {"night": LIVING_NIGHT, "windy-day": WINDY_DAY, "dewy-night": DEWY_NIGHT}
 MOTION = "track 145.3 45"

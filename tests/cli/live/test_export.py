@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.reader import JournalReader
 from catseye.records.campaign import read_campaign
 from cli.living_scene import recorded
 

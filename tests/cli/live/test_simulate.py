@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from cli.living_scene import PATIENCE, RUN, ended, processes_with, recorded, small_site, started
 

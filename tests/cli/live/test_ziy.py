@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.reader import JournalReader
 from cli.living_scene import PATIENCE, ended, small_site, started
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.writer import Journal
 from catseye.gateways.writers.samplers_fits import read_samplers
 from catseye.geometry.antenna import ground_from_reflector
 from catseye.geometry.rotation import from_vector
 from catseye.records.live import LiveShot, LiveWeather
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_run
 
 NAMES = ("ZEG1", "ZEG2", "ZEG3", "ZEG4", "ZEG5")

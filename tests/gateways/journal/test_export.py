@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal import Journal
-from catseye.coordinator.journal_entries import AnsweredShot, Run, Solution
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.entries import AnsweredShot, Run, Solution
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.export import FORMAT, TABLES, export_tables, stamp
 from catseye.gateways.writers import output
 from catseye.records.campaign import read_campaign
 from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
-from catseye.simulator.world_clock import ManualClock
+from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_entries, scene_run, scene_shot
 
 HALF_TICK = 0.5 / TICKS_PER_DAY

@@ -7,8 +7,8 @@ import pytest
 
 from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import SAMPLE_TIME
-from catseye.simulator.servo import Trace
-from catseye.simulator.tuning import Plant
+from catseye.simulator.servo.axis import Trace
+from catseye.simulator.servo.tuning import Plant
 
 
 @pytest.fixture(scope="module")

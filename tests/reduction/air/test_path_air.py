@@ -11,7 +11,7 @@ from catseye.reduction.air.path_air import site_air, site_readings
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.places import places_of
-from catseye.simulator.air import NIGHT, SUMMER_DAY, WINTER, Air
+from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, Air
 
 
 def shots_of(campaign, every=5):

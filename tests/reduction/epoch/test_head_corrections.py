@@ -22,8 +22,8 @@ from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.stations import station_in
-from catseye.simulator import Faults, simulate_night
-from catseye.simulator.world import kelvin_from_ground
+from catseye.simulator import Faults, simulate_night, write_night
+from catseye.simulator.night.world import kelvin_from_ground
 from mirror_scene import START, sent, traced_change
 
 KAPPA = 4 * np.pi * 1.5e9 / SPEED_OF_LIGHT  # rad a metre of range, in vacuum
@@ -451,7 +451,7 @@ def test_coordinates_of_nights_whose_heads_are_off_their_sheets_scatter_as_claim
     ratios: dict[str, list[np.ndarray]] = {"admitted": [], "denied": []}
     for seed in range(5):
         night = simulate_night(7000 + seed, faults=clear)
-        campaign = read_campaign(night.write(tmp_path / str(seed)))
+        campaign = read_campaign(write_night(night, tmp_path / str(seed)))
         within = drawn_effects(campaign, np.random.default_rng(seed), axis=0.1, coupling=4e-3, cyclic=0.02)
         admitting = told(campaign, scaled(within, 0.0), LOOSE, limits={})
         plain = reduce_epoch(campaign)

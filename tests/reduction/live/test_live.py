@@ -9,7 +9,7 @@ import pytest
 from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site_folder import REFERENCE
 from catseye.reduction.live.live import Live, LiveSettings
-from catseye.simulator.twin_conditions import STILL
+from catseye.simulator.twin.conditions import STILL
 from live_scene import DISH, Feed, Night, begun, deviations, lasting, sights, site, twin
 
 # as the files say it, seen through calm air: no drift, no bending, nothing typed wrongly

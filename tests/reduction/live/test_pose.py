@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.reduction.live.pose import beam_per_feed_shift, live_pose
 from catseye.reduction.live.state import REFERENCE_EPOCH, Carried, with_reference
-from catseye.simulator.twin_beam import TracedDish
+from catseye.simulator.twin.beam import TracedDish
 from live_scene import site
 
 F = 60.0  # m

@@ -15,7 +15,7 @@ from catseye.reduction.panels.heights import conformity, meetings, reduce_panels
 from catseye.reduction.panels.job import verdicts
 from catseye.reduction.panels.maps import fitted_map
 from catseye.reduction.panels.model import panel_model, used_layout
-from catseye.simulator.panels import Crew, screwed, solid_panels, taken
+from catseye.simulator.laboratory.panels import Crew, screwed, solid_panels, taken
 from panel_scene import dish, patch, read, standing_by_chance, survey, tool
 
 

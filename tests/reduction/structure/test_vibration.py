@@ -5,11 +5,11 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.reduction.structure.vibration import RangeSeries, difference, movements, vibration
-from catseye.simulator.faults import Streams
-from catseye.simulator.twin_air import LivingAir
-from catseye.simulator.twin_conditions import LIVING_NIGHT, LivingPlanted
-from catseye.simulator.twin_motion import Motion
-from catseye.simulator.twin_telescope import ARM_FOOT, ARM_LENGTH, telescope
+from catseye.simulator.night.faults import Streams
+from catseye.simulator.twin.air import LivingAir
+from catseye.simulator.twin.conditions import LIVING_NIGHT, LivingPlanted
+from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.telescope import ARM_FOOT, ARM_LENGTH, telescope
 
 WINDOW, RATE, U = 0.128, 7.8, 20e-6
 RANGERS = {

@@ -8,7 +8,7 @@ from scipy.optimize import fsolve, minimize_scalar
 
 from catseye.reduction.triplet.geometry import half_wavelengths, triplet_cycles, triplet_lengths
 from catseye.reduction.triplet.memo import median_series, memo_numbers
-from catseye.simulator.triplet import PHASE_TO_GROUP, _into_prism, random_scenes, triplet_sheets
+from catseye.simulator.laboratory.triplet import PHASE_TO_GROUP, _into_prism, random_scenes, triplet_sheets
 from triplet_scene import readings_of
 
 ASKED = 0.2e-6  # m, of H_corr without noise

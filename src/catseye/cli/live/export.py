@@ -36,7 +36,7 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """A run as tables (CSV, FITS), or as a campaign that `catseye reduce` reads."""
-    from catseye.coordinator.journal_reader import JournalReader
+    from catseye.coordinator.journal.reader import JournalReader
     from catseye.gateways.journal.campaign import export_campaign
     from catseye.gateways.journal.export import export_tables
     from catseye.gateways.writers.output import refuse_output

@@ -62,7 +62,7 @@ def time_of(text: str | None) -> str | None:
 def motion_of(text: str | None) -> str | None:
     """As given, if it is a motion; a table is read when it is needed."""
     if text is not None and not text.startswith("table "):
-        from catseye.simulator.twin_motion import Motion
+        from catseye.simulator.twin.motion import Motion
 
         try:
             Motion.parse(text)
@@ -73,7 +73,7 @@ def motion_of(text: str | None) -> str | None:
 
 def faults_of(texts: list[str] | None) -> list[str]:
     """As given, if they are faults."""
-    from catseye.simulator.twin_faults import Fault
+    from catseye.simulator.twin.faults import Fault
 
     for text in texts or []:
         try:
@@ -162,7 +162,7 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
     if usual is not None:
         return usual
     from catseye.geometry.time_tag import PER_DAY
-    from catseye.simulator.world_clock import SystemClock
+    from catseye.simulator.clock.world_clock import SystemClock
 
     return SystemClock().now_ns() / PER_DAY
 

@@ -122,7 +122,7 @@ def where_of(
     if feed is not None and motion_script is not None:
         raise typer.BadParameter("is a known motion; --feed says otherwise.", param_hint="'--motion-script'")
     from catseye.coordinator.feed import MotionScript
-    from catseye.coordinator.link_settings import Address
+    from catseye.coordinator.link.settings import Address
     from catseye.ranger.addresses import Addresses, feed_address, ranger_addresses
     from catseye.service.addresses import read_addresses
 
@@ -156,7 +156,7 @@ def run_coordinator(
     from catseye.service.coordinator import LiveCoordinator
     from catseye.service.logs import LiveLog
     from catseye.service.running import LiveRun
-    from catseye.simulator.world_clock import SystemClock
+    from catseye.simulator.clock.world_clock import SystemClock
 
     clock = SystemClock(offset)
     coloured = not log_json and sys.stderr is not None and sys.stderr.isatty()

@@ -109,7 +109,7 @@ def zy(
     }
     from catseye.service.rangers import RangersServed, heads_of
     from catseye.service.running import LiveRun
-    from catseye.simulator.world_clock import SystemClock
+    from catseye.simulator.clock.world_clock import SystemClock
 
     if head is not None:
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **told)

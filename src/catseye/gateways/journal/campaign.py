@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from catseye.constants import DEGREE
-from catseye.coordinator.journal_entries import AnsweredShot
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.entries import AnsweredShot
+from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.writers.output import whole_directory

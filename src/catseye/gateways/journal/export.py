@@ -17,8 +17,8 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
-from catseye.coordinator.journal_entries import Entry, Solution
-from catseye.coordinator.journal_reader import JournalReader, Kind
+from catseye.coordinator.journal.entries import Entry, Solution
+from catseye.coordinator.journal.reader import JournalReader, Kind
 from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, whole_directory

@@ -17,8 +17,8 @@ from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.guard import guard_of
 from catseye.reduction.steering.reroute import route
 from catseye.reduction.steering.sighting import place_of_monument
-from catseye.simulator.motor import AxisDesign
-from catseye.simulator.tuning import Filter, design_filter, margins, plant_of, ready_axis, step_metrics
+from catseye.simulator.servo.motor import AxisDesign
+from catseye.simulator.servo.tuning import Filter, design_filter, margins, plant_of, ready_axis, step_metrics
 
 USUAL_COUNTS_PER_S, USUAL_COUNTS_PER_S2 = 12_000.0, 40_000.0  # of axes whose record does not say
 LONGEST_MOVE = 120.0  # s, of a drawn move: a few seconds of computing

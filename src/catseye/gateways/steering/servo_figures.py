@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.simulator.servo import Trace
-from catseye.simulator.tuning import Plant
+from catseye.simulator.servo.axis import Trace
+from catseye.simulator.servo.tuning import Plant
 
 WIDTH = 9.4  # inches, as all figures
 

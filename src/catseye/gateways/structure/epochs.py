@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
-from catseye.coordinator.journal_entries import Solution
-from catseye.coordinator.journal_reader import JournalReader
+from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.records.columns import columns_of
 from catseye.records.live import TICKS_PER_DAY, LiveWeather

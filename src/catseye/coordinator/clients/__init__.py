@@ -1,0 +1,1 @@
+"""Who asks the coordinator: its port, the board of what is known, samplers, parameters."""

@@ -1,0 +1,151 @@
+"""What the coordinator's clients can ask and set: a function for each command, rows of plain values back."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from catseye.coordinator.clients.parameters import Parameter, Parameters
+from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers, plain
+from catseye.coordinator.modes import mode_of
+from catseye.coordinator.ziy import Coordinator
+from catseye.errors import InputError
+from catseye.ranger.line import Request
+
+VERSION = "1"
+Rows = Iterable[tuple[str, ...]]
+HELP = {
+    "STATUS": ("STATUS", "mode; rangers ready; shots numbered; shots acknowledged; round; telescope; journal"),
+    "RANGERS": ("RANGERS", "a line each: name; state; shots; failures in a row; target streamed; last status; trouble"),
+    "PARAMETERS": ("PARAMETERS", "a line each: name; value; value that waits; legal values"),
+    "SET": ("SET name, value", "check a parameter's value and keep it until START"),
+    "PREPARE": ("PREPARE", "check all values that wait"),
+    "START": ("START", "make the prepared values count"),
+    "SAMPLERS": ("SAMPLERS", "a line each: name; values kept; what a value holds"),
+    "SAMPLER": ("SAMPLER name | SAMPLER name, n", "the last n values, a line each, oldest first"),
+    "SUBSCRIBE": ("SUBSCRIBE | SUBSCRIBE kind, ...", "push SHOT EPOCH EVENT POSTURE WEATHER; NONE ends it"),
+    "MODE": ("MODE | MODE mode", "active, passive, hold"),
+    "DROP": ("DROP ranger", "leave a ranger out; it stays connected"),
+    "TAKE": ("TAKE ranger", "use a ranger again"),
+    "STREAM": ("STREAM ranger, target | STREAM ranger", "one target again and again; without a target it ends"),
+    "VER": ("VER", "name and version; sent behind a command of many lines it ends them"),
+    "HLP": ("HLP | HLP command", "commands, or one command's forms"),
+    "BYE": ("BYE", "close this connection"),
+}
+
+
+class Board:
+    """A coordinator's commands, parameters and samplers."""
+
+    def __init__(self, coordinator: Coordinator, parameters: tuple[Parameter, ...] = ()):
+        self._ziy = coordinator
+        self.samplers = Samplers()
+        self.parameters = Parameters((*_own(coordinator), *parameters))
+        self._asked: dict[str, tuple[tuple[int, ...], Callable[..., Rows]]] = {
+            "STATUS": ((0,), self._status),
+            "RANGERS": ((0,), self._rangers),
+            "PARAMETERS": ((0,), self._parameters),
+            "SET": ((2,), lambda name, text: [(plain(name.lower()), plain(self.parameters.set(name, text)))]),
+            "PREPARE": ((0,), lambda: [(str(self.parameters.prepare()),)]),
+            "START": ((0,), lambda: [(str(self.parameters.start()),)]),
+            "SAMPLERS": ((0,), self._samplers),
+            "SAMPLER": ((1, 2), self._sampler),
+            "MODE": ((0, 1), self._mode),
+            "DROP": ((1,), lambda ranger: self._done(coordinator.drop, ranger)),
+            "TAKE": ((1,), lambda ranger: self._done(coordinator.take, ranger)),
+            "STREAM": ((1, 2), self._stream),
+            "VER": ((0,), lambda: [("ZIY", VERSION)]),
+            "HLP": ((0, 1), self._help),
+        }
+
+    def rows(self, request: Request) -> Rows | None:
+        """The rows that answer a request; None for a command that is not known.
+
+        Raises InputError: parameters that do not fit, or what was asked cannot be.
+        """
+        found = self._asked.get(request.command)
+        if found is None:
+            return None
+        counts, handler = found
+        if len(request.parameters) not in counts:
+            raise InputError(f"{len(request.parameters)} parameters do not fit (expected {HELP[request.command][0]})")
+        return handler(*request.parameters)
+
+    def _status(self) -> Rows:
+        z = self._ziy
+        ready = sum(link.state == "ready" for link in z.links.values())
+        telescope = "known" if z.telescope_known else "silent"
+        journal = plain(z.intake.trouble or "well")
+        counts = (f"{ready} of {len(z.links)}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
+        return [(z.mode, *counts, telescope, journal)]
+
+    def _rangers(self) -> Rows:
+        z = self._ziy
+        for name, link in z.links.items():
+            state = "dropped" if name in z.firing.dropped else link.state
+            status, stream = plain(z.firing.last_status.get(name, "none")), z.firing.streams.get(name, "none")
+            yield name, state, str(link.shots), str(link.failures), stream, status, " ".join(link.troubles) or "none"
+
+    def _parameters(self) -> Rows:
+        return [tuple(plain(word) for word in row) for row in self.parameters.rows()]
+
+    def _samplers(self) -> Rows:
+        return [
+            (name, str(count), " ".join(("mjd", *COLUMNS[name]))) for name, count in self.samplers.lengths().items()
+        ]
+
+    def _sampler(self, name: str, count: str = "1") -> Rows:
+        if name.upper() not in COLUMNS:
+            raise InputError(f"{name[:20]!a} is no sampler (expected one of {' '.join(COLUMNS)})")
+        if not count.isdecimal() or not 1 <= int(count[:9]) <= KEPT:
+            raise InputError(f"n {count[:20]!a} is not 1 to {KEPT}")
+        return [(name.upper(), *row) for row in self.samplers.last(name.upper(), int(count))]
+
+    def _mode(self, text: str | None = None) -> Rows:
+        if text is not None:
+            self._ziy.set_mode(mode_of(text))
+        return [(self._ziy.mode,)]
+
+    def _stream(self, ranger: str, target: str | None = None) -> Rows:
+        self._ziy.stream(ranger.upper(), target)
+        return [(ranger.upper(), target or "none")]
+
+    def _help(self, name: str | None = None) -> Rows:
+        if name is None:
+            return [(" ".join(HELP),)]
+        if name.upper() not in HELP:
+            raise InputError(f"{name[:20]!a} is no command (expected one that HLP lists)")
+        return [tuple(plain(word) for word in HELP[name.upper()])]
+
+    def _done(self, action: Callable[[str], None], ranger: str) -> Rows:
+        action(ranger.upper())
+        return [(ranger.upper(),)]
+
+
+def _own(z: Coordinator) -> tuple[Parameter, ...]:
+    """The coordinator's own parameters."""
+
+    def dropped(text: str) -> str:
+        names = [] if text.lower() == "none" else text.upper().split()
+        strange = [name for name in names if name not in z.links]
+        if strange:
+            raise InputError(f"{strange[0][:20]!a} is no ranger here (expected names with blanks between, or none)")
+        return " ".join(sorted(set(names))) or "none"
+
+    def drop(text: str) -> None:
+        names = set() if text == "none" else set(text.split())
+        for name in z.links:
+            if (name in z.firing.dropped) != (name in names):
+                (z.drop if name in names else z.take)(name)
+
+    def set_mode(text: str) -> Any:
+        z.set_mode(mode_of(text))
+
+    return (
+        Parameter("mode", "active passive hold", lambda: z.mode, lambda text: mode_of(text), set_mode),
+        Parameter(
+            "dropped",
+            "rangers with blanks between, or none",
+            lambda: " ".join(sorted(z.firing.dropped)) or "none",
+            dropped,
+            drop,
+        ),
+    )

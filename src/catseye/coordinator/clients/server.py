@@ -1,0 +1,212 @@
+"""The coordinator's own port, for displays and for monitor and control, in the ZY grammar: a person on `nc` can use it.
+
+What one client may cost is bounded as at a ranger: a line of 1024 bytes, 200 lines a second (what comes faster is left
+unread), 1 MiB that it does not take (then it is cut off), 64 clients. docs/formats/ziy.md is the reference.
+"""
+
+import asyncio
+import logging
+from collections.abc import Iterable
+from functools import partial
+from typing import Any
+
+from catseye.coordinator.clients.board import VERSION, Board
+from catseye.coordinator.clients.samplers import plain
+from catseye.coordinator.parts import ticks_now
+from catseye.coordinator.ziy import Coordinator
+from catseye.errors import CatseyeError, InputError
+from catseye.ranger.line import LONGEST_REQUEST, Request, parse_request, stamp_text
+from catseye.ranger.network import Listener, Network, Sockets
+
+PORT = 5260
+LOOPBACK = "127.0.0.1"
+KEEP_ALIVE = 60.0  # s
+LINES_A_SECOND = 200.0
+MOST_AT_ONCE = 400.0  # lines
+MOST_UNSENT = 2**20  # bytes
+MOST_CLIENTS = 64
+AGAIN = 0.1  # s until a client that came too fast is read on
+KINDS = {"SHOT": "RANGES", "EPOCH": "EPOCHS", "EVENT": "EVENTS", "POSTURE": "POSTURE", "WEATHER": "WEATHER"}
+PUSHED = {sampler: kind for kind, sampler in KINDS.items()}
+LOG = logging.getLogger(__name__)
+
+
+class Client(asyncio.Protocol):
+    """One connection; `wants` are the kinds that it has subscribed."""
+
+    def __init__(self, server: "ZiyServer"):
+        self.server = server
+        self.transport: asyncio.Transport | None = None
+        self.wants: set[str] = set()
+        self._unread = bytearray()
+        self._left, self._since = MOST_AT_ONCE, asyncio.get_running_loop().time()
+        self._timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        self.server.joined(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self.server.left(self)
+
+    def data_received(self, data: bytes) -> None:
+        self._unread += data
+        self._read_on()
+
+    def _read_on(self) -> None:
+        """Answer whole lines as far as the rate allows; otherwise stop reading from the peer for a while."""
+        if self.transport is None or self.transport.is_closing():
+            return
+        now = asyncio.get_running_loop().time()
+        self._left, self._since = min(MOST_AT_ONCE, self._left + (now - self._since) * LINES_A_SECOND), now
+        while self._left >= 1.0 and not self.transport.is_closing():
+            end = self._unread.find(b"\n", 0, LONGEST_REQUEST + 3)
+            if end < 0:
+                if len(self._unread) > LONGEST_REQUEST + 2:
+                    self._unread.clear()
+                    self.tell(0, f"LINE 0, line is longer than {LONGEST_REQUEST} bytes")
+                    self.transport.close()
+                break
+            line = bytes(self._unread[:end]).removesuffix(b"\r")
+            del self._unread[: end + 1]
+            self._left -= 1.0
+            self.server.answer(self, line.decode("ascii", "replace"))
+        if b"\n" in self._unread and not self.transport.is_closing():
+            self.transport.pause_reading()
+            self._timer = asyncio.get_running_loop().call_later(AGAIN, self._resume)
+
+    def _resume(self) -> None:
+        self._timer = None
+        if self.transport is not None and not self.transport.is_closing():
+            self.transport.resume_reading()
+            self._read_on()
+
+    def tell(self, tid: int, body: str) -> None:
+        """A line with TID and the stamp of now."""
+        self.write(f"{tid}\t{stamp_text(self.server.now_ticks())}\t{body}\n".encode("ascii", "replace"))
+
+    def write(self, data: bytes) -> None:
+        """Send; who does not take what it is sent is cut off, and costs nobody else anything."""
+        if self.transport is None or self.transport.is_closing():
+            return
+        self.transport.write(data)
+        if self.transport.get_write_buffer_size() > MOST_UNSENT:
+            LOG.warning("a client of the ZIY is cut off: more than %d bytes not taken", MOST_UNSENT)
+            self.transport.abort()
+
+
+class ZiyServer:
+    """A coordinator behind a port.
+
+    host    address to listen at; only this machine unless told otherwise
+    port    0 takes any free one; `port` says which after `start`
+    """
+
+    def __init__(
+        self, coordinator: Coordinator, host: str = LOOPBACK, port: int = PORT, *, network: Network | None = None
+    ):
+        self.coordinator, self.host, self.port = coordinator, host, port
+        self.board = Board(coordinator)
+        self.clients: set[Client] = set()
+        self._network: Network = network or Sockets()
+        self._listener: Listener | None = None
+        self._keeping: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Listen. Raises InputError where the port cannot be had."""
+        try:
+            self._listener = await self._network.serve(partial(Client, self), self.host, self.port)
+        except OSError as problem:
+            raise InputError(
+                f"ZIY: {self.host} port {self.port} cannot be had: {problem.strerror or problem}"
+            ) from problem
+        self.port = self._listener.port
+        self.coordinator.listeners.append(self.publish)
+        self._keeping = asyncio.get_running_loop().create_task(self._keep_alive())
+
+    async def stop(self) -> None:
+        """Close the connections and listen no more."""
+        if self._keeping is not None:
+            self._keeping.cancel()
+            await asyncio.gather(self._keeping, return_exceptions=True)
+        if self.publish in self.coordinator.listeners:
+            self.coordinator.listeners.remove(self.publish)
+        for client in list(self.clients):
+            if client.transport is not None:
+                client.transport.close()
+        if self._listener is not None:
+            await self._listener.close()
+
+    def now_ticks(self) -> int:
+        """The stamp of now."""
+        return ticks_now(self.coordinator.clock)
+
+    def joined(self, client: Client) -> None:
+        """Greet; one too many is turned away."""
+        if len(self.clients) >= MOST_CLIENTS:
+            client.tell(0, f"CONNECT 0, {MOST_CLIENTS} clients are connected (expected fewer)")
+            if client.transport is not None:
+                client.transport.close()
+            return
+        self.clients.add(client)
+        client.tell(0, f"HELLO This is ZIY {plain(self.coordinator.site.site.campaign.name)} ver. {VERSION}")
+        client.tell(0, f"CONNECT 1, {self.port}")
+
+    def left(self, client: Client) -> None:
+        """A connection is over."""
+        self.clients.discard(client)
+
+    def publish(self, entry: Any) -> None:
+        """Something is durable: kept in the samplers, and pushed to those who want it."""
+        for sampler, (stamp, *values) in self.board.samplers.add(entry):
+            kind = PUSHED.get(sampler)
+            wanting = [] if kind is None else [client for client in self.clients if kind in client.wants]
+            if wanting:
+                line = f"0\t{stamp}\t{kind} 1, {', '.join(values)}\n".encode("ascii", "replace")
+                for client in wanting:
+                    client.write(line)
+
+    def answer(self, client: Client, line: str) -> None:
+        """A line of a client."""
+        try:
+            request = parse_request(line)
+        except InputError as problem:
+            client.tell(0, f"LINE 0, {plain(str(problem))}")
+            return
+        if request is None:
+            return
+        if request.command == "BYE":
+            client.tell(request.tid, f"BYE 1, {self.port}, Closing Connection")
+            if client.transport is not None:
+                client.transport.close()
+            return
+        try:
+            if request.ticks is not None:
+                raise InputError("commands here take no stamp (expected TID and command alone)")
+            rows = self._subscribed(client, request) if request.command == "SUBSCRIBE" else self.board.rows(request)
+        except CatseyeError as problem:
+            client.tell(request.tid, f"{request.command} 0, {plain(str(problem))}")
+            return
+        if rows is None:
+            client.tell(request.tid, f"UNKNOWN command {request.command}")
+            return
+        for row in rows:
+            client.tell(request.tid, ", ".join([f"{request.command} 1", *row]))
+
+    def _subscribed(self, client: Client, request: Request) -> Iterable[tuple[str, ...]]:
+        """SUBSCRIBE [what ...]: all kinds where none is named; NONE ends it."""
+        asked = [word.upper() for word in request.parameters] or ["SHOT", "EPOCH", "EVENT"]
+        strange = [word for word in asked if word not in KINDS and word != "NONE"]
+        if strange:
+            raise InputError(f"{strange[0][:20]!a} cannot be subscribed (expected {' '.join(KINDS)} or NONE)")
+        client.wants = set() if "NONE" in asked else client.wants | set(asked)
+        return [(" ".join(sorted(client.wants)) or "NONE",)]
+
+    async def _keep_alive(self) -> None:
+        while True:
+            await asyncio.sleep(KEEP_ALIVE)
+            for client in list(self.clients):
+                client.write(b"\n")

@@ -1,0 +1,1 @@
+"""Nobody looks into the Sun or a box: requests, moves, beams at rest."""

@@ -1,0 +1,388 @@
+"""The last word between every plan and every ranger: what may not be sent, and which beam must move, or go dark, when.
+
+It believes nobody: its Sun is its own, and where a command leads it works out from what the ranger was told. Of a move
+the whole rectangle of counts between where the mirror may be and where it goes is asked (`sweep`), so it does not
+matter how the axes run. It must be told what rangers answer (`heard`) and how the telescope stands (`telescope`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.coordinator.guard.memory import Memory
+from catseye.coordinator.guard.resting import AHEAD, Alarm, in_words, resting
+from catseye.coordinator.plan.candidates import leaves
+from catseye.coordinator.visibility.surroundings import PERHAPS, SUN, KeepClear, Surroundings, instants, later
+from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between, vantages_of
+from catseye.errors import CatseyeError, InputError
+from catseye.geometry.encoder import BEAM_PER_COUNT, within
+from catseye.geometry.slew import trapezoid
+from catseye.geometry.time_tag import utc_text
+from catseye.ranger.commands import COMMANDS, schedule_of
+from catseye.ranger.line import Reply, Request, stamp_text
+from catseye.ranger.values import Value
+from catseye.records.interlock import Act, Interlock, Interlocks
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site_folder import SiteFolder
+from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
+
+Array = NDArray[np.float64]
+MOVES = frozenset(["STT", "CIL", "CMEAS", "TRK", "SCN", "FHM"])  # CMEAS 1 only
+SHINES = frozenset(["PS", "TRG", "CMEAS", "SCN", "STM"])  # PS 1, SCN 1 only
+HARMLESS = frozenset(
+    [
+        *("AXIS", "ERL", "FKP", "FKI", "FKD", "FIL", "FSI", "FLT", "WCNT", "WTOL", "WTMO", "WMD", "ACU", "CYC", "SFQ"),
+        *("IFF", "D0", "NG", "KND", "MOD", "MPC", "WAI", "CWT", "CLR", "BYE", "RST", "STI"),
+        *("ABP", "ABV", "ABA", "COO", "INI", "BP", "ALPHA", "BETA", "MO", "EZ", "AZM", "ELV", "ORD", "NUM"),
+    ]
+)
+BLOCK_TICKS = round(10.0 / TICK_SECONDS)  # for which the surroundings of a ranger on the ground are kept
+LOOK = 2.0  # s: a short move, its settling and its shot
+SHOT = 1.0  # s: settling and a shot, behind a long move
+ACTS: tuple[Act, ...] = ("shine", "move")
+ARRIVED = 1.0  # s after its profile's end, when a mirror is taken to stand where it was sent
+OLD_POSTURE = 10.0  # s
+FARTHEST_STAMP = 5.0  # s: what moves later than that is asked for when it is due
+LIE = 1.0 * DEGREE  # of a vector to the Sun
+WRONG_CLOCK = 1.0  # s
+LONGEST_SCAN = 600.0  # s
+A_SHOT = 2.0  # s of a scan
+DOWN = (0.0, 0.0, -1.0)
+ALONG_THE_BEAM = (0.0, 0.0, 1.0)
+
+
+class SafetyGuard:
+    """Of all rangers of a site.
+
+    site         its records
+    keep_clear   Sun and boxes; the site's Sun without boxes if None
+    interlocks   when what is forbidden; nothing if None
+
+    Raises InputError: an interlock for a ranger that the site does not have.
+    """
+
+    def __init__(self, site: SiteFolder, *, keep_clear: KeepClear | None = None, interlocks: Interlocks | None = None):
+        self.site, self.keep_clear = site, keep_clear or KeepClear(site)
+        self.interlocks = (interlocks or Interlocks()).interlock
+        self.vantages = vantages_of(site)
+        for each in self.interlocks:
+            for name in each.rangers:
+                if name not in self.vantages:
+                    raise InputError(f"interlock {each.name!r}: ranger {name!r} is not in the site")
+        self.opened = {each.name for each in self.interlocks if each.switch}
+        self._memory = {name: Memory(v) for name, v in self.vantages.items()}
+        self._posture: LivePosture | None = None
+        self._kept: dict[str, tuple[int, Surroundings]] = {}
+        self._suns: tuple[int, int, Array] | None = None
+
+    # What it must be told --------------------------------------------------------------------------------------------
+
+    def telescope(self, posture: LivePosture) -> None:
+        """How the telescope stands; rangers on its arm move with it."""
+        self._posture = posture
+
+    def heard(self, ranger: str, reply: Reply) -> None:
+        """A reply of a ranger: ACP, CIL, CMEAS, FHM, TRK, WAI and STW say where its mirror is; others nothing."""
+        if ranger in self._memory:
+            self._memory[ranger].hear(reply.command, reply.ok, reply.values)
+
+    def stands(self, ranger: str, counts: tuple[float, float]) -> None:
+        """Where a mirror rests, counts."""
+        for axis in (0, 1):
+            self._memory[ranger].stand.rest(axis, counts[axis])
+
+    def switch(self, name: str, *, is_open: bool) -> None:
+        """A contact of the interlocks: open forbids. Raises InputError: there is no such switch."""
+        if name not in {each.name for each in self.interlocks if each.switch}:
+            raise InputError(f"{name!r} is no switch of the interlocks")
+        (self.opened.add if is_open else self.opened.discard)(name)
+
+    # What it says ----------------------------------------------------------------------------------------------------
+
+    def refusal(self, ranger: str, request: Request, now_ticks: int) -> str | None:
+        """Why a request must not be sent to a ranger, in one line; None where it may, and then it counts as sent."""
+        if ranger not in self._memory:
+            return f"ranger {ranger!r} is not in the site (expected one of {len(self._memory)} of its records)"
+        memory = self._memory[ranger]
+        memory.stand.settle(now_ticks)
+        try:
+            if request.command == "COO" and len(request.parameters) >= 4:  # thousands of them
+                memory.take(request, ())
+                return None
+            said, values = self._judged(memory, request, now_ticks)
+            if said is None:
+                memory.take(request, values)
+        except (CatseyeError, ValueError) as problem:
+            return str(problem)
+        return said
+
+    def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
+        """What SUN should tell a ranger: the unit vector to the Sun in its own frame.
+
+        While it is set, where no beam goes: straight down, and for the feed arm, which looks down at the dish, the
+        other way along the telescope's beam. A ranger knows no horizon, and a vector cannot be taken back.
+
+        Raises InputError: a ranger on the feed arm, and no posture, or an old one.
+        """
+        vantage = self.vantages[ranger]
+        sun = self._suns_between(now_ticks, now_ticks)[0]
+        if not self.keep_clear.counts_at(sun):
+            return DOWN if vantage.frame == "ground" else ALONG_THE_BEAM
+        if vantage.frame == "reflector":
+            posture = self._fresh_posture(vantage, now_ticks)
+            since = seconds_between(posture.ticks, now_ticks)
+            sun = reflector_at(self.site, posture, since).rotation.T @ sun
+        return float(sun[0]), float(sun[1]), float(sun[2])
+
+    def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> list[Alarm]:
+        """Which beams at rest at counts the Sun, a box or an interlock comes to within ten minutes; soonest first.
+
+        Of a beam on the feed arm the Sun and boxes are looked for within a minute.
+
+        A ranger on the arm whose posture is not known is left out: nothing may move it either.
+        """
+        alarms: list[Alarm] = []
+        for name in sorted(counts):
+            alarms += resting(self.keep_clear, self.vantages[name], counts[name], now_ticks, self._posture)
+            for each in self.interlocks:
+                within = self._opens(each, name, now_ticks, AHEAD)
+                if within is not None and "shine" in each.forbids and self._memory[name].shining:
+                    text = f"{name}: interlock {each.name} ({each.why}) {in_words(within)}: switch its laser off"
+                    alarms.append(Alarm(name, within, "interlock", "dark", text))
+        return sorted(alarms, key=lambda alarm: (alarm.within, alarm.ranger))
+
+    # Inside ----------------------------------------------------------------------------------------------------------
+
+    def _judged(self, memory: Memory, request: Request, now: int) -> tuple[str | None, tuple[Value, ...]]:
+        name = request.command
+        if name == "AT":
+            return self._scheduled(memory, request, now), ()
+        if name not in COMMANDS:
+            return f"{name} is no command of a ranger", ()
+        values = COMMANDS[name].read(request)
+        if COMMANDS[name].only_asks(request):
+            return None, values
+        if name == "INITZY":
+            return "files cannot be looked into from here (expected their commands instead)", values
+        if name == "SUN":
+            return self._lie(memory.vantage, values, now), values
+        if name == "STI" and abs(seconds_between(now, int(values[0]))) > WRONG_CLOCK:
+            return (
+                f"clock {stamp_text(int(values[0]))} is more than {WRONG_CLOCK:g} s off: its Sun would be wrong",
+                values,
+            )
+        moves = name in MOVES and not (name == "CMEAS" and values[0] == 2) and not (name == "SCN" and values[0] == 0)
+        shines = name in SHINES and values[:1] != (0,)
+        if not moves and not shines and name not in HARMLESS and name not in ("PS", "SCN"):
+            return f"{name} is not known to the safety guard (expected another command)", values
+        since = max(now, request.ticks or now)
+        until = later(since, LOOK) if name != "TRK" else max(later(since, LOOK), int(values[5]))
+        said = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
+        if said is None and name == "PS" and shines:
+            said = self._lights(memory, since, until)
+        if said is None and moves:
+            if since > later(now, FARTHEST_STAMP):
+                return (
+                    f"its start is {seconds_between(now, since):.0f} s away (expected at most {FARTHEST_STAMP:g})",
+                    values,
+                )
+            said = (
+                self._homing(memory, since, until) if name == "FHM" else self._move(memory, name, values, since, until)
+            )
+            if said is None and name == "FHM":
+                memory.stand.lose(int(values[0]))
+        return said, values
+
+    def _scheduled(self, memory: Memory, request: Request, now: int) -> str | None:
+        start, repeats, interval, inner = schedule_of(request.parameters)
+        if COMMANDS[inner.command].only_asks(inner):
+            return None
+        firing = inner.command in ("TRG", "MPC") or (inner.command == "CMEAS" and inner.parameters[:1] == ("2",))
+        if not firing:
+            return f"{inner.command} at another time cannot be judged now (expected it when it is due)"
+        since = max(now, start)
+        last = later(since, LOOK + (repeats - 1) * interval)
+        return self._interlocked(memory.vantage.name, since, last, moves=False, shines=True)
+
+    def _interlocked(self, ranger: str, since: int, until: int, *, moves: bool, shines: bool) -> str | None:
+        """The first interlock that forbids it, in words."""
+        asked: list[Act] = [act for act, on in zip(ACTS, (shines, moves), strict=True) if on]
+        for each in self.interlocks:
+            acts = [act for act in asked if act in each.forbids]
+            if not acts or self._opens(each, ranger, since, seconds_between(since, until)) is None:
+                continue
+            ends = "until its switch closes"
+            if not each.switch:
+                begin = since / TICKS_PER_DAY
+                last = each.spans(begin, begin + 1.0)[0][1]
+                ends = f"until {utc_text(last)}" if last < begin + 1.0 else "for a day and more"
+            return f"interlock {each.name} ({each.why}) forbids to {' and '.join(acts)} {ends}"
+        return None
+
+    def _opens(self, each: Interlock, ranger: str, since: int, seconds: float) -> float | None:
+        """s from a time until an interlock holds a ranger, within some s; None where it does not."""
+        if not each.concerns(ranger):
+            return None
+        if each.switch:
+            return 0.0 if each.name in self.opened else None
+        begin = since / TICKS_PER_DAY
+        spans = each.spans(begin, begin + seconds / SECONDS_PER_DAY)
+        return None if not spans else max(0.0, (spans[0][0] - begin) * SECONDS_PER_DAY)
+
+    def _lie(self, vantage: Vantage, values: tuple[Value, ...], now: int) -> str | None:
+        """A vector to the Sun that is none."""
+        if not self.keep_clear.counts_at(self.keep_clear.sun(now)):
+            return None
+        told = np.array([float(v) for v in values])
+        size = float(np.linalg.norm(told))
+        true = np.array(self.sun_vector(vantage.name, now))
+        off = float(np.arctan2(np.linalg.norm(np.cross(told, true)), told @ true)) if size > 0.0 else np.pi
+        if off <= LIE:
+            return None
+        return f"that is {off / DEGREE:.1f} deg from the Sun (limit {LIE / DEGREE:g}): ask the guard for its vector"
+
+    def _lights(self, memory: Memory, since: int, until: int) -> str | None:
+        """A laser is not switched on into a box."""
+        if not self.keep_clear.boxes:
+            return None
+        if not memory.stand.known:
+            return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
+        around = self._around(memory, since, until)
+        low, high = memory.stand.low, memory.stand.high
+        box = around.box_in(low, high) if bool(around.near_boxes(low, high)) else None
+        return None if box is None else f"the beam may be on {box} (expected the mirror elsewhere first)"
+
+    def _homing(self, memory: Memory, since: int, until: int) -> str | None:
+        """The search for an index sweeps the beam anywhere."""
+        if memory.laser_off:
+            return None
+        up = self.keep_clear.counts_at(self.keep_clear.sun(instants(since, until)))
+        if not up and not self.keep_clear.boxes:
+            return None
+        return "the search for an index sweeps the beam anywhere (expected PS 0 first)"
+
+    def _move(self, memory: Memory, name: str, values: tuple[Value, ...], since: int, until: int) -> str | None:
+        """Whether the mirror may go where a command leads it; if so it is under way."""
+        if not memory.stand.known:
+            return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
+        goals = self._goals(memory, name, values)
+        low, high = goals.min(axis=0), goals.max(axis=0)
+        stops = memory.vantage.stops
+        if not np.all(within([low[0], high[0]], *stops)):
+            return f"azimuth {low[0]:.0f} to {high[0]:.0f} counts leaves the stops {stops[0]:g} to {stops[1]:g}"
+        if name == "SCN":
+            rounds = int(values[2]) if len(values) > 2 else 0
+            takes = rounds * len(memory.order) * A_SHOT
+            start = max(since, int(values[1]) if len(values) > 1 else 0)
+            if not 0.0 < takes <= LONGEST_SCAN or start > later(since, FARTHEST_STAMP):
+                return f"a scan must say its rounds, and end within {LONGEST_SCAN:g} s (expected SCN 1, 0, rounds)"
+            until = later(start, takes)
+        longest = trapezoid(np.stack([memory.stand.low, memory.stand.high]), np.stack([high, low]), memory.pace)
+        seconds = float(np.max(longest.total)) + ARRIVED
+        until = max(until, later(since, seconds + SHOT - ARRIVED))
+        said = self._swept(memory, name, (low, high), since, until)
+        if said is None:
+            at = later(max(since, int(values[1]) if name == "TRK" else since), seconds)
+            memory.stand.go(low, high, at if name != "SCN" else max(at, until), name)
+        return said
+
+    def _goals(self, memory: Memory, name: str, values: tuple[Value, ...]) -> Array:
+        """Counts (k, 2) to which a command leads. Raises InputError: it cannot be told."""
+        if name == "STT":
+            axis = int(values[0])
+            low, high = memory.stand.low.copy(), memory.stand.high.copy()
+            if memory.stand.goal is not None:  # the other axis may be under way
+                low[1 - axis], high[1 - axis] = (side[1 - axis] for side in memory.stand.goal)
+            low[axis] = high[axis] = memory.axes[axis].position
+            return np.stack([low, high])
+        if name == "SCN":
+            if not memory.order:
+                raise InputError("the scan list is empty (expected NUM and ORD first)")
+            return np.stack([memory.counts(number) for number in memory.order])
+        if name == "TRK":
+            memory.number(values[0])
+            numbers = [float(v) for v in values]
+            return np.stack([memory.look(tuple(numbers[2:5])), memory.look(tuple(numbers[6:9]))])
+        if name == "CIL" and len(values) == 3:
+            return np.array([[float(values[1]), float(values[2])]])
+        if name == "CIL" and len(values) == 4:
+            return memory.look(tuple(float(v) for v in values[1:]))[None]
+        return memory.counts(values[1] if name == "CMEAS" else values[0])[None]
+
+    def _swept(self, memory: Memory, name: str, goal: tuple[Array, Array], since: int, until: int) -> str | None:
+        """Sun and boxes on the way from where the mirror may be to a rectangle of counts."""
+        stand = memory.stand
+        low, high = np.minimum(stand.low, goal[0]), np.maximum(stand.high, goal[1])
+        around = self._around(memory, since, until)
+        code = int(around.codes(low, high))
+        if code == SUN:
+            if np.array_equal(stand.low, stand.high) and bool(leaves(around, stand.low, *(g[None] for g in goal))[0]):
+                return None
+            left = float(around.from_sun(low, high)) + around.sun_limit
+            return (
+                f"the beam could come within {max(left, 0.0) / DEGREE:.1f} deg of the Sun "
+                f"(expected at least {around.sun_limit / DEGREE:.1f}): choose another way, or wait"
+            )
+        if code != PERHAPS:
+            return None
+        box = self._box(memory, name, goal, around, (low, high))
+        return None if box is None else f"the beam could come to {box}: choose another way or target"
+
+    def _box(
+        self, memory: Memory, name: str, goal: tuple[Array, Array], around: Surroundings, swept: tuple[Array, Array]
+    ) -> str | None:
+        """The box to which a move may come: along the axes' profiles where start, end and start together are known."""
+        together = name in ("CIL", "CMEAS", "TRK") and np.array_equal(memory.stand.low, memory.stand.high)
+        spread = float(np.hypot(*((goal[1] - goal[0]) * BEAM_PER_COUNT)))
+        if not together or spread > DEGREE:
+            return around.box_in(*swept)
+        paced = replace(around, vantage=replace(around.vantage, pace=memory.pace))
+        if spread > 0.0:
+            paced = replace(paced, guards=tuple(replace(g, off_beam=g.off_beam + spread) for g in paced.guards))
+        return paced.box_entered(memory.stand.low, goal[0])
+
+    def _around(self, memory: Memory, since: int, until: int) -> Surroundings:
+        """What a ranger must keep out of; of one on the ground kept for ten seconds."""
+        vantage = memory.vantage
+        if vantage.frame == "reflector":
+            posture = self._fresh_posture(vantage, since)
+            wider = _unforeseen(seconds_between(posture.ticks, until))
+            suns = self._suns_between(since, until)
+            return self.keep_clear.around(vantage, since, until, posture=posture, suns=suns, wider=wider)
+        block = since // BLOCK_TICKS
+        end = (block + 2) * BLOCK_TICKS
+        if until > end:
+            return self.keep_clear.around(vantage, since, until, posture=None)
+        kept = self._kept.get(vantage.name)
+        if kept is None or kept[0] != block:
+            kept = block, self.keep_clear.around(vantage, block * BLOCK_TICKS, end, posture=None)
+            self._kept[vantage.name] = kept
+        return kept[1]
+
+    def _suns_between(self, since: int, until: int) -> Array:
+        """(NODES, 3) of `instants`, straight between two 40 s apart: 1e-6 rad off, 4e-5 where refraction bends most."""
+        if self._suns is None or not self._suns[0] <= since <= until <= self._suns[1]:
+            first, last = since, max(until, since + 4 * BLOCK_TICKS)
+            self._suns = first, last, self.keep_clear.sun([first, last])
+        first, last, suns = self._suns
+        share = ((instants(since, until) - first) / (last - first))[:, None]
+        found = suns[0] + share * (suns[1] - suns[0])
+        return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+
+    def _fresh_posture(self, vantage: Vantage, ticks: int) -> LivePosture:
+        posture = self._posture
+        if posture is None:
+            raise InputError(f"{vantage.name} rides on the telescope, whose posture is not known (expected one first)")
+        age = seconds_between(posture.ticks, ticks)
+        if not -1.0 <= age <= OLD_POSTURE:
+            raise InputError(f"{vantage.name}: the telescope's posture is {age:.1f} s old (limit {OLD_POSTURE:g} s)")
+        return posture
+
+
+def _unforeseen(seconds: float) -> float:
+    """Angle, rad, by which the telescope may turn otherwise than its rates say, some s after they were told."""
+    ramp = 0.5 * SLEW_ACCELERATION * seconds**2
+    return float(np.hypot(min(ramp, 2.0 * AZIMUTH_SLEW * seconds), min(ramp, 2.0 * ELEVATION_SLEW * seconds)))

@@ -1,0 +1,226 @@
+"""A journal read: its runs, and what happened in each, in order, a piece at a time; nothing is ever written."""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+from sqlalchemy import Connection, Engine, Table, func, select
+from sqlalchemy.exc import SQLAlchemyError
+
+from catseye.coordinator.journal.entries import AnsweredShot, Entry, Solution
+from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
+from catseye.coordinator.journal.rows import entry_of, unpack
+from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, version_of
+from catseye.errors import InputError
+from catseye.records.site_folder import SiteFolder, read_site
+
+PIECE = 512  # events read at once: 8 MB where each is a buffer
+Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRun:
+    """What a journal says of one run.
+
+    run          its number in the journal, from 1
+    started, ended   ticks; `ended` None while it lasts, and for ever where it was killed
+    settings     as the coordinator stated them
+    versions     of catseye, python, numpy
+    buffers      whether samples were kept
+    hashes       SHA-256 of its files by relative path
+    """
+
+    run: int
+    uuid: str
+    started: int
+    ended: int | None
+    site: str
+    seed: int | None
+    settings: dict[str, Any]
+    host: str
+    pid: int
+    versions: dict[str, str]
+    buffers: bool
+    hashes: dict[str, str]
+
+
+class JournalReader:
+    """A journal at a place, while it is written or after.
+
+    url   a file, or postgresql://USER@HOST/DATABASE
+
+    Raises InputError: no journal there, a newer one, one that cannot be read.
+    """
+
+    def __init__(self, url: str | Path):
+        self._where = place_of(url)
+        self.place = self._where.shown
+        refuse_foreign(self._where, fresh=False)
+        self._engine: Engine = reading_engine(self._where)
+        self._folders: list[TemporaryDirectory[str]] = []
+        with self._reading() as connection:
+            if version_of(connection, self.place) == 0:
+                raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
+
+    def runs(self) -> tuple[StoredRun, ...]:
+        """All runs, oldest first."""
+        with self._reading() as connection:
+            files: dict[int, dict[str, str]] = {}
+            for row in connection.execute(select(RUN_FILES).order_by(RUN_FILES.c.path)):
+                files.setdefault(row.run, {})[row.path] = row.sha256
+            return tuple(
+                _stored(row, files.get(row.run, {})) for row in connection.execute(select(RUNS).order_by(RUNS.c.run))
+            )
+
+    def run(self, which: int | str | None = None) -> StoredRun:
+        """One run: by number, by its uuid or the beginning of it, or the last.
+
+        Raises InputError where there is none, or are two.
+        """
+        runs = self.runs()
+        found = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
+        if len(found) != 1:
+            held = f"runs 1 to {runs[-1].run}" if runs else "no runs"
+            raise InputError(f"journal {self.place}: run {which!r} names {len(found)} runs (it holds {held})")
+        return found[0]
+
+    def events(
+        self,
+        run: int,
+        after: int = 0,
+        *,
+        until: int | None = None,
+        kinds: Sequence[Kind] | None = None,
+        buffers: bool = True,
+    ) -> Iterator[tuple[int, Entry]]:
+        """What happened in a run, (seq, entry), in the order in which it was given to the reduction.
+
+        after     seq: those behind it
+        until     seq: those up to it
+        kinds     tables wanted; all
+        buffers   whether shots come with their samples, where they were kept
+
+        Raises InputError where the journal is damaged, once all before the damage was given.
+        """
+        tables = [table for table in EVENTS if kinds is None or table.name in kinds]
+        last = self.last(run) if until is None else min(until, self.last(run))
+        while after < last:
+            upto = min(after + PIECE, last)
+            yield from self._piece(run, after, upto, tables, buffers)
+            after = upto
+
+    def shots(self, run: int, *, buffers: bool = True) -> Iterator[tuple[int, AnsweredShot]]:
+        """The shots of a run, with their seq."""
+        for seq, entry in self.events(run, kinds=["shots"], buffers=buffers):
+            if isinstance(entry, AnsweredShot):
+                yield seq, entry
+
+    def solutions(self, run: int) -> Iterator[tuple[int, Solution]]:
+        """The solutions of a run, with their seq."""
+        for seq, entry in self.events(run, kinds=["solutions"]):
+            if isinstance(entry, Solution):
+                yield seq, entry
+
+    def last(self, run: int) -> int:
+        """The seq of a run's last event; 0 of none."""
+        with self._reading() as connection:
+            return _last(connection, run)
+
+    def files(self, run: int) -> dict[str, str]:
+        """The texts of a run's files by relative path."""
+        wanted = (
+            select(RUN_FILES.c.path, TEXTS.c.text)
+            .join(TEXTS, RUN_FILES.c.sha256 == TEXTS.c.sha256)
+            .where(RUN_FILES.c.run == run)
+            .order_by(RUN_FILES.c.path)
+        )
+        with self._reading() as connection:
+            return {row.path: row.text for row in connection.execute(wanted)}
+
+    def site(self, run: int) -> SiteFolder:
+        """The site of a run, from its files, in a temporary directory that lasts as long as this reader."""
+        folder = TemporaryDirectory(prefix="catseye-site-")
+        self._folders.append(folder)
+        root = Path(folder.name)
+        for name in ("monuments", "mirrors", "triplets"):
+            (root / name).mkdir()
+        for path, text in self.files(run).items():
+            where = (root / path).resolve()
+            if root.resolve() not in where.parents:
+                raise InputError(f"journal {self.place}: run {run} has a file {path!r} outside its site")
+            where.parent.mkdir(parents=True, exist_ok=True)
+            where.write_text(text, encoding="utf-8", newline="")
+        return read_site(root)
+
+    def close(self) -> None:
+        """Remove the temporary directories."""
+        while self._folders:
+            self._folders.pop().cleanup()
+
+    def __enter__(self) -> "JournalReader":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _reading(self) -> Iterator[Connection]:
+        try:
+            with self._engine.connect() as connection, connection.begin():
+                yield connection
+        except SQLAlchemyError as problem:
+            raise refused(self._where, problem) from problem
+
+    def _piece(
+        self, run: int, after: int, upto: int, tables: Sequence[Table], buffers: bool
+    ) -> list[tuple[int, Entry]]:
+        """The events after a seq and up to another, one state of the journal."""
+        found: list[tuple[int, Entry]] = []
+        with self._reading() as connection:
+            samples: dict[int, Any] = {}
+            if buffers and SHOTS in tables:
+                samples = {row.seq: row for row in connection.execute(_between(BUFFERS, run, after, upto))}
+            for table in tables:
+                for row in connection.execute(_between(table, run, after, upto)):
+                    buffer = samples.get(row.seq) if table is SHOTS else None
+                    taken = None
+                    if buffer is not None:
+                        place = f"journal {self.place}: run {run}, event {row.seq}"
+                        taken = unpack(buffer, max(1, row.samples_per_cycle), place)
+                    found.append((row.seq, entry_of(table.name, row, taken)))
+        found.sort(key=lambda pair: pair[0])
+        return found
+
+
+def _between(table: Table, run: int, after: int, upto: int) -> Any:
+    return select(table).where(table.c.run == run, table.c.seq > after, table.c.seq <= upto).order_by(table.c.seq)
+
+
+def _last(connection: Connection, run: int) -> int:
+    highest = (connection.scalar(select(func.max(table.c.seq)).where(table.c.run == run)) for table in EVENTS)
+    return max(seq or 0 for seq in highest)
+
+
+def _is(run: StoredRun, which: int | str) -> bool:
+    return run.run == which if isinstance(which, int) else run.uuid.startswith(which)
+
+
+def _stored(row: Any, files: dict[str, str]) -> StoredRun:
+    return StoredRun(
+        run=row.run,
+        uuid=row.uuid,
+        started=row.started_ticks,
+        ended=row.ended_ticks,
+        site=row.site,
+        seed=row.seed,
+        settings=json.loads(row.settings),
+        host=row.host,
+        pid=row.pid,
+        versions={"catseye": row.catseye, "python": row.python, "numpy": row.numpy},
+        buffers=row.buffers,
+        hashes=files,
+    )

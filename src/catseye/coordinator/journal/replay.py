@@ -1,0 +1,80 @@
+"""A run fed to the reduction again, in the order in which it was fed then, and held against what it said then."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
+from catseye.coordinator.parts import EpochJob, LiveReduction
+from catseye.errors import CatseyeError
+from catseye.records.live import LivePosture, LiveShot, LiveWeather
+from catseye.records.site_folder import SiteFolder
+
+LiveFactory = Callable[[SiteFolder, StoredRun], LiveReduction]
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """One solution, stored and made again.
+
+    seq         in its run
+    new         its answer is empty where nothing could be solved this time
+    shots       fed since the solution before
+    differing   seqs of those whose answer is not the stored one to the last bit
+    """
+
+    seq: int
+    stored: Solution
+    new: Solution
+    shots: int
+    differing: tuple[int, ...]
+
+    @property
+    def same(self) -> bool:
+        """Whether all is as it was, to the last bit."""
+        return self.stored.same(self.new) and not self.differing
+
+
+def replay(
+    reader: JournalReader, run: int, live_factory: LiveFactory, *, until: int | None = None
+) -> Iterator[Replayed]:
+    """Each stored solution of a run beside the one that the same shots, weather and posture give now.
+
+    live_factory   makes the reduction of a run, with the settings that the run states
+    until          seq of the last event fed
+
+    Without stored samples the reduction sees what the rangers made of them, and answers differ.
+    """
+    live = live_factory(reader.site(run), reader.run(run))
+    shots, differing = 0, []
+    job: EpochJob | None = None
+    kinds: list[Kind] = ["shots", "weather", "postures", "documents", "solutions"]
+    for seq, entry in reader.events(run, until=until, kinds=kinds):
+        if isinstance(entry, AnsweredShot):
+            shots += 1
+            again = _asked(live, entry.shot)
+            if entry.status and _answer(again) != _answer(entry):
+                differing.append(seq)
+        elif isinstance(entry, LiveWeather):
+            live.weather(entry)
+        elif isinstance(entry, LivePosture):
+            live.posture(entry)
+        elif isinstance(entry, Document) and entry.name == EPOCH_BEGUN:
+            job = live.begin(entry.ticks)
+        elif isinstance(entry, Solution):
+            new = Solution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
+            yield Replayed(seq, entry, new, shots, tuple(differing))
+            shots, differing, job = 0, [], None
+
+
+def _asked(live: LiveReduction, shot: LiveShot) -> AnsweredShot:
+    """As the coordinator asks: a shot that the reduction refuses has the refusal for its answer."""
+    try:
+        return AnsweredShot.of(shot, live.shot(shot))
+    except CatseyeError as problem:
+        return AnsweredShot(shot, "refused", str(problem))
+
+
+def _answer(shot: AnsweredShot) -> tuple[str, ...]:
+    """Status and numbers; as text, in which NaN is NaN and every bit shows."""
+    return (shot.status, shot.text, *(repr(float(value)) for value in (shot.range_, shot.u_range, shot.misfit)))

@@ -1,0 +1,65 @@
+"""The beginning of a run: its row in the journal, and the files that it starts from, each text once a journal."""
+
+import json
+import os
+import platform
+import socket
+from hashlib import sha256
+
+import numpy as np
+from sqlalchemy import insert, select
+
+from catseye import __version__
+from catseye.coordinator.journal.entries import Run, plain
+from catseye.coordinator.journal.place import Place, reading_engine, writing_engine
+from catseye.coordinator.journal.tables import RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
+from catseye.coordinator.parts import Clock, ticks_now
+
+OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
+
+
+def begin(place: Place, run: Run, clock: Clock, buffers: bool) -> int:
+    """The tables where there are none, the run's row and its files, in one transaction; the run's number.
+
+    buffers   whether samples will be kept
+    """
+    settings = json.dumps(plain(dict(run.settings), "settings"), sort_keys=True, allow_nan=False)
+    files = {path: (sha256(text.encode()).hexdigest(), text) for path, text in run.files().items()}
+    _look_first(place)
+    engine = writing_engine(place, create=True)
+    with engine.begin() as connection:
+        if connection.dialect.name == "postgresql":
+            connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({OURS})")
+        create_or_carry(connection, place.shown)
+        known = set(
+            connection.scalars(select(TEXTS.c.sha256).where(TEXTS.c.sha256.in_([f[0] for f in files.values()])))
+        )
+        fresh = {digest: text for digest, text in files.values() if digest not in known}
+        if fresh:
+            connection.execute(insert(TEXTS), [{"sha256": digest, "text": text} for digest, text in fresh.items()])
+        done = connection.execute(
+            insert(RUNS).values(
+                uuid=run.uuid,
+                started_ticks=ticks_now(clock),
+                site=run.site.site.campaign.name,
+                seed=run.seed,
+                settings=settings,
+                host=socket.gethostname(),
+                pid=os.getpid(),
+                catseye=__version__,
+                python=platform.python_version(),
+                numpy=np.__version__,
+                buffers=buffers,
+            )
+        )
+        number = int(done.inserted_primary_key[0])  # type: ignore[index]
+        rows = [{"run": number, "path": path, "sha256": digest} for path, (digest, _) in files.items()]
+        connection.execute(insert(RUN_FILES), rows)
+    return number
+
+
+def _look_first(place: Place) -> None:
+    """A file of others' is refused before it is opened for writing, which would change its header."""
+    if place.path is not None and place.path.exists() and place.path.stat().st_size:
+        with reading_engine(place).connect() as connection:
+            version_of(connection, place.shown)

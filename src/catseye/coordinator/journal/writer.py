@@ -1,0 +1,350 @@
+"""The journal's writer: what happened, in order, durable. A thread of its own; one commit for all that came in some ms.
+
+What an `append` holds stands in one transaction. Where the database cannot take it (disk full, server gone), an alarm
+is told, the entries wait, and it is tried again until it can: what the reduction was fed is what is journalled, once.
+"""
+
+import asyncio
+import threading
+import time
+from collections import defaultdict, deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, update
+from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
+
+from catseye.coordinator.journal.entries import Item, Run
+from catseye.coordinator.journal.place import (
+    Place,
+    WriterLock,
+    fold,
+    identity,
+    place_of,
+    refuse_foreign,
+    refused,
+    writing_engine,
+)
+from catseye.coordinator.journal.rows import PACKED, RAW, Row, Rows, pack, rows_of
+from catseye.coordinator.journal.run import begin
+from catseye.coordinator.journal.tables import METADATA, RUNS, insertion
+from catseye.coordinator.parts import Clock, NotDurable, ticks_now
+from catseye.errors import InputError
+
+MOST_ROWS = 512  # of one commit
+MOST_WAITING = 20_000  # rows in line
+MOST_BYTES = 256 * 2**20  # of samples in line
+PATIENCE = 2.0  # s of trouble after which futures fail
+FIRST_WAIT, LONGEST_WAIT = 0.05, 2.0  # s between attempts while there is trouble
+LONGEST_DURABLE = 10.0  # s that `durable` waits: a server may hang without a word
+
+Tell = Callable[[str], None]
+
+
+@dataclass(eq=False)
+class Batch:
+    """What one append gave: rows, seq in them, of one transaction."""
+
+    rows: Rows
+    size: int  # bytes of samples
+    future: "Future[int]" = field(default_factory=Future)
+    since: float = field(default_factory=time.monotonic)
+
+    def fail(self, problem: InputError) -> None:
+        if not self.future.done():
+            self.future.set_exception(problem)
+
+    def done(self, seq: int) -> None:
+        if not self.future.done():
+            self.future.set_result(seq)
+
+
+class Journal:
+    """One run's writer; made by `open`.
+
+    run      its number in this journal
+    place    where it is, for people
+    """
+
+    def __init__(self, place: Place, engine: Engine, lock: WriterLock, run: int, **settings: Any):
+        self.run, self.place = run, place.shown
+        self._where, self._engine, self._lock = place, engine, lock
+        self._clock: Clock = settings["clock"]
+        self._group: float = settings["group"]
+        self._buffers: bool = settings["keep_buffers"]
+        self._packing = PACKED if settings["compress"] else RAW
+        self._on_alarm: Tell | None = settings["on_alarm"]
+        self._on_recovery: Tell | None = settings["on_recovery"]
+        self._patience: float = settings["patience"]
+        self._wake = threading.Condition()
+        self._queue: deque[Batch] = deque()
+        self._waiting = self._bytes = self._seq = 0
+        self._closing = False
+        self._give_up = float("inf")
+        self._trouble: str | None = None
+        self._busy_since: float | None = None
+        self._connection: Connection | None = None
+        self._inserts = {table.name: insertion(table, engine.dialect) for table in METADATA.tables.values()}
+        self._file = identity(place)
+        self._thread = threading.Thread(target=self._work, name="journal", daemon=True)
+        self._thread.start()
+
+    @classmethod
+    def open(
+        cls,
+        url: str | Path,
+        *,
+        run: Run,
+        clock: Clock,
+        group: float = 0.005,
+        keep_buffers: bool = True,
+        compress: bool = False,
+        on_alarm: Tell | None = None,
+        on_recovery: Tell | None = None,
+        patience: float = PATIENCE,
+    ) -> "Journal":
+        """Create, or carry to this version, the journal at a place, and begin a run in it.
+
+        url            a file, or postgresql://USER@HOST/DATABASE
+        group          s that a commit waits for more
+        keep_buffers   samples too: without them a replay has only what the rangers made of them
+        compress       samples in half the space for 0.2 ms each
+        on_alarm       told once, from the journal's thread, that nothing is durable any more and why
+        on_recovery    told when it is again
+        patience       s of trouble after which the futures of what waits fail; it stays in line all the same
+
+        Raises InputError: a bad place, another's file or database, a newer journal, one that cannot be written, a file
+        that has a writer.
+        """
+        place = place_of(url)
+        refuse_foreign(place, fresh=True)
+        lock = WriterLock(place)
+        try:
+            number = begin(place, run, clock, keep_buffers)
+            engine = writing_engine(place)
+        except SQLAlchemyError as problem:
+            lock.release()
+            raise refused(place, problem) from problem
+        except InputError:
+            lock.release()
+            raise
+        return cls(
+            place,
+            engine,
+            lock,
+            number,
+            clock=clock,
+            group=group,
+            keep_buffers=keep_buffers,
+            compress=compress,
+            on_alarm=on_alarm,
+            on_recovery=on_recovery,
+            patience=patience,
+        )
+
+    @property
+    def trouble(self) -> str | None:
+        """Why nothing is durable at present; None where all is well. No shot should be fired meanwhile."""
+        since = self._busy_since
+        if self._trouble is None and since is not None and time.monotonic() - since > self._patience:
+            return f"journal {self.place}: no answer for {time.monotonic() - since:.0f} s"
+        return self._trouble
+
+    def append(self, *items: Item) -> "Future[int]":
+        """Put entries in line, in order; done, with the last one's seq, when they are durable.
+
+        items   none: done when all before are durable
+
+        Any thread; never waits. The future fails with InputError where the entries are refused (a shot that is there
+        already), and with NotDurable where trouble lasts: then they stay in line.
+
+        Raises InputError: nothing a journal holds, a full line, a closed journal; then nothing was put in line.
+        """
+        sets = [rows_of(item, self._buffers) for item in items]
+        size = sum(row["samples"].nbytes for rows in sets for table, row in rows if table == "buffers")
+        rows = [row for rows in sets for row in rows]
+        batch = Batch(rows, size)
+        batch.future.set_running_or_notify_cancel()  # from here on nobody can take it back
+        with self._wake:
+            if self._closing:
+                raise InputError(f"journal {self.place}: is closed")
+            if self._waiting + len(rows) > MOST_WAITING or self._bytes + size > MOST_BYTES:
+                why = self._trouble or "it cannot keep up"
+                raise InputError(f"{self._waiting} rows wait for the journal (expected at most {MOST_WAITING}): {why}")
+            for seq, entry in enumerate(sets, start=self._seq + 1):
+                for _, row in entry:
+                    row["run"], row["seq"] = self.run, seq
+            self._seq += len(sets)
+            self._waiting += len(rows)
+            self._bytes += size
+            self._queue.append(batch)
+            if len(self._queue) == 1 or self._waiting >= MOST_ROWS:
+                self._wake.notify()
+        return batch.future
+
+    async def durable(self, *items: Item) -> None:
+        """Append and wait until it is durable; InputError after 10 s."""
+        try:
+            await asyncio.wait_for(asyncio.wrap_future(self.append(*items)), LONGEST_DURABLE)
+        except TimeoutError:
+            raise InputError(f"journal {self.place}: not durable after {LONGEST_DURABLE:g} s") from None
+
+    def close(self, timeout: float = 5.0) -> None:
+        """Write what waits, end the run, let others write. What cannot be written within the time is given up.
+
+        Raises InputError where entries were given up.
+        """
+        with self._wake:
+            self._closing = True
+            self._give_up = min(self._give_up, time.monotonic() + timeout)
+            self._wake.notify()
+        self._thread.join(timeout + 2.0 * LONGEST_WAIT)
+        if not self._thread.is_alive():
+            self._lock.release()
+        if self._waiting:
+            raise InputError(f"journal {self.place}: closed with {self._waiting} rows not written: {self.trouble}")
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _work(self) -> None:
+        """The thread: groups to the database until closed; whatever ends it, no future is left waiting."""
+        try:
+            while batches := self._taken():
+                self._persist(batches)
+                with self._wake:
+                    self._busy_since = None
+            self._end()
+        finally:
+            with self._wake:
+                self._closing = True
+                left = list(self._queue)
+            for batch in left:
+                batch.fail(InputError(f"journal {self.place}: ended before this was durable"))
+            self._disconnect()
+
+    def _taken(self) -> list[Batch]:
+        """The next group, still counted as waiting; empty when closed and done."""
+        with self._wake:
+            while not self._queue and not self._closing:
+                self._wake.wait()
+            if not self._queue:
+                return []
+            full_at = self._queue[0].since + self._group
+            while not self._closing and self._waiting < MOST_ROWS and (left := full_at - time.monotonic()) > 0.0:
+                self._wake.wait(left)
+            batches: list[Batch] = []
+            rows = 0
+            while self._queue and (not batches or rows + len(self._queue[0].rows) <= MOST_ROWS):
+                batches.append(self._queue.popleft())
+                rows += len(batches[-1].rows)
+            self._busy_since = time.monotonic()
+            return batches
+
+    def _persist(self, batches: list[Batch]) -> None:
+        """Until it is written: trouble is told once, and tried again more and more seldom."""
+        wait, began = FIRST_WAIT, time.monotonic()
+        while True:
+            try:
+                self._store(batches)
+            except (IntegrityError, DataError) as problem:
+                self._disconnect()
+                self._sift(batches, problem)
+                return
+            except (SQLAlchemyError, InputError) as problem:
+                self._disconnect()
+                why = problem if isinstance(problem, InputError) else refused(self._where, problem)
+                self._in_trouble(str(why))
+            else:
+                break
+            if time.monotonic() - began >= self._patience or self._closing:
+                self._fail_waiting(batches)
+            if not self._paused(wait):
+                return
+            wait = min(2.0 * wait, LONGEST_WAIT)
+        self._acknowledge(batches)
+
+    def _store(self, batches: Sequence[Batch]) -> None:
+        """One transaction."""
+        rows: dict[str, list[Row]] = defaultdict(list)
+        for batch in batches:
+            for table, row in batch.rows:
+                if table == "buffers" and "lag" in row:
+                    row |= pack(row["samples"], max(1, row.pop("lag")), self._packing)
+                rows[table].append(row)
+        if self._connection is None:
+            self._connection = self._engine.connect()
+        with self._connection.begin():
+            for table in sorted(rows, reverse=True):  # any fixed order will do
+                self._connection.execute(self._inserts[table], rows[table])
+        if identity(self._where) != self._file:
+            raise InputError(f"journal {self.place}: the file was moved or removed (put it back, or start again)")
+
+    def _sift(self, batches: list[Batch], problem: IntegrityError | DataError) -> None:
+        """A group that the database refuses is written one by one; what it refuses then has a failed future."""
+        if len(batches) > 1:
+            for batch in batches:
+                self._persist([batch])
+            return
+        text = f"{refused(self._where, problem)}: refused (expected each shot once: a ranger, a time, a target)"
+        batches[0].fail(InputError(text))
+        self._forget(batches)
+
+    def _acknowledge(self, batches: list[Batch]) -> None:
+        self._forget(batches)
+        if self._trouble is not None:
+            self._trouble = None
+            if self._on_recovery is not None:
+                self._on_recovery(f"journal {self.place}: is back, all that waited is written")
+        for batch in batches:
+            batch.done(batch.rows[-1][1]["seq"] if batch.rows else self._seq)
+
+    def _forget(self, batches: list[Batch]) -> None:
+        with self._wake:
+            self._waiting -= sum(len(batch.rows) for batch in batches)
+            self._bytes -= sum(batch.size for batch in batches)
+
+    def _in_trouble(self, text: str) -> None:
+        first, self._trouble = self._trouble is None, text
+        if first and self._on_alarm is not None:
+            self._on_alarm(f"{text}: nothing is durable (it is tried again by itself; fire no shots)")
+
+    def _fail_waiting(self, batches: list[Batch]) -> None:
+        with self._wake:
+            waiting = [*batches, *self._queue]
+        for batch in waiting:
+            batch.fail(NotDurable(f"{self._trouble}: not durable; kept, and written when that is possible"))
+
+    def _paused(self, seconds: float) -> bool:
+        """Wait before the next attempt; False where there is none, since the journal is being closed."""
+        until = time.monotonic() + seconds
+        with self._wake:
+            while (left := min(until, self._give_up) - time.monotonic()) > 0.0:
+                self._wake.wait(left)
+            return time.monotonic() < self._give_up
+
+    def _end(self) -> None:
+        """The run's end; a file becomes one file again, without its log, where nobody else has it open."""
+        with suppress(SQLAlchemyError):
+            if self._connection is None:
+                self._connection = self._engine.connect()
+            with self._connection.begin():
+                self._connection.execute(
+                    update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ticks_now(self._clock))
+                )
+            fold(self._where, self._connection)
+
+    def _disconnect(self) -> None:
+        if self._connection is not None:
+            with suppress(SQLAlchemyError):
+                self._connection.invalidate()
+            with suppress(SQLAlchemyError):
+                self._connection.close()
+            self._connection = None

@@ -1,0 +1,1 @@
+"""One ranger behind its ports: connected, prepared, watched, asked for shots."""

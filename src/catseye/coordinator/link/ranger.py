@@ -1,0 +1,384 @@
+"""One ranger, from the coordinator's side: connected, made ready, watched, and asked for one shot after another.
+
+Nothing here raises for what a ranger or the network does. What goes wrong is told as a happening with a name, every
+wait has an end, and a connection that is gone is made again: after 0.2 s, then a third longer each time, up to 30 s.
+"""
+
+import asyncio
+import random
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal
+
+from catseye.coordinator.herald import Herald
+from catseye.coordinator.journal.entries import Command
+from catseye.coordinator.link.clock_watch import ClockWatch
+from catseye.coordinator.link.greeting import Greeting, first_of
+from catseye.coordinator.link.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
+from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
+from catseye.coordinator.link.shooting import Shooter
+from catseye.coordinator.link.status_watch import StatusWatch
+from catseye.coordinator.link.wire import Sent
+from catseye.coordinator.parts import Clock, PlannedShot, SafetyGuard, Tell, ticks_now
+from catseye.errors import CatseyeError, InputError
+from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
+from catseye.ranger.commands import COMMANDS
+from catseye.ranger.head import Sampling
+from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, stamp_text
+from catseye.ranger.status import Status
+from catseye.records.live import LiveShot
+
+State = Literal["down", "connected", "preparing", "ready"]
+LONGEST_KEPT = 200  # characters of a reply, in the journal
+LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
+MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
+
+
+class RangerLink:
+    """A ranger behind its two ports.
+
+    ranger       name, as it must greet
+    commands     that initialise it: geometry and cubes, from the site's records
+    later        names of cubes of which it is told before their first shot only
+    wanted       "listen": ask and hear only, on the second port; "hold": connected, nothing sent that changes it;
+                 "measure": made ready, and `fire` serves
+    heard        called with what another client made it say (CMEAS ...)
+    commanded    called with each request that was sent and does something, and with what came of it
+    seed         of the waits' jitter
+    network      where connections are made, as ZyClient's; None: TCP
+    """
+
+    def __init__(
+        self,
+        ranger: str,
+        address: Address,
+        *,
+        commands: Sequence[Request],
+        later: Collection[str] = (),
+        guard: SafetyGuard,
+        clock: Clock,
+        tell: Tell,
+        wanted: Wanted = "measure",
+        heard: Callable[["RangerLink", Reply], None] | None = None,
+        commanded: Callable[[Command], None] | None = None,
+        settings: LinkSettings | None = None,
+        seed: int = 0,
+        network: Any = None,
+    ):
+        self.ranger, self.address, self.wanted = ranger, address, wanted
+        self.preparation = Preparation.of(commands, later)
+        self.told: set[int] = set()  # cubes that it was told of on demand
+        self.names = {number: name for name, number in self.preparation.numbers.items()}
+        self.state: State = "down"
+        self.sampling = Sampling()
+        self.counts: tuple[float, float] | None = None
+        self.busy, self.shots, self.failures = False, 0, 0  # failures in a row
+        self.round_trip = float("nan")
+        self._guard, self._clock, self._heard_by, self._commanded = guard, clock, heard, commanded
+        self.settings = settings or LinkSettings()
+        self._herald = Herald(ranger, clock, tell)
+        self._shooter = Shooter(self, self._herald, clock)
+        self._status = StatusWatch(ranger, self._herald, self._restarted)
+        self._watch = ClockWatch(clock, self._herald, self.settings.clock_limit)
+        self._rng = random.Random(f"{seed} {ranger}")
+        self._network = {} if network is None else {"network": network}
+        self._client: ZyClient | None = None
+        self._greeting = Greeting()
+        self._doubt = asyncio.Event()
+        self._probed_at = 0.0
+        self._heard_at = 0.0
+        self._was_ready, self._patience = False, self.settings.probe_every
+        self._lit_here = self._left = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection that lives as far as is known."""
+        return self._client is not None and not self._client.closed.done()
+
+    @property
+    def status(self) -> Status:
+        """Its status word as last heard."""
+        return self._status.word
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What is wrong with it and lasts."""
+        return self._herald.standings
+
+    @property
+    def ready(self) -> bool:
+        """Whether a shot can begin now."""
+        return self.state == "ready" and not self.busy and self.wanted == "measure"
+
+    # Connection -----------------------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Connect, watch, connect again; until cancelled, or left."""
+        wait = self.settings.first_wait
+        while True:
+            self._was_ready = False
+            why = await self._session()
+            if self._left:
+                return
+            self.state, self._client, self._shooter.aimed = "down", None, None
+            self._herald.standing("lost", f"{self.ranger}: {why}; trying again", "warning")
+            if self._was_ready:
+                wait = self.settings.first_wait
+            await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
+            wait = min(self.settings.growth * wait, self.settings.longest_wait)
+
+    async def _session(self) -> str:
+        """One connection's life; why it ended."""
+        why = "no port"
+        ports = list(enumerate(self.address.ports))
+        for place, port in ports[::-1] if self.wanted == "listen" else ports:
+            said = await self._connect(port, SECOND_CLIENT_TID if place else FIRST_CLIENT_TID)
+            if said is None:
+                break
+            why = said
+        client = self._client
+        if client is None:
+            return why
+        self.state = "connected"
+        self._herald.standing("lost", None, over=f"{self.ranger} is connected")
+        try:
+            return await self._supervise(client)
+        finally:
+            client.close()
+            self._client = None
+
+    async def _connect(self, port: int, first_tid: int) -> str | None:
+        """Connect and be greeted by the right ranger; what was wrong."""
+        loop, limit = asyncio.get_running_loop(), self.settings.probe_timeout
+        self._greeting = Greeting()
+        try:
+            async with asyncio.timeout(limit):
+                client = await ZyClient.connect(
+                    self.address.host, port, first_tid=first_tid, heard=self._hear, clock=loop.time, **self._network
+                )
+        except InputError as problem:
+            return str(problem)
+        except TimeoutError:
+            return f"{self.address.host} port {port} does not answer within {limit:g} s"
+        said: str | None = "given up"
+        try:
+            said = await self._greeting.verdict(self.ranger, port, client.closed, limit)
+        finally:
+            if said is not None:
+                client.close()
+        if said is None:
+            self._client = client
+        elif self._greeting.stranger:
+            self._herald.tell("wrong-ranger", said, "alarm")
+        return said
+
+    async def _supervise(self, client: ZyClient) -> str:
+        """Watch a connection until it is over."""
+        while not client.closed.done():
+            if self.wanted == "measure" and self.state == "connected":
+                await self._make_ready(client)
+            elif self.wanted != "measure" and self.state == "ready":
+                self.state = "connected"
+            client.check()
+            if (not self.busy or self._doubt.is_set()) and not client.closed.done():
+                self._doubt.clear()
+                if not await self._lives():
+                    return f"hung: VER was not answered within {self._probe_timeout:g} s"
+            await first_of(client.closed, self._doubt, self.settings.probe_every)
+        return client.closed.result()
+
+    @property
+    def _probe_timeout(self) -> float:
+        """Of VER, s; another client's moves may stand before it."""
+        return self.settings.probe_timeout if self.wanted == "measure" else self.settings.move_timeout
+
+    async def _lives(self, *, idle: bool = False) -> bool:
+        """Ask VER; from its stamp and the round trip, see to the clock.
+
+        idle   no shot is under way though `busy` says so
+        """
+        loop = asyncio.get_running_loop()
+        sent = self._probed_at = loop.time()
+        reply = await self._ask(Request("VER"), self._probe_timeout)
+        if reply.ok is not True or reply.ticks is None:
+            return not self.connected or self._heard_at > sent  # gone is not hung: the session says why
+        self.round_trip = loop.time() - sent
+        self._was_ready = self._was_ready or self.wanted != "measure"
+        limit = self.settings.slow
+        slow = f"a round trip takes {self.round_trip:.2f} s (limit {limit:g} s)" if self.round_trip > limit else None
+        self._herald.standing("slow", slow, over=f"a round trip takes {self.round_trip:.3f} s again")
+        right = self._watch.look(reply.ticks, self.round_trip)
+        if self.wanted == "measure" and (idle or not self.busy):
+            if right is not None:
+                await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
+            if self.state == "ready" and self.status & Status.LASER_OFF:  # the ranger itself switched it off
+                await self._ask(Request("PS", ("1",)), self.settings.probe_timeout)
+        return True
+
+    async def _make_ready(self, client: ZyClient) -> None:
+        """Tell the ranger what it lacks; where that fails, wait, longer each time."""
+        self.state = "preparing"
+        loop = asyncio.get_running_loop()
+        began, was_dark = loop.time(), bool(self.status & Status.LASER_OFF)
+        try:
+            self._teach_guard()
+            self.told.clear()
+            sent = await prepare(self.sure, self.preparation, lambda: self.status)
+            self.sampling = await sampling_of(self._ask)
+            self.counts = await counts_of(self._ask)
+            if self.status & Status.LASER_OFF:
+                self._lit_here = self._lit_here or was_dark
+                await self.sure(Request("PS", ("1",)), PATIENCE)
+        except CatseyeError as problem:
+            self.state = "connected"
+            if self.connected:
+                kind = problem.kind if isinstance(problem, Refused) else "not-initialised"
+                text = f"{self.ranger}: {problem}; again in {self._patience:g} s"
+                self._herald.tell(kind, text, "warning")
+                await first_of(client.closed, self._doubt, self._patience)
+                self._patience = min(2.0 * self._patience, LONGEST_PATIENCE)
+            return
+        if self.state == "preparing" and self.connected:
+            self.state, self._was_ready, self._patience = "ready", True, self.settings.probe_every
+            what = "made ready" if sent else "was ready still"
+            self._herald.tell("ready", f"{self.ranger} {what} in {loop.time() - began:.1f} s", always=True)
+
+    def _teach_guard(self) -> None:
+        """What the ranger knows already the guard must know, too, to understand CIL n."""
+        now = ticks_now(self._clock)
+        for request in self.preparation.requests:
+            self._guard.refusal(self.ranger, request, now)
+
+    # Asking ---------------------------------------------------------------------------------------------------------
+
+    async def sure(self, request: Request, timeout: float) -> Reply:
+        """A reply past the guard. Raises InputError: refused by the guard, or not connected."""
+        return await self.reply_of(request.command, self.send(request), timeout)
+
+    def send(self, request: Request) -> Sent:
+        """Send a request past the guard; its TID and a future of its reply. Raises InputError, as `sure`."""
+        if self._client is None:
+            raise InputError("not connected")
+        asks = COMMANDS[request.command].only_asks(request)
+        if not asks:
+            said = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
+            if said is not None:
+                raise Refused("refused", f"{request.command}: {said}")
+        tid, future = self._client.request(request.command, *request.parameters, ticks=request.ticks)
+        if not asks and self._commanded is not None:
+            future.add_done_callback(partial(self._done, tid, format_request(replace(request, tid=tid))))
+        return tid, future
+
+    def _done(self, tid: int, line: str, future: "asyncio.Future[Reply]") -> None:
+        """What came of a request is told; one that nobody waits for any more had no reply."""
+        reply = None if future.cancelled() else future.result()
+        if self._commanded is None:
+            return
+        if reply is None:
+            self._commanded(Command(ticks_now(self._clock), self.ranger, tid, line))
+            return
+        text = "" if reply.command == "BUF" else reply.text[:LONGEST_KEPT]  # samples have a table of their own
+        came = reply.ticks is not None  # the client answers itself where the connection is lost
+        ticks = reply.ticks if reply.ticks is not None else ticks_now(self._clock)
+        self._commanded(Command(ticks, self.ranger, tid, line, text, reply.ok if came else None))
+
+    async def _ask(self, request: Request, timeout: float) -> Reply:
+        """A reply, f = 0 where there was none in time, or it must not be sent."""
+        try:
+            return await self.sure(request, timeout)
+        except InputError as problem:
+            return Reply(request.command, False, (str(problem),), 0, None)
+
+    async def reply_of(self, command: str, sent: Sent, timeout: float) -> Reply:
+        """The reply to what was sent; f = 0 where it did not come in time, which is told."""
+        client, (tid, future) = self._client, sent
+        try:
+            async with asyncio.timeout(timeout):
+                reply = await future
+        except TimeoutError:
+            if client is not None:
+                client.forget(tid)
+            self._doubt.set()
+            if command != "VER":
+                text = f"{self.ranger} did not answer {command} within {timeout:.1f} s"
+                self._herald.tell("no-reply", text, "warning", about=command)
+            return Reply(command, False, ("no reply",), tid, None)
+        self._guard.heard(self.ranger, reply)
+        return reply
+
+    def _hear(self, reply: Reply) -> None:
+        """What comes unasked, or for another client."""
+        self._heard_at = asyncio.get_running_loop().time()
+        if self._shooter.hears(reply):
+            return
+        self._guard.heard(self.ranger, reply)
+        self._greeting.hear(reply)
+        if reply.command == "STW" and reply.ok is True:
+            self._status.hear(reply.text)
+        elif reply.command == "SUN" and reply.ok is False:
+            self._herald.tell("sun", f"{self.ranger}: {reply.text[:160]}", "alarm")
+            self._shooter.aimed = None
+        elif reply.command in MOVERS:
+            self._shooter.aimed = None
+        if self._heard_by is not None and reply.command == "CMEAS":
+            self._heard_by(self, reply)
+
+    def _restarted(self, text: str) -> None:
+        if self.state == "ready":
+            self.state, self._shooter.aimed = "connected", None
+            self._doubt.set()
+            self._herald.tell("restarted", text, "warning", always=True)
+
+    async def fire(self, planned: PlannedShot) -> LiveShot | None:
+        """One shot; None where it failed, which has been told."""
+        shots: list[LiveShot] = []
+        await self.stream(planned, shots.append, count=1)
+        return shots[0] if shots else None
+
+    async def stream(self, planned: PlannedShot, take: Callable[[LiveShot], None], *, count: int) -> int:
+        """Point once, and take so many buffers one behind the other; how many came.
+
+        planned   a target that moves is followed for all of them, on its line
+        take      called with each
+        """
+        if not self.ready:
+            return 0
+        self.busy = True
+        try:
+            since = asyncio.get_running_loop().time() - self._probed_at  # a ranger that is always busy is asked, too
+            if since > self.settings.probe_every and not await self._lives(idle=True):
+                self._doubt.set()
+                return 0
+            return await self._shooter.stream(planned, take, count=count)
+        finally:
+            self.busy = False
+
+    async def tell_sun(self, vector: Sequence[float]) -> None:
+        """Give it the unit vector to the Sun, in its own frame."""
+        if self.wanted == "measure" and self._client is not None:
+            await self._ask(Request("SUN", tuple(f"{v:.7f}" for v in vector)), self.settings.move_timeout)
+
+    async def park(self) -> bool:
+        """Look at ZRG, inside the instrument; whether that was done."""
+        if not self.ready:
+            return False
+        self.busy = True
+        try:
+            return await self._shooter.park()
+        finally:
+            self.busy = False
+
+    async def darken(self) -> None:
+        """The laser off; it is switched on again when the guard allows it."""
+        if self.wanted == "measure":
+            await self._ask(Request("PS", ("0",)), self.settings.move_timeout)
+
+    async def leave(self, timeout: float = 3.0) -> None:
+        """Switch off the laser that was switched on here, and close for good."""
+        self._left = True
+        if self._client is not None and not self._client.closed.done():
+            if self._lit_here and (await self._ask(Request("PS", ("0",)), timeout)).ok is not True:
+                self._herald.tell("laser-left-on", f"{self.ranger} did not answer PS 0: its laser may shine", "alarm")
+            self._client.close("the coordinator leaves")
+        self._lit_here = False

@@ -1,0 +1,1 @@
+"""What to shoot next: candidates, their value, a tour."""

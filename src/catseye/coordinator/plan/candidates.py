@@ -1,0 +1,136 @@
+"""What one ranger could shoot in a round: where it must look, how long each move takes, and which moves it may make."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.coordinator.visibility.surroundings import BOX, FREE, PERHAPS, SUN, Surroundings
+from catseye.geometry.encoder import HALF_TURN
+from catseye.geometry.slew import trapezoid
+
+Array = NDArray[np.float64]
+AZIMUTH, ELEVATION = 1, 2
+HALT = 0.1  # s, at a corner
+WHY = {FREE: None, SUN: "the Sun", BOX: "a box"}
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The place where the mirror stands, row 0, and m things to shoot.
+
+    names     (1 + m) the first is ""
+    middle    (1 + m, 2) counts in the middle of the round
+    low, high (1 + m, 2) counts between which they stay during it
+    code      (1 + m, 1 + m) FREE, SUN or PERHAPS of a move from row to column, wherever both are by then
+    moving    (1 + m, 1 + m) s, the ways round corners in it
+    corner    (1 + m, 1 + m) 0: one move; AZIMUTH or ELEVATION: that axis first, alone
+    units     (1 + m, 3) towards them, ground frame
+    """
+
+    names: tuple[str, ...]
+    middle: Array
+    low: Array
+    high: Array
+    code: NDArray[np.int8]
+    moving: Array
+    corner: NDArray[np.int8]
+    units: Array
+
+    def via(self, row: int, column: int) -> tuple[tuple[float, float], ...]:
+        """Counts at which to halt on the way."""
+        code = int(self.corner[row, column])
+        if code == 0:
+            return ()
+        azimuth, elevation = (column, row) if code == AZIMUTH else (row, column)
+        return ((float(self.middle[azimuth, 0]), float(self.middle[elevation, 1])),)
+
+    def may(self, row: int, column: int, around: Surroundings) -> str | None:
+        """Why not to move from one to another, None where it is free; a box is asked for once."""
+        if self.code[row, column] == PERHAPS:
+            entered = around.box_entered(self.middle[row], self.middle[column])
+            self.code[row, column] = FREE if entered is None else BOX
+        return WHY[int(self.code[row, column])]
+
+
+def candidates(
+    names: tuple[str, ...], looks: Array, units: Array, start: tuple[float, float], around: Surroundings
+) -> tuple[Candidates, dict[str, str]]:
+    """The table, and why names were left out of it.
+
+    names    (m)
+    looks    (m, nodes, 2) counts at times of the round; NaN beyond the stops
+    units    (m, 3) towards them
+    start    counts where the mirror stands
+    """
+    unseen: dict[str, str] = {}
+    reachable = np.asarray(np.isfinite(looks).all(axis=(1, 2)))
+    steady = np.asarray(reachable & (np.ptp(np.where(np.isfinite(looks), looks, 0.0)[..., 0], axis=1) < HALF_TURN))
+    pointing = np.full(len(names), FREE, dtype=np.int8)
+    pointing[steady] = around.codes(looks[steady].min(axis=1), looks[steady].max(axis=1))
+    for i, name in enumerate(names):
+        if not reachable[i]:
+            unseen[name] = "beyond the azimuth stops"
+        elif not steady[i]:
+            unseen[name] = "passes the end of the azimuth stops during the round"
+        elif pointing[i] == SUN:
+            unseen[name] = "too near the Sun"
+        elif pointing[i] == PERHAPS:
+            box = around.box_in(looks[i].min(axis=0), looks[i].max(axis=0))
+            if box is not None:
+                unseen[name] = f"too near {box}"
+    kept = [i for i, name in enumerate(names) if name not in unseen]
+    here = np.array(start, dtype=float)
+    low = np.concatenate([here[None], looks[kept].min(axis=1)]) if kept else here[None]
+    high = np.concatenate([here[None], looks[kept].max(axis=1)]) if kept else here[None]
+    middle = np.concatenate([here[None], looks[kept, looks.shape[1] // 2]]) if kept else here[None]
+    a, b = np.triu_indices(len(low))  # there and back are one rectangle
+    code = np.empty((len(low), len(low)), dtype=np.int8)
+    code[a, b] = code[b, a] = around.codes(np.minimum(low[a], low[b]), np.maximum(high[a], high[b]))
+    code[0] = np.where(leaves(around, here, low, high), FREE, code[0])
+    moving = trapezoid(middle[:, None], middle[None], around.vantage.pace).total
+    corner = _round_corners(around, middle, low, high, code=code, moving=moving)
+    chosen = np.concatenate([np.zeros((1, 3)), units[kept].reshape(-1, 3)])
+    return Candidates(("", *(names[i] for i in kept)), middle, low, high, code, moving, corner, chosen), unseen
+
+
+def _round_corners(
+    around: Surroundings, middle: Array, low: Array, high: Array, *, code: NDArray[np.int8], moving: Array
+) -> NDArray[np.int8]:
+    """Which axis to move first, alone, where both at once might look into the Sun or a box; changes `code`, `moving`.
+
+    A rectangle of counts that holds a zone is gone round along its sides, where one of its other corners is free.
+    """
+    corner = np.zeros(code.shape, dtype=np.int8)
+    free = np.asarray(around.codes(low, high) == FREE)
+    start, end = np.nonzero(np.triu(code != FREE) & free[:, None] & free[None])
+    if len(start) == 0:
+        return corner
+    best = np.full(len(start), np.inf)
+    for first in (AZIMUTH, ELEVATION):
+        azimuth, elevation = (end, start) if first == AZIMUTH else (start, end)
+        at = [np.stack([side[azimuth, 0], side[elevation, 1]], axis=-1) for side in (low, high, middle)]
+        total = np.full(len(start), HALT)
+        good = np.ones(len(start), dtype=bool)
+        for leg in (start, end):
+            legs = np.minimum(low[leg], at[0]), np.maximum(high[leg], at[1])
+            good &= around.codes(*legs) == FREE
+            total = total + trapezoid(middle[leg], at[2], around.vantage.pace).total
+        better = good & (total < best)
+        corner[start[better], end[better]] = first
+        corner[end[better], start[better]] = AZIMUTH + ELEVATION - first  # the same way back
+        best = np.where(better, total, best)
+    there = np.isfinite(best)
+    for i, j in ((start[there], end[there]), (end[there], start[there])):
+        code[i, j], moving[i, j] = FREE, best[there]
+    return corner
+
+
+def leaves(around: Surroundings, here: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether moves (n,) from counts (2,) to somewhere in rectangles (n, 2) leave the Sun's cone and come no nearer."""
+    now = float(around.from_sun(here, here))
+    if now > 0.0:
+        return np.zeros(len(low), dtype=bool)
+    outside = around.from_sun(low, high) > 0.0
+    way = around.from_sun(np.minimum(low, here), np.maximum(high, here))
+    return np.asarray(outside & (way >= now - 1e-6) & ~around.near_boxes(np.minimum(low, here), np.maximum(high, here)))

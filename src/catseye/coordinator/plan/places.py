@@ -1,0 +1,158 @@
+"""Where targets will be during a round, in the frame of the ranger that looks, and the shots made of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import MILLIMETRE
+from catseye.coordinator.parts import PlannedShot, SiteState
+from catseye.coordinator.visibility.surroundings import later
+from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture
+from catseye.geometry.antenna import ground_from_reflector_at
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site_folder import REFERENCE, SiteFolder
+
+Array = NDArray[np.float64]
+AS_GIVEN = 0.005  # m: a target this near to its record is where the ranger believes it; half a beam's radius
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What a ranger shall shoot: target, s from the round's begin to its buffer, why, and halts on the way, counts."""
+
+    target: str
+    at: float
+    reason: str
+    via: tuple[tuple[float, float], ...] = ()
+
+
+class Places:
+    """Of one round.
+
+    site, vantages, retros   the records
+    state                    whose `place` predicts
+    ticks                    (n,) instants of the round
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        vantages: Mapping[str, Vantage],
+        retros: Mapping[str, Retro],
+        state: SiteState,
+        ticks: NDArray[np.int64],
+    ):
+        self.site, self.vantages, self.retros, self.state, self.ticks = site, vantages, retros, state, ticks
+        self._predicted: dict[str, tuple[Array, Array]] = {}
+        self._shifts: dict[str, Array] = {}
+        self._rotation, self._vertex = self._frames(ticks)
+
+    @staticmethod
+    def nominal(site: SiteFolder) -> LivePosture:
+        """The posture of the record."""
+        return nominal_posture(site)
+
+    def looks(self, vantage: Vantage, names: tuple[str, ...]) -> tuple[Array, Array]:
+        """Counts (m, n, 2) at the instants, NaN where the stops are in the way, and unit vectors (m, 3), ground."""
+        points = np.array([self._own(vantage, name) for name in names])
+        looks = vantage.look(points)
+        for i, name in enumerate(names):
+            if name == REFERENCE:
+                looks[i] = vantage.reference
+        middle = len(self.ticks) // 2
+        way = points[:, middle] - vantage.station.scan_point
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        units = way / np.where(length > 0.0, length, 1.0)
+        return looks, units if vantage.frame == "ground" else units @ self._rotation[middle].T
+
+    def shift(self, vantage: Vantage) -> Array:
+        """(3,) m, own frame: by how much the ranger is predicted beside its record, in the middle of the round."""
+        if vantage.frame == "ground":
+            return np.zeros(3)
+        if vantage.name not in self._shifts:
+            one = slice(len(self.ticks) // 2, len(self.ticks) // 2 + 1)
+            at = self._place(vantage.name, self.ticks[one])
+            there = self._in_reflector(at, self._rotation[one], self._vertex[one])
+            self._shifts[vantage.name] = there[0] - vantage.station.scan_point
+        return self._shifts[vantage.name]
+
+    def shots(self, vantage: Vantage, chosen: "list[Chosen]", duration: float) -> tuple[PlannedShot, ...]:
+        """The shots of a ranger."""
+        begin = np.array([later(int(self.ticks[0]), each.at) for each in chosen], dtype=np.int64)
+        both = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)
+        nodes = np.array([self._own(vantage, each.target) for each in chosen]).reshape(-1, len(self.ticks), 3)
+        points = np.einsum("cbn,cnk->cbk", lagrange(self.ticks, both), nodes)
+        return tuple(
+            PlannedShot(
+                vantage.name,
+                each.target,
+                int(begin[i]),
+                duration,
+                points[i, 0],
+                points[i, 1],
+                self._fixed(vantage, each.target, points[i]),
+                each.reason,
+                each.via,
+            )
+            for i, each in enumerate(chosen)
+        )
+
+    def _fixed(self, vantage: Vantage, name: str, points: Array) -> bool:
+        if name == REFERENCE:
+            return True
+        retro = self.retros[name]
+        away = np.linalg.norm(points - retro.point, axis=-1)
+        return bool(retro.frame == vantage.frame and np.max(away) <= AS_GIVEN)
+
+    def _own(self, vantage: Vantage, name: str) -> Array:
+        """(n, 3) m, own frame, at the instants."""
+        if name == REFERENCE:
+            return np.broadcast_to(vantage.station.scan_point, (len(self.ticks), 3))
+        retro = self.retros[name]
+        if retro.part == "dish" and vantage.frame == "reflector":  # millimetres are nothing to a beam; they are many
+            return np.broadcast_to(retro.point, (len(self.ticks), 3)) - self.shift(vantage)
+        if name not in self._predicted:
+            at = self._place(name, self.ticks)
+            self._predicted[name] = at, self._in_reflector(at, self._rotation, self._vertex)
+        ground, reflector = self._predicted[name]
+        return ground if vantage.frame == "ground" else reflector - self.shift(vantage)
+
+    def _place(self, name: str, ticks: ArrayLike) -> Array:
+        return np.asarray(self.state.place(name, np.asarray(ticks, dtype=float) / TICKS_PER_DAY), dtype=float)
+
+    def _frames(self, ticks: ArrayLike) -> tuple[Array, Array]:
+        """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector in the ground frame, the posture's rates held."""
+        posture, reflector = self.state.posture, self.site.site.frames.reflector
+        since = (np.asarray(ticks, dtype=float) - posture.ticks) * TICK_SECONDS
+        found = ground_from_reflector_at(
+            posture.azimuth + posture.azimuth_rate * since,
+            posture.elevation + posture.elevation_rate * since,
+            elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
+            reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
+        )
+        return np.asarray(found.rotation), np.asarray(found.translation)
+
+    @staticmethod
+    def _in_reflector(points: Array, rotation: Array, vertex: Array) -> Array:
+        """Ground points (k, 3) in the reflector frame at their times."""
+        return np.asarray(np.einsum("kji,kj->ki", rotation, points - vertex))
+
+
+def lagrange(nodes: ArrayLike, times: ArrayLike) -> Array:
+    """Weights (..., n) by which values at nodes (n,) give those at times (...), of a polynomial through them all.
+
+    Five nodes 2.5 s apart follow a telescope that slews at 0.01 rad/s within a micrometre at 100 m.
+
+    >>> lagrange([0.0, 1.0, 2.0], [0.5]).tolist()
+    [[0.375, 0.75, -0.125]]
+    """
+    x = np.asarray(nodes, dtype=float)
+    t = np.asarray(times, dtype=float)[..., None, None] - x[0]
+    x = x - x[0]
+    n = len(x)
+    others = ~np.eye(n, dtype=bool)
+    top = np.where(others, t - x[None, :], 1.0)
+    bottom = np.where(others, x[:, None] - x[None, :], 1.0)
+    return np.asarray(np.prod(top, axis=-1) / np.prod(bottom, axis=-1))

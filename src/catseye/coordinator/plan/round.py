@@ -1,0 +1,301 @@
+"""What each ranger shoots next: a round of some seconds, planned at once for all.
+
+In order: the reference when it is due, a benchmark now and then, then whatever teaches most about the points that
+matter for each second that it takes, then, on the feed arm, the next stretch of the dish. Rangers take turns: the one
+that is free first chooses first, knowing what the others have chosen. A point whose covariance is long in one direction
+draws the ranger that looks along it: so every point gets rangers all round where there are any.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from heapq import heapify, heappop, heappush
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.coordinator.parts import PlannedShot, Round, SiteState
+from catseye.coordinator.plan.candidates import Candidates, candidates
+from catseye.coordinator.plan.places import Chosen, Places
+from catseye.coordinator.plan.tour import Tour
+from catseye.coordinator.plan.value import SIGMA, Knowledge
+from catseye.coordinator.visibility.sights import Sights
+from catseye.coordinator.visibility.surroundings import FREE, PERHAPS, KeepClear, Surroundings, instants, later
+from catseye.coordinator.visibility.vantage import Retro, Vantage, retros_of, vantages_of
+from catseye.errors import InputError
+from catseye.geometry.keep_out import servo_margin
+from catseye.ranger.sun_watch import LARGEST_STEP
+from catseye.records.live import TICK_SECONDS
+from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.solids import Solids
+
+Array = NDArray[np.float64]
+HOUR_TICKS = 100_000_000 // 24
+RANGERS_GRID = servo_margin([0.5 * LARGEST_STEP] * 2)  # rad by which a ranger's own look at the Sun may be too careful
+
+
+@dataclass(frozen=True)
+class RoundSettings:
+    """How rounds are made; s, m.
+
+    period            of a round
+    lead              from now to the first move
+    settle            from the end of a move to the buffer
+    transfer          from the end of a buffer to the next move: reply and samples
+    duration          of a buffer
+    reference_every   and benchmark_every: no longer ago than this
+    dish_share        of a feed-arm ranger's round for the dish
+    sigma             of a range
+    drift             per square root of a second: how points forget
+    """
+
+    period: float = 10.0
+    lead: float = 0.3
+    settle: float = 0.15
+    transfer: float = 0.02
+    duration: float = 0.128
+    reference_every: float = 60.0
+    benchmark_every: float = 120.0
+    dish_share: float = 0.5
+    sigma: float = SIGMA
+    drift: float = 30e-6
+
+
+@dataclass(eq=False)
+class _Turn:
+    """One ranger's round in the making.
+
+    points, variance   of the table's rows: index in what is known (-1: none), and of a range to it, m^2
+    until              s, for what is chosen by its worth
+    counted, open_     rows that are chosen so, and those of them not shot in this pass
+    row, at            where the mirror is, and from when on, s
+    """
+
+    vantage: Vantage
+    around: Surroundings
+    table: Candidates
+    points: NDArray[np.int64]
+    variance: Array
+    until: float
+    counted: NDArray[np.bool_]
+    open_: NDArray[np.bool_]
+    row: int = 0
+    at: float = 0.0
+    chosen: list[Chosen] = field(default_factory=list)
+
+
+class RoundPlanner:
+    """Plans rounds for a site; the same states in the same order give the same rounds.
+
+    site         whose records say who stands where
+    targets      that matter to rangers on the ground; structure and triplets' balls if None
+    keep_clear   Sun and boxes; the site's Sun without boxes if None
+    solids       what stands in the way
+    settings     how
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        *,
+        targets: Iterable[str] | None = None,
+        keep_clear: KeepClear | None = None,
+        solids: Solids | None = None,
+        settings: RoundSettings | None = None,
+    ):
+        self.site, self.settings = site, settings or RoundSettings()
+        self.keep_clear = keep_clear or KeepClear(site)
+        self.vantages, self.retros = vantages_of(site), retros_of(site)
+        wanted = None if targets is None else frozenset(targets)
+        dish = tuple(r for r in self.retros.values() if r.part == "dish")
+        ground = {n: r for n, r in self.retros.items() if _matters(r, wanted)}
+        arm = {n: r for n, r in self.retros.items() if r.part == "dish" or (r.part != "benchmark" and r.kind != "ball")}
+        self._sights = Sights(site, self.vantages, ground=ground, arm=arm, solids=solids)
+        self._benchmarks = {b.ranger: b.target for b in site.benchmarks}
+        self._benchmarked: dict[str, int] = {}
+        seen = self._sights.at(Places.nominal(site)).targets
+        riders = [v for v in self.vantages.values() if v.frame == "reflector"]
+        in_dish = {r.name for r in dish}
+        self.tours = {
+            v.name: Tour(v, tuple(self.retros[n] for n in seen.get(v.name, ()) if n in in_dish)) for v in riders
+        }
+        self._in_dish, self._started = in_dish, False
+        self._visited: set[str] = set()
+
+    def round(self, state: SiteState) -> Round:
+        """The next round, from `state.now_ticks` and the lead on.
+
+        Raises InputError for a ranger that the site does not have.
+        """
+        s = self.settings
+        begin, end = later(state.now_ticks, s.lead), later(state.now_ticks, s.lead + s.period)
+        self._start_tours(begin, state.ready)
+        places = Places(self.site, self.vantages, self.retros, state, instants(begin, end))
+        suns = self.keep_clear.sun(places.ticks)
+        seen, unseen = self._sights.at(state.posture), {}
+        rangers = [self._vantage(name) for name in sorted(state.ready)]
+        wanted = {v.name: self._wanted(v, seen.targets.get(v.name, ()), state) for v in rangers}
+        know = self._knowledge(sorted({n for names in wanted.values() for n in names if n in self.retros}), state)
+        turns = {}
+        for v in rangers:
+            around = self.keep_clear.around(v, begin, end, posture=state.posture, suns=suns, wider=RANGERS_GRID)
+            turn, why = self._turn(v, around, wanted[v.name], places, know, state)
+            turns[v.name] = turn
+            unseen.update({(v.name, target): text for target, text in why.items()})
+            unseen.update({pair: text for pair, text in seen.unseen.items() if pair[0] == v.name})
+            unseen.update({(r, t): "left alone for now: it failed" for r, t in state.suspended if r == v.name})
+            self._due(turn, state, begin)
+        self._by_worth(turns, know)
+        for turn in turns.values():
+            if turn.vantage.name in self.tours:
+                unseen.update(self._dish(turn, places, state))
+        shots: dict[str, tuple[PlannedShot, ...]] = {
+            name: places.shots(turn.vantage, turn.chosen, s.duration) for name, turn in turns.items()
+        }
+        return Round(begin, end, shots, unseen)
+
+    def _vantage(self, name: str) -> Vantage:
+        if name not in self.vantages:
+            raise InputError(
+                f"ranger {name!r} is not in the site (expected one of {len(self.vantages)} of its records)"
+            )
+        return self.vantages[name]
+
+    def _start_tours(self, ticks: int, ready: tuple[str, ...]) -> None:
+        """Spread over the dish, and by the hour: what starts again does not begin at the same prism.
+
+        A new lap begins when all that the rangers at hand can see are visited.
+        """
+        at_hand = [tour for name, tour in self.tours.items() if name in ready]
+        if self._visited.issuperset(n for tour in at_hand for n in tour.names):
+            self._visited.clear()
+        if self._started:
+            return
+        for k, tour in enumerate(self.tours.values()):
+            tour.begin((k / len(self.tours) + (ticks % HOUR_TICKS) / HOUR_TICKS) % 1.0)
+        self._started = True
+
+    def _wanted(self, vantage: Vantage, seen: tuple[str, ...], state: SiteState) -> tuple[str, ...]:
+        """What a ranger may shoot besides the dish: ZRG first, its benchmark, then what it sees."""
+        bench = self._benchmarks.get(vantage.name)
+        names = [REFERENCE, *([bench] if bench else []), *(n for n in seen if n not in self._in_dish)]
+        return tuple(n for n in names if (vantage.name, n) not in state.suspended)
+
+    def _knowledge(self, names: list[str], state: SiteState) -> Knowledge:
+        """What is known of points before the round: as last told and forgotten a little, or as the records say."""
+        forgotten = self.settings.drift**2 * self.settings.period * np.eye(3)
+        table = [state.u[n] + forgotten if n in state.u else self.retros[n].u ** 2 * np.eye(3) for n in names]
+        return Knowledge(tuple(names), np.array(table))
+
+    def _turn(
+        self,
+        vantage: Vantage,
+        around: Surroundings,
+        names: tuple[str, ...],
+        places: Places,
+        know: Knowledge,
+        state: SiteState,
+    ) -> tuple[_Turn, dict[str, str]]:
+        s = self.settings
+        looks, units = places.looks(vantage, names)
+        start = state.counts.get(vantage.name, vantage.reference)
+        table, why = candidates(names, looks, units, start, around)
+        points = np.array([know.at.get(n, -1) for n in table.names])
+        own = state.u.get(vantage.name)
+        variance = np.full(len(points), s.sigma**2)
+        if own is not None:
+            variance = variance + np.einsum("mi,ij,mj->m", table.units, own, table.units)
+        share = 1.0 - s.dish_share if vantage.name in self.tours and self.tours[vantage.name].names else 1.0
+        counted = np.array([n in self.retros and self.retros[n].part != "benchmark" for n in table.names])
+        return _Turn(vantage, around, table, points, variance, share * s.period, counted, counted.copy()), why
+
+    def _due(self, turn: _Turn, state: SiteState, begin: int) -> None:
+        """The reference, and a benchmark, where the last is too long ago by the end of the round."""
+        s, name = self.settings, turn.vantage.name
+        if state.since_reference.get(name, np.inf) + s.period > s.reference_every:
+            self._go(turn, REFERENCE, "reference: the last is too long ago")
+        bench = self._benchmarks.get(name)
+        last = self._benchmarked.get(name)
+        due = last is None or (begin - last) * TICK_SECONDS + s.period > s.benchmark_every
+        if bench and due and self._go(turn, bench, "benchmark: index of air along a certified path"):
+            self._benchmarked[name] = begin
+
+    def _go(self, turn: _Turn, target: str, reason: str) -> bool:
+        if target not in turn.table.names:
+            return False
+        row = turn.table.names.index(target)
+        if turn.table.may(turn.row, row, turn.around) is not None:
+            return False
+        self._take(turn, row, reason)
+        return True
+
+    def _take(self, turn: _Turn, row: int, reason: str) -> None:
+        begin = turn.at + float(turn.table.moving[turn.row, row]) + self.settings.settle
+        turn.open_[row] = False
+        turn.chosen.append(Chosen(turn.table.names[row], begin, reason, turn.table.via(turn.row, row)))
+        turn.row, turn.at = row, begin + self.settings.duration + self.settings.transfer
+
+    @property
+    def _a_shot(self) -> float:
+        """s that a shot takes besides its move."""
+        return self.settings.settle + self.settings.duration + self.settings.transfer
+
+    def _by_worth(self, turns: dict[str, _Turn], know: Knowledge) -> None:
+        queue = [(turn.at, name) for name, turn in turns.items()]
+        heapify(queue)
+        while queue:
+            _, name = heappop(queue)
+            if self._best(turns[name], know):
+                heappush(queue, (turns[name].at, name))
+
+    def _best(self, turn: _Turn, know: Knowledge) -> bool:
+        """Choose what is worth most a second, of what was not shot in this pass; False when nothing fits any more."""
+        for _ in range(2):
+            while len(rows := self._open(turn)):
+                cost = turn.table.moving[turn.row, rows] + self._a_shot
+                worth = know.worth(turn.points[rows], turn.table.units[rows], turn.variance[rows])
+                best = int(np.argmax(worth.gain / cost))
+                row = int(rows[best])
+                if turn.table.may(turn.row, row, turn.around) is None:
+                    before, after = know.learn(int(turn.points[row]), worth.across[best], float(worth.total[best]))
+                    reason = f"u of {turn.table.names[row]} from {1e3 * before:.4f} to {1e3 * after:.4f} mm"
+                    self._take(turn, row, reason)
+                    return True
+            turn.open_ = turn.counted.copy()  # another pass over all
+            turn.open_[turn.row] = False
+        return False
+
+    def _open(self, turn: _Turn) -> NDArray[np.int64]:
+        """Rows that fit into the rest of the round: those that are surely free to go to, else those that may be."""
+        code = turn.table.code[turn.row]
+        fits = turn.open_ & (turn.at + turn.table.moving[turn.row] + self._a_shot <= turn.until)
+        for wanted in (FREE, PERHAPS):
+            rows = np.flatnonzero(fits & (code == wanted))
+            if len(rows):
+                return rows
+        return rows
+
+    def _dish(self, turn: _Turn, places: Places, state: SiteState) -> dict[tuple[str, str], str]:
+        """The next stretch of the dish behind what was chosen."""
+        s, name = self.settings, turn.vantage.name
+        left = frozenset(t for r, t in state.suspended if r == name)
+        here = turn.table.middle[turn.row]
+        tour = self.tours[name]
+        chosen, why = tour.stretch(
+            here,
+            s.period - turn.at,
+            turn.around,
+            each=self._a_shot,
+            shift=places.shift(turn.vantage),
+            left_alone=left,
+            visited=self._visited,
+        )
+        self._visited.update(tour.names[i] for i, _ in chosen)
+        turn.chosen += [Chosen(tour.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen]
+        return {(name, target): text for target, text in why.items()}
+
+
+def _matters(retro: Retro, wanted: frozenset[str] | None) -> bool:
+    """To rangers on the ground."""
+    if wanted is not None:
+        return retro.name in wanted
+    return retro.part == "structure" or retro.kind == "ball"

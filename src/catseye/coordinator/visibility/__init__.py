@@ -1,0 +1,1 @@
+"""Which ranger sees which target from where it stands."""

@@ -1,0 +1,267 @@
+"""What the beam of a ranger must keep out of between two times: the Sun's cone and boxes, in the ranger's own frame.
+
+A move is asked for the whole rectangle of counts between its ends (`sweep`): both for the Sun and for the sphere about
+each box, then for spheres about pieces of it. Where one of these is touched, the box itself is asked for along the
+profiles of the axes.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import DEGREE
+from catseye.coordinator.visibility.sweep import chords, nearest
+from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between
+from catseye.errors import InputError
+from catseye.geometry.frame import Transform
+from catseye.geometry.keep_out import Box
+from catseye.geometry.slew import trapezoid
+from catseye.records.keep_out import KeepOut
+from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site_folder import SiteFolder
+from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
+from catseye.reduction.steering.guard import Guard, guard_of
+
+Array = NDArray[np.float64]
+NODES = 5  # instants at which a ranger that the telescope carries is looked at
+FREE, SUN, PERHAPS, BOX = 0, 1, 2, 3  # perhaps a box; surely
+PIECE = 5.0  # m: no piece of a box is longer
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres:
+    """Directions (k, 3) to middles, own frame, and angles (k,), rad, within which no beam may come."""
+
+    middles: Array
+    limits: Array
+
+    def grown(self, angle: float) -> "Spheres":
+        """All wider by an angle, rad."""
+        return Spheres(self.middles, self.limits + angle)
+
+    def inside(self, vantage: Vantage, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Whether (..., k) a beam within rectangles of counts (..., 2) may come into each."""
+        return np.asarray(nearest(vantage.station, low, high, self.middles) <= self.limits)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """For one ranger and a span of time.
+
+    vantage        the ranger
+    suns           (k, 3) directions, own frame; none where the Sun is set
+    sun_limit      rad: no beam nearer
+    boxes          spheres about boxes, box by box, one for each of k stands of the ranger
+    pieces         of each box, those about its pieces
+    guards         that know the boxes only, one a stand
+    names          of the boxes
+    """
+
+    vantage: Vantage
+    suns: Array
+    sun_limit: float
+    boxes: "Spheres"
+    pieces: tuple["Spheres", ...]
+    guards: tuple[Guard, ...]
+    names: tuple[str, ...]
+
+    def from_sun(self, low: ArrayLike, high: ArrayLike) -> Array:
+        """Angle (...), rad, left between the Sun's cone and a beam that stays within rectangles of counts (..., 2)."""
+        if len(self.suns) == 0:
+            return np.full(np.shape(low)[:-1], np.inf)
+        return np.asarray(np.min(nearest(self.vantage.station, low, high, self.suns), axis=-1) - self.sun_limit)
+
+    def near_boxes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
+        """Whether (...) a beam within rectangles of counts (..., 2) may come near a box."""
+        a, b = np.broadcast_arrays(np.asarray(low, dtype=float), np.asarray(high, dtype=float))
+        found = np.zeros(a.shape[:-1], dtype=bool)
+        if self.pieces:
+            stands = len(self.boxes.middles) // len(self.pieces)
+            near = np.asarray(
+                self.boxes.inside(self.vantage, a, b).reshape(*a.shape[:-1], len(self.pieces), stands).any(axis=-1)
+            )
+            for k, pieces in enumerate(self.pieces):
+                asked = near[..., k] & ~found
+                if asked.any():
+                    found[asked] = pieces.inside(self.vantage, a[asked], b[asked]).any(axis=-1)
+        return found
+
+    def codes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.int8]:
+        """FREE, SUN or PERHAPS (a box), (...), for rectangles of counts (..., 2)."""
+        code = np.where(self.near_boxes(low, high), PERHAPS, FREE)
+        return np.asarray(np.where(self.from_sun(low, high) <= 0.0, SUN, code), dtype=np.int8)
+
+    def box_entered(self, start: ArrayLike, end: ArrayLike) -> str | None:
+        """The box into which a slew (2,) to (2,) counts leads, both axes starting together; None where it does not."""
+        move = trapezoid(start, end, self.vantage.pace)
+        for guard in self.guards:
+            found = guard.entries(0.0, move)
+            if int(found.status):
+                return self.names[int(found.zone) - 1]
+        return None
+
+    def box_in(self, low: ArrayLike, high: ArrayLike, step: float = 100.0) -> str | None:
+        """A box that a beam within a rectangle of counts (2,) may come into, in whatever order the axes move."""
+        a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        grid = [np.linspace(a[k], b[k], int(np.ceil((b[k] - a[k]) / step)) + 1) for k in (0, 1)]
+        cell = np.array([np.ptp(g) / max(len(g) - 1, 1) for g in grid]) * 0.5
+        looks = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2)
+        far = float(np.hypot(*(cell * (1.0, 2.0)))) * 2.0 * np.pi * 1e-5  # half a cell's diagonal on the sky, at most
+        for guard in self.guards:
+            left = np.min(guard.clearance(0.0, looks, exact_below=0.05)[:, 1:], axis=0, initial=np.inf)
+            if np.any(left <= far):
+                return self.names[int(np.argmin(left))]
+        return None
+
+
+Zones = tuple[Spheres, tuple[Spheres, ...], tuple[Guard, ...]]
+NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
+
+
+class KeepClear:
+    """Sun and boxes of a site.
+
+    keep_out   boxes, cone, margins; the default without boxes if None
+    place      of the ground frame's origin; the site's, with its usual air, if None
+    """
+
+    def __init__(self, site: SiteFolder, keep_out: KeepOut | None = None, place: Place | None = None):
+        self.site, self.keep_out = site, keep_out or KeepOut()
+        self.place = place or place_of(site.site.site)
+        self.boxes = self.keep_out.boxes()
+        self._whole = _table([(b.centre, 0.5 * float(np.linalg.norm(b.size))) for b in self.boxes])
+        self._parts = [_table(_pieces(b)) for b in self.boxes]
+        self._guards: dict[str, Guard] = {}
+        self._standing: dict[tuple[str, float], Zones] = {}
+
+    def guard(self, vantage: Vantage) -> Guard:
+        """Of a ranger, boxes only, as it stands in its own frame."""
+        if vantage.name not in self._guards:
+            self._guards[vantage.name] = guard_of(
+                vantage.name,
+                vantage.station,
+                vantage.mirror,
+                keep_out=self.keep_out,
+                place=None,
+                pace=vantage.pace,
+            )
+        return self._guards[vantage.name]
+
+    def sun(self, ticks: ArrayLike) -> Array:
+        """Direction (..., 3) of the Sun, ground frame, also where it is set."""
+        return sun_at(np.asarray(ticks, dtype=float) / TICKS_PER_DAY, self.place).direction
+
+    def counts_at(self, directions: Array) -> bool:
+        """Whether a Sun that stands at directions (k, 3), ground, is one to keep out of at some time."""
+        return bool(np.max(directions[..., 2]) >= np.sin(self.keep_out.sun.horizon_deg * DEGREE))
+
+    def around(
+        self,
+        vantage: Vantage,
+        since_ticks: int,
+        until_ticks: int,
+        *,
+        posture: LivePosture | None,
+        suns: Array | None = None,
+        wider: float = 0.0,
+    ) -> Surroundings:
+        """Of a ranger between two times.
+
+        posture   of the telescope, which a ranger on the feed arm needs; its rates are held
+        suns      (NODES, 3) of `instants`, where they are known already
+        wider     rad, added to every zone
+
+        Raises InputError where a ranger on the feed arm is asked about without a posture.
+        """
+        ticks = instants(since_ticks, until_ticks)
+        seen = self.sun(ticks) if suns is None else suns
+        guard = self.guard(vantage)
+        if vantage.frame == "reflector" and posture is None:
+            raise InputError(f"{vantage.name} rides on the telescope, whose posture is not known (expected one first)")
+        if vantage.frame == "ground" or posture is None:
+            frames = [Transform("ground", vantage.frame, np.eye(3), np.zeros(3))]
+            turned = seen
+        else:
+            every = _every(posture, seconds_between(since_ticks, until_ticks))
+            ticks, seen = ticks[::every], seen[::every]
+            frames = [reflector_at(self.site, posture, seconds_between(posture.ticks, t)) for t in ticks.tolist()]
+            turned = np.einsum("kji,kj->ki", np.stack([f.rotation for f in frames]), seen)
+        margin = guard.margin + wider + chords(turned)
+        cone = self.keep_out.sun.half_angle_deg * DEGREE + margin
+        boxes, pieces, guards = self._spheres(vantage, guard, frames, wider)
+        up = self.counts_at(seen)
+        return Surroundings(
+            vantage, turned if up else turned[:0], cone, boxes, pieces, guards, tuple(b.name for b in self.boxes)
+        )
+
+    def _spheres(self, vantage: Vantage, guard: Guard, frames: list[Transform], wider: float) -> Zones:
+        """Spheres about boxes and their pieces as seen from a ranger, and its guards, at each of some stands."""
+        if not self.boxes:
+            return NOTHING, (), ()
+        key = vantage.name, wider
+        if vantage.frame == "ground" and key in self._standing:
+            return self._standing[key]
+        whole, step = _seen(vantage, frames, *self._whole)
+        parts = [_seen(vantage, frames, *part) for part in self._parts]
+        # A carried ranger stands between its nodes, too: what is half a step away widens every box.
+        extra = wider + max(step, *(each for _, each in parts))
+        guards = tuple(
+            replace(
+                guard,
+                station=guard.station if vantage.frame == "ground" else vantage.on_ground(f),
+                off_beam=guard.off_beam + extra,
+            )
+            for f in frames
+        )
+        off = guard.margin + extra
+        found = whole.grown(off), tuple(spheres.grown(off) for spheres, _ in parts), guards
+        if vantage.frame == "ground":
+            self._standing[key] = found
+        return found
+
+
+def _every(posture: LivePosture, seconds: float) -> int:
+    """Which of the instants are looked at from a ranger that is carried: 4 the ends, 2 the middle too, 1 all."""
+    turn = max(abs(posture.azimuth_rate), abs(posture.elevation_rate)) * seconds
+    return NODES - 1 if turn < DEGREE else (NODES - 1) // 2 if turn < 3.0 * DEGREE else 1
+
+
+def _table(spheres: list[tuple[Array, float]]) -> tuple[Array, Array]:
+    return np.array([c for c, _ in spheres]).reshape(-1, 3), np.array([r for _, r in spheres])
+
+
+def _seen(vantage: Vantage, frames: list[Transform], centres: Array, radii: Array) -> tuple[Spheres, float]:
+    """Spheres of middles (b, 3) m, ground, from each of some stands, and half the largest step between stands."""
+    stands = np.stack([f.points(vantage.station.scan_point) for f in frames])
+    turns = np.stack([f.rotation for f in frames])
+    way = centres[:, None] - stands
+    far = np.linalg.norm(way, axis=-1)
+    axes = np.einsum("bki,kij->bkj", way, turns) / np.maximum(far, 1e-9)[..., None]
+    outside = far > radii[:, None]
+    sine = np.divide(np.broadcast_to(radii[:, None], far.shape), far, out=np.ones_like(far), where=outside)
+    limits = np.where(outside, np.arcsin(sine), np.pi)
+    apart = np.linalg.norm(np.diff(axes, axis=1), axis=-1)
+    step = float(np.max(np.arcsin(np.minimum(0.5 * apart, 1.0)), initial=0.0))
+    return Spheres(axes.reshape(-1, 3), limits.ravel()), step
+
+
+def _pieces(box: Box) -> list[tuple[Array, float]]:
+    """Middles (3,) m, ground, and radii of spheres about equal pieces of a box."""
+    number = np.ceil(box.size / PIECE).astype(int)
+    size = box.size / number
+    grid = [(np.arange(n) + 0.5) * d - 0.5 * whole for n, d, whole in zip(number, size, box.size, strict=True)]
+    x, y, z = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3).T
+    c, s = np.cos(box.turn), np.sin(box.turn)
+    middles = box.centre + np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
+    return [(middle, 0.5 * float(np.linalg.norm(size))) for middle in middles]
+
+
+def instants(since_ticks: int, until_ticks: int) -> NDArray[np.int64]:
+    """(NODES,) ticks, from the first to the last, evenly."""
+    return np.rint(np.linspace(since_ticks, until_ticks, NODES)).astype(np.int64)
+
+
+def later(ticks: int, seconds: float) -> int:
+    """The tick some s later."""
+    return ticks + round(seconds / TICK_SECONDS)

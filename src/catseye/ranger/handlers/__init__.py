@@ -1,0 +1,1 @@
+"""What each ZY command does: functions of a ranger's state and the values of its request."""

@@ -1,0 +1,66 @@
+"""The Sun: the coordinator's vector, and what a ranger does by itself when the Sun comes to its beam."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from catseye.constants import DEGREE
+from catseye.errors import InputError
+from catseye.geometry.time_tag import PER_SECOND
+from catseye.ranger.handlers.axes import Handler
+from catseye.ranger.state import RangerState, Values
+from catseye.ranger.sun_watch import HALF_ANGLE, nearest_sun, way_out
+
+SUN_NS = PER_SECOND  # the Sun moves 15" in it
+
+
+def _sun(z: RangerState, _: int, *vector: float) -> Values:
+    if vector:
+        size = float(np.linalg.norm(vector))
+        if not 0.99 <= size <= 1.01:
+            raise InputError(f"vector to the Sun is {size:.4g} long (expected 1)")
+        z.sun_vector, z.sun_told_ns = vector, z.now_ns()
+    if z.sun_vector is None:
+        raise InputError("no vector to the Sun has been given (expected SUN x, y, z)")
+    return tuple(f"{v:.7f}" for v in z.sun_vector)
+
+
+def watch_sun(z: RangerState) -> list[str]:
+    """The Sun that comes to a beam, looked for once a second: laser off, and away if a way is free.
+
+    What is to be said: one line when it begins.
+    """
+    now = z.now_ns()
+    if 0 < z.next_sun_ns - now <= SUN_NS or not (z.initialised and z.homed):
+        return []
+    z.next_sun_ns = now + SUN_NS
+    station, suns, begun = z.cubes.station, z.suns(), not z.in_sun
+    least = nearest_sun(station, z.here, z.here, suns, exact=True)
+    z.in_sun = least < HALF_ANGLE
+    if not z.in_sun:
+        return []
+    z.head.switch_laser(False)
+    away = _leave_sun(z, suns)
+    text = f"the Sun is {least / DEGREE:.1f} deg from the beam (expected {HALF_ANGLE / DEGREE:g}): laser off, {away}"
+    return [text] if begun else []
+
+
+def _leave_sun(z: RangerState, suns: list[ArrayLike]) -> str:
+    """Drive away where a way is free; what is done, in words."""
+    station, moving = z.cubes.station, any(z.head.moving(axis) for axis in (0, 1))
+    if moving and z.heading and nearest_sun(station, z.here, z.heading, suns, exact=True) >= HALF_ANGLE:
+        return "the move that is under way leads out"
+    z.head.stop()
+    if not (z.head.enabled(0) and z.head.enabled(1)):
+        return "amplifiers are off: cover the mirror"
+    end = way_out(station, z.here, suns, z.limits)
+    if end is None:
+        return "no way out is free: cover the mirror"
+    z.aimed, z.heading = None, end
+    started = [
+        z.head.start(axis, end[axis], velocity=settings.velocity, acceleration=settings.acceleration)
+        for axis, settings in enumerate(z.axes)
+    ]
+    return f"driving away to {end[0]}, {end[1]}" if all(started) else "the axes do not start: tried again each second"
+
+
+SUN: dict[str, Handler] = {"SUN": _sun}

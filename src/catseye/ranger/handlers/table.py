@@ -1,0 +1,163 @@
+"""What each ZY command does: functions of a ranger and the values that the table of commands has checked.
+
+A handler gives the values of its reply, or is a generator: `None` or a time gives the turn back, values are one more
+reply, what it returns is the last (None: there is none). Refusals are raised, with the state as it was.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from catseye.errors import CatseyeError, InputError
+from catseye.ranger.commands import COMMANDS
+from catseye.ranger.handlers.axes import AXES, Handler
+from catseye.ranger.handlers.cubes import CUBES
+from catseye.ranger.handlers.shots import SHOTS, scan_rounds, stream_shots
+from catseye.ranger.handlers.sun import SUN, watch_sun
+from catseye.ranger.line import Reply, Request, commands_of_file, nanoseconds_to_ticks, tag_of
+from catseye.ranger.line import stamp_text as stamp
+from catseye.ranger.state import VERSION, RangerState, Values, Work
+from catseye.ranger.status import word_text
+
+__all__ = ["HANDLERS", "file_names", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
+
+
+def _sti(z: RangerState, _: int, ticks: int | None = None) -> Values:
+    if ticks is not None:
+        z.head.set_clock(tag_of(ticks))
+    return (stamp(z.now_ticks()),)
+
+
+def _ps(z: RangerState, _: int, on: int | None = None) -> Values:
+    if on and z.in_sun:
+        raise InputError("the beam looks into the Sun (expected a move away first)")
+    if on is not None:
+        z.head.switch_laser(bool(on))
+    return str(int(z.head.laser_on())), *(f"{k} {v:.2f}" for k, v in sorted(z.head.supplies().items()))
+
+
+def _entemp(z: RangerState, _: int) -> Values:
+    temperature = z.head.enclosure_temperature_c()
+    if not np.isfinite(temperature):
+        raise InputError("the enclosure's temperature is not known")
+    return (f"{temperature:.2f}",)
+
+
+def _rst(z: RangerState, _: int) -> Values:
+    z.reset()
+    return ()
+
+
+def _lst(z: RangerState, client: int) -> Values:
+    mine = [e for e in z.scheduler.entries if e.client == client]
+    return str(len(mine)), *(
+        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in mine[:24]
+    )
+
+
+def _clr(z: RangerState, client: int) -> Values:
+    return (str(z.scheduler.clear(client)),)
+
+
+def _hlp(z: RangerState, _: int, name: str | None = None) -> Values | Work:
+    if name is None:
+        return (" ".join(["AT", *sorted(COMMANDS)]),)
+    if name.upper() not in COMMANDS:
+        raise InputError(f"{name} is no command (expected one that HLP lists)")
+    row = COMMANDS[name.upper()]
+    return (_commas(row.help), _commas(row.usage))
+
+
+def _commas(text: str) -> str:
+    """A reply's value holds no comma."""
+    return text.replace(",", ";")
+
+
+def _initzy(z: RangerState, client: int) -> Work:
+    """CUBES.INI, ZYnnn.INI, the head's own; the first command that fails ends it."""
+    if z.files is None:
+        raise InputError("this ranger has no initialisation files (expected their folder at its start)")
+    commands = [(name, *each) for name in file_names(z) for each in _commands(z.files / name)]
+    for name, line, request in commands:
+        where = f"{name} line {line}"
+        if request.command not in COMMANDS or request.command in ("INITZY", "RST", "BYE"):
+            raise InputError(f"{where}: {request.command} is no command of an initialisation file")
+        try:
+            answer = z.work_of(client, request)
+            if isinstance(answer, tuple):
+                yield Reply(request.command, True, answer)
+            else:
+                last = yield from _told(request.command, answer)
+                if last is not None:
+                    yield Reply(request.command, True, last)
+        except CatseyeError as problem:
+            raise InputError(f"{where}: {problem}") from problem
+    return ()
+
+
+def _told(command: str, work: Work) -> Work:
+    """The replies of another command, each with its name."""
+    while True:
+        try:
+            values = next(work)
+        except StopIteration as end:
+            return end.value
+        yield Reply(command, True, values) if isinstance(values, tuple) else values
+
+
+def file_names(z: RangerState) -> tuple[str, str, str]:
+    """Initialisation files of a ranger in their order: all rangers' cubes, the monument's, the head's."""
+    return "CUBES.INI", f"{z.name.upper()}.INI", f"{z.mirror.lower()}.INI"
+
+
+def _commands(path: Path) -> list[tuple[int, Request]]:
+    try:
+        return commands_of_file(path.read_text("ascii"), path.name)
+    except (OSError, UnicodeDecodeError) as problem:
+        raise InputError(f"{path.name} cannot be read (expected an ASCII file)") from problem
+
+
+def replace_file(folder: Path, name: str, text: str) -> None:
+    """A new initialisation file; the old one is kept as NAME.BAK. Refused whole where a line cannot be read.
+
+    folder   of the ranger's files
+    name     one of `file_names`
+    text     commands, ASCII, with comments after ;
+
+    Raises InputError: a line that is no command of the table with fitting parameters, or the file cannot be written.
+    """
+    for line, request in commands_of_file(text, name):
+        try:
+            if request.command not in COMMANDS:
+                raise InputError(f"{request.command} is no command")
+            COMMANDS[request.command].read(request)
+        except InputError as problem:
+            raise InputError(f"{name} line {line}: {problem}") from problem
+    path, new = folder / name, folder / f".{name}.new"
+    try:
+        new.write_text(text, "ascii")
+        if path.exists():
+            path.replace(path.with_suffix(".BAK"))
+        new.replace(path)
+    except (OSError, UnicodeEncodeError) as problem:
+        new.unlink(missing_ok=True)
+        raise InputError(f"{name} cannot be written (expected ASCII and room in its folder)") from problem
+
+
+HANDLERS: dict[str, Handler] = {
+    **AXES,
+    **CUBES,
+    **SHOTS,
+    **SUN,
+    "STW": lambda z, _: (word_text(z.status()),),
+    "VER": lambda z, _: (z.name, VERSION),
+    "STI": _sti,
+    "PS": _ps,
+    "ENTEMP": _entemp,
+    "RST": _rst,
+    "LST": _lst,
+    "CLR": _clr,
+    "HLP": _hlp,
+    "INITZY": _initzy,
+    "BYE": lambda z, _: ("Closing Connection",),  # the server puts the port before it
+}

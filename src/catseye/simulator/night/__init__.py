@@ -1,0 +1,1 @@
+"""Whole synthetic nights with known truth, as campaign directories."""

@@ -1,0 +1,152 @@
+"""What a head records: the phase of each return, and the samples of its converter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.simulator.night.air import Air
+from catseye.simulator.night.faults import Faults, Planted, Streams
+from catseye.simulator.night.glass import GLASS_TO_AIR, ball_delay, prism_delay
+from catseye.simulator.night.schedule import REFERENCE, PlannedShot
+from catseye.simulator.night.structure import Target, unit
+from catseye.simulator.night.world import Head
+
+MODULATION_HZ = 1.5e9
+RADIANS_PER_METRE = 2.0 * TWO_PI * MODULATION_HZ / SPEED_OF_LIGHT  # of one-way optical path
+VOLT_PER_CODE = 10.0 / 32768.0
+SAMPLES_PER_CYCLE, CYCLES = 64, 128
+DRIFT_RAD_PER_ROOT_HOUR = 0.010
+HARMONICS = np.array([0.0020, 0.0003])  # second and third, of the amplitude, their phases any from shot to shot
+REFERENCE_VOLT = 6.5
+USUAL_VOLT = {"dish": (3.8, 5.4), "prism": (4.2, 5.9), "arm": (4.5, 6.2), "ball": (2.1, 3.1), "hollow": (2.8, 3.8)}
+BENCHMARK_VOLT = (4.4, 5.4)
+
+
+@dataclass(frozen=True)
+class Return:
+    """The truth of one shot before sampling."""
+
+    shot: PlannedShot
+    phasor: complex  # V, wanted, foreign and leaked together
+    status: str  # 'good', 'blocked' or 'reflected'
+    index: float  # group index averaged along the path, its fluctuation included; 1 for a reference shot
+    range: float  # one-way optical path over index and glass: the straight distance, m
+    phase_error: float  # that a foreign return adds to the phase, rad
+
+
+def glass_delay(target: Target, towards_ranger, *, obliquity: float):
+    """Optical path that the glass of a target adds one way, air metres; `obliquity` scales what the angle changes."""
+    if target.kind == "ball":
+        return ball_delay(*target.sizes)
+    if target.normal is None:
+        return 0.0
+    straight = (GLASS_TO_AIR - 1.0 / GLASS_TO_AIR) * target.sizes[0]
+    slanted = float(prism_delay(np.asarray(target.sizes[0]), target.normal, towards_ranger))
+    return straight + obliquity * (slanted - straight)
+
+
+def electronic_phase(head: Head, seconds, streams: Streams, planted: Planted):
+    """Phase of the electronics at the times of the shots (ascending): a random walk; every third head warms up."""
+    rng = streams(f"electronics/{head.ranger}")
+    start, warms, rise = rng.uniform(0.0, TWO_PI), rng.uniform() < 1.0 / 3.0, rng.uniform(0.010, 0.030)
+    rise *= rng.choice((-1.0, 1.0))
+    steps = np.sqrt(np.diff(seconds, prepend=seconds[0]) / 3600.0) * rng.normal(size=len(seconds))
+    walk = planted.gain("drift") * DRIFT_RAD_PER_ROOT_HOUR * np.cumsum(steps)
+    transient = planted.gain("warm_up") * warms * rise * np.exp(-(seconds - seconds[0]) / 300.0)
+    return start + walk + transient
+
+
+def usual_volt(name: str, draw: float) -> float:
+    """Amplitude of an ordinary return, for a draw of 0 to 1 that belongs to the path."""
+    if name.startswith("ZBM"):
+        low, high = BENCHMARK_VOLT
+    else:
+        kind = {"DP": "dish", "ZY": "arm"}.get(name[:2], "hollow")
+        if name.startswith("TR"):
+            kind = "ball" if name.endswith("-B") else "prism"
+        low, high = USUAL_VOLT[kind]
+    return low + (high - low) * draw
+
+
+def foreign_return(amplitude: float, draws) -> tuple[complex, complex]:
+    """Factors on the wanted unit phasor: what is left of it, and what comes from elsewhere.
+
+    Half of the foreign returns replace the wanted one (path wrong by 1 mm up to nearly half a wavelength),
+    half mix with it, at 15 to 60 %, such that the phase is wrong by at least 1 mm.
+    """
+    replaces, size, where, side = draws
+    sign = 1.0 if side < 0.5 else -1.0
+    if replaces < 0.5:
+        return 0.0, amplitude * (0.4 + 0.7 * size) * np.exp(1j * sign * RADIANS_PER_METRE * (0.001 + 0.045 * where))
+    share = 0.15 + 0.45 * size
+    # Between 40 and 140 degrees a share of 0.15 or more turns the phase by at least 0.085 rad: 1.3 mm.
+    return amplitude, amplitude * share * np.exp(1j * sign * np.radians(40.0 + 100.0 * where))
+
+
+def returns_of_ranger(
+    head: Head,
+    shots: list[PlannedShot],
+    *,
+    points: dict[str, np.ndarray],
+    targets: dict[str, Target],
+    air: Air,
+    faults: Faults,
+    planted: Planted,
+    streams: Streams,
+) -> list[Return]:
+    """What comes back to one ranger, shot by shot."""
+    seconds = np.array([s.seconds for s in shots])
+    phase_e = electronic_phase(head, seconds, streams, planted)
+    rng = streams(f"returns/{head.ranger}")
+    paths = {name: streams(f"air/{head.ranger}/{name}").normal() for name in targets}
+    fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
+    flicker = 1.0 + planted.gain("scintillation") * 0.022 * rng.normal(size=len(shots))
+    fate, foreign = rng.uniform(size=len(shots)), rng.uniform(size=(len(shots), 4))
+    here = points[head.ranger]
+    ends = np.array([here if s.target == REFERENCE else points[s.target] for s in shots])
+    index = air.path_index(here, ends, seconds) + planted.gain("index_fluctuation") * fluctuation
+    end_index = air.index(ends[:, 2], seconds)
+    volt = {name: usual_volt(name, streams(f"path/{head.ranger}/{name}").uniform()) for name in targets}
+    weak = faults.weak_amplitude if head.ranger == faults.weak_ranger else 1.0
+
+    found = []
+    for i, shot in enumerate(shots):
+        if shot.target == REFERENCE:
+            wanted = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
+            phasor = REFERENCE_VOLT * wanted + head.true_leakage
+            found.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
+            continue
+        away = here - ends[i]
+        distance = float(np.linalg.norm(away))
+        glass = glass_delay(targets[shot.target], unit(away), obliquity=planted.gain("obliquity"))
+        path = index[i] * distance + end_index[i] * glass
+        wanted = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * path))
+        amplitude = volt[shot.target] * weak * flicker[i]
+        status, left, strange = "good", complex(amplitude), 0j
+        if fate[i] < faults.fraction_blocked:
+            status, left = "blocked", 0j
+        elif fate[i] > 1.0 - faults.fraction_reflected:
+            status = "reflected"
+            left, strange = foreign_return(amplitude, foreign[i])
+        error = float(np.angle(left + strange)) if status == "reflected" else 0.0
+        phasor = wanted * (left + strange) + head.true_leakage
+        found.append(Return(shot, complex(phasor), status, float(index[i]), distance, error))
+    return found
+
+
+def sampled_frames(head: Head, returns: list[Return], streams: Streams, planted: Planted) -> np.ndarray:
+    """Converter codes of every shot of one head, int16, (shots, samples): harmonics, offset, noise, rounding, ends."""
+    rng = streams(f"samples/{head.ranger}")
+    offset, spread = rng.uniform(-0.25, 0.25), rng.uniform(0.165, 0.245)  # V
+    phasor = np.array([r.phasor for r in returns])[:, None]
+    phases = streams(f"harmonics/{head.ranger}").uniform(0.0, TWO_PI, (len(returns), len(HARMONICS)))
+    harmonics = np.abs(phasor) * HARMONICS * np.exp(1j * phases)
+    turn = np.exp(-1j * TWO_PI * np.arange(SAMPLES_PER_CYCLE) / SAMPLES_PER_CYCLE)
+    cycle = offset + np.real(phasor * turn + harmonics[:, :1] * turn**2 + harmonics[:, 1:] * turn**3)  # A cos(j - phi)
+    volts = rng.standard_normal((len(returns), CYCLES, SAMPLES_PER_CYCLE), dtype=np.float32)
+    volts *= np.float32(planted.gain("noise") * spread / VOLT_PER_CODE)
+    volts += (cycle / VOLT_PER_CODE).astype(np.float32)[:, None, :]
+    np.rint(volts, out=volts)
+    np.clip(volts, -32768.0, 32767.0, out=volts)
+    return volts.astype(np.int16).reshape(len(returns), CYCLES * SAMPLES_PER_CYCLE)

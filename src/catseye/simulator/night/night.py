@@ -1,0 +1,48 @@
+"""A synthetic night: all that its files will hold, and the truth behind them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.simulator.night.air import Conditions, WeatherReading
+from catseye.simulator.night.schedule import PlannedShot
+from catseye.simulator.night.structure import Structure, Target
+from catseye.simulator.night.truth import Truth
+from catseye.simulator.night.world import (
+    Benchmark,
+    Head,
+    Monument,
+)
+
+
+@dataclass(frozen=True)
+class Sounding:
+    """One line of path_temperatures.csv."""
+
+    seconds: float
+    ranger: str
+    target: str
+    temperature_c: float
+    u_temperature_c: float
+
+
+@dataclass(frozen=True)
+class Night:
+    """A campaign: what its files hold (`write_night` makes them), and the `truth`."""
+
+    name: str
+    seed: int
+    azimuth_deg: float
+    elevation_deg: float
+    start_mjd_utc: float
+    conditions: Conditions
+    monuments: dict[str, Monument]
+    heads: dict[str, Head]
+    telescope: Structure
+    benchmarks: list[Benchmark]
+    single_targets: list[Target]
+    weather: list[WeatherReading]
+    shots: list[PlannedShot]  # by time; row i of frames is shot i + 1
+    frames: np.ndarray  # int16, (shots, 8192)
+    truth: Truth
+    sounded: tuple[Sounding, ...] = ()  # rows of path_temperatures.csv; no file without

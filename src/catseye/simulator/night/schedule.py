@@ -1,0 +1,112 @@
+"""Who shoots what and when, in the manner of night-01."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import DEGREE
+from catseye.simulator.night.faults import Faults, Streams
+from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.structure import Structure, unit
+from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, Benchmark, Monument
+
+REFERENCE = "ZRG"
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Rhythm of the campaign.
+
+    interval_s        between shots of a ranger
+    jitter_s          each shot comes early or late by up to this
+    reference_every   shots between two reference shots
+    span_s            the ground rangers start anywhere that lets them end within it
+    ball_rangers      ground rangers that shoot one ball, at most
+    ball_angle_deg    largest angle from the axis of a ball
+    weak_share        share of the dish prisms that the weak ranger shoots
+    """
+
+    interval_s: float = 14.0
+    jitter_s: float = 0.75
+    reference_every: int = 8
+    span_s: float = 3300.0
+    ball_rangers: int = 5
+    ball_angle_deg: float = 79.0
+    weak_share: float = 2.0 / 3.0
+    ground_repeats: int = 2
+    certified_repeats: int = 4
+    neighbour_repeats: int = 2
+
+
+@dataclass(frozen=True)
+class PlannedShot:
+    """One shot of the plan, s since the start."""
+
+    seconds: float
+    ranger: str
+    target: str
+
+
+def ground_targets(
+    rule: Schedule,
+    *,
+    monuments: dict[str, Monument],
+    telescope: Structure,
+    marks: list[Benchmark],
+    pose: Posture,
+    streams: Streams,
+) -> dict[str, list[str]]:
+    """What each ground ranger shoots, repeats included; seen from the design, so that no plant changes it."""
+    found: dict[str, list[str]] = {ranger: [] for ranger in GROUND_RANGERS}
+    place = {r: m.fixed_point_mm / 1000.0 for r, m in monuments.items()}
+    for unit_ in telescope.triplets:
+        rng = streams(f"sight/{unit_.name}")
+        ball, axis = telescope.design[f"{unit_.name}-B"], -pose.nominal_direction(unit(unit_.normal))
+        cosine = {r: unit(p - ball) @ axis for r, p in place.items() if p[2] < ball[2]}
+        seen = [r for r, c in cosine.items() if c > np.cos(rule.ball_angle_deg * DEGREE)]
+        fewer = int(rng.uniform() < 0.3)
+        for r in rng.permutation(seen)[: max(rule.ball_rangers - fewer, 3)]:
+            found[str(r)] += [f"{unit_.name}-B"] * rule.ground_repeats
+    for i, target in enumerate(telescope.structural):
+        if target.frame == "reflector":  # on the feed arm, seen from all around: every other ranger
+            chosen = list(GROUND_RANGERS[i % 2 :: 2])
+        else:  # near the elevation bearing: the five nearest
+            at = telescope.design[target.name]
+            chosen = sorted(GROUND_RANGERS, key=lambda r: float(np.linalg.norm(place[r] - at)))[:5]
+        for r in chosen:
+            found[r] += [target.name] * rule.ground_repeats
+    for mark in marks:
+        found[mark.ranger] += [mark.name] * rule.certified_repeats
+        if mark.neighbour:
+            found[mark.neighbour] += [mark.name] * rule.neighbour_repeats
+    return found
+
+
+def feed_arm_targets(ranger: str, rule: Schedule, telescope: Structure, faults: Faults, streams: Streams) -> list[str]:
+    """What a ranger of the feed arm shoots once: its fellows, the triplets' prisms, nearly all dish prisms."""
+    others = [r for r in FEED_ARM_RANGERS if r != ranger]
+    prisms = [t.name for unit_ in telescope.triplets for t in unit_.targets if t.kind == "prism"]
+    share = rule.weak_share if ranger == faults.weak_ranger else 0.99
+    drawn = streams(f"prisms/{ranger}").uniform(size=len(telescope.dish))
+    return others + prisms + [t.name for t, u in zip(telescope.dish, drawn, strict=True) if u < share]
+
+
+def with_references(targets: list[str], every: int) -> list[str]:
+    """A reference shot first, after every `every` shots, and last."""
+    blocks = [targets[i : i + every] for i in range(0, len(targets), every)]
+    return [REFERENCE, *(name for block in blocks for name in (*block, REFERENCE))]
+
+
+def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Streams) -> dict[str, list[PlannedShot]]:
+    """Shots of every ranger in its own time."""
+    plan = {}
+    for ranger, targets in shot_lists.items():
+        rng = streams(f"schedule/{ranger}")
+        order = [str(t) for t in rng.permutation(targets)] if targets else []
+        names = with_references(order, rule.reference_every)
+        on_ground = ranger in GROUND_RANGERS
+        room = rule.span_s - rule.interval_s * len(names)
+        start = rng.uniform(40.0, max(room, 60.0) if on_ground else 0.3 * rule.span_s)
+        times = start + rule.interval_s * np.arange(len(names)) + rng.uniform(-rule.jitter_s, rule.jitter_s, len(names))
+        plan[ranger] = [PlannedShot(float(t), ranger, name) for t, name in zip(times, names, strict=True)]
+    return plan

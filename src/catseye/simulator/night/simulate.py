@@ -1,0 +1,216 @@
+"""A whole synthetic night: the campaign as the files would tell it, and the truth that they do not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import PPM, TWO_PI
+from catseye.errors import InputError, ValidityError
+from catseye.simulator.night.air import NIGHT, Air, Conditions, group_refractivity_ppm, weather_readings
+from catseye.simulator.night.faults import Faults, Planted, Streams
+from catseye.simulator.night.head import Return, returns_of_ranger, sampled_frames
+from catseye.simulator.night.night import Night, Sounding
+from catseye.simulator.night.posture import posture
+from catseye.simulator.night.schedule import Schedule, feed_arm_targets, ground_targets, plan_shots
+from catseye.simulator.night.structure import Target, structure, typed_mm, typing_error
+from catseye.simulator.night.truth import truth_of
+from catseye.simulator.night.world import (
+    FEED_ARM_RANGERS,
+    GROUND_RANGERS,
+    Benchmark,
+    Head,
+    benchmarks,
+    head,
+    monument,
+)
+
+START_MJD_UTC = 52889.125
+
+
+SOUNDING_INTERVAL_S = 120.0
+
+
+@dataclass(frozen=True)
+class WarmLine(Air):
+    """Air that is warmer by a plume on the way to some points than smooth air at these heights.
+
+    plumes   (point (3,) m, °C that the mean of the straight line is warmer: twice that half-way, none at the ends)
+    """
+
+    plumes: tuple[tuple[np.ndarray, float], ...] = ()
+
+    def path_index(self, start, end, seconds):
+        """As of `Air`; towards a plume's point by the midpoint rule over 500 parts."""
+        index = super().path_index(start, end, seconds)
+        for point, warmer in self.plumes:
+            share = (np.arange(500) + 0.5) / 500
+            plume = warmer * (1.0 - np.cos(TWO_PI * share))
+            for i in np.flatnonzero(np.all(np.asarray(end) == point, axis=-1)):
+                z = start[2] + (end[i, 2] - start[2]) * share
+                t = self.temperature_c(z, seconds[i]) + plume
+                weather = self.pressure_hpa(z, seconds[i]), self.humidity_percent(seconds[i])
+                # the plume warms, it does not wet: the same vapour is a lower relative humidity
+                drier = saturation_hpa(self.temperature_c(z, seconds[i])) / saturation_hpa(t)
+                index[i] = 1.0 + PPM * group_refractivity_ppm(t, weather[0], weather[1] * drier).mean()
+        return index
+
+
+def saturation_hpa(temperature_c):
+    """Magnus' form, good to 0.5 %: only ratios are taken of it."""
+    return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
+
+
+def simulate_night(
+    seed: int,
+    *,
+    azimuth_deg: float = 145.3,
+    elevation_deg: float = 30.0,
+    dish_prisms: int = 60,
+    triplets: int = 10,
+    faults: Faults | None = None,
+    conditions: Conditions = NIGHT,
+    schedule: Schedule | None = None,
+    planted: Planted | None = None,
+    warm_lines: Mapping[tuple[str, str], float] | None = None,
+    u_sound_c: float | None = None,
+    night: int = 0,
+) -> Night:
+    """A night in the manner of night-01, from one seed.
+
+    azimuth_deg     clockwise from north
+    elevation_deg   5 to 90
+    dish_prisms     0 to 999
+    triplets        0 to 99
+    warm_lines      (ranger, target) -> °C by which the mean of that line is warmer than smooth air
+    u_sound_c       °C: these lines are sounded, each with an offset of its own drawn from it, and noise of a fifth;
+                    None: no sound
+    night           another one at the same site: noise, electronics, weather and air are drawn anew
+    """
+    if not 5.0 <= elevation_deg <= 90.0:
+        raise ValidityError(f"elevation {elevation_deg} deg is outside 5-90 deg, where the telescope moves")
+    if not (0 <= dish_prisms <= 999 and 0 <= triplets <= 99):
+        raise ValidityError(f"{dish_prisms} dish prisms and {triplets} triplets: expected 0-999 and 0-99")
+    faults, rule, planted = faults or Faults(), schedule or Schedule(), planted or Planted()
+    streams = Streams(seed, night)
+    heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
+    monuments = {r: monument(r, heads[r], streams, planted) for r in GROUND_RANGERS}
+    marks = benchmarks(monuments, streams, planted)
+    pose = posture(azimuth_deg, elevation_deg, streams, planted)
+    telescope = structure(
+        pose, dish_count=dish_prisms, triplet_count=triplets, streams=streams, faults=faults, planted=planted
+    )
+    cubes = benchmark_targets(marks, streams, planted)
+    targets = telescope.targets | {t.name: t for t in cubes}
+    points = {r: m.true_scan_point for r, m in monuments.items()} | {t.name: t.point for t in targets.values()}
+    points = shifted(points, planted)
+    for ranger in planted.d0_error_mm:
+        if ranger not in heads:
+            raise InputError(f"a D0 error planted on {ranger!r}: expected a ranger, ZY101 to ZY118")
+
+    lists = ground_targets(rule, monuments=monuments, telescope=telescope, marks=marks, pose=pose, streams=streams) | {
+        r: feed_arm_targets(r, rule, telescope, faults, streams) for r in FEED_ARM_RANGERS
+    }
+    plan = plan_shots(rule, lists, streams)
+    air = Air(conditions, planted.gain("stratification"))
+    warm = dict(warm_lines or {})
+    for ranger, target in warm:
+        if ranger not in heads or target not in points:
+            raise InputError(f"a warm line {ranger} - {target}: the night has no such ends")
+    seen = {
+        r: WarmLine(air.conditions, air.stratification, tuple((points[t], w) for (a, t), w in warm.items() if a == r))
+        for r in heads
+    }
+    returns = {
+        r: returns_of_ranger(
+            heads[r],
+            plan[r],
+            points=points,
+            targets=targets,
+            air=seen[r] if seen[r].plumes else air,
+            faults=faults,
+            planted=planted,
+            streams=streams,
+        )
+        for r in heads
+    }
+    ordered, frames = in_time(heads, returns, streams, planted)
+    weather, offsets = weather_readings(
+        air, streams=streams, faults=faults, planted=planted, until_s=ordered[-1].shot.seconds
+    )
+    truth = truth_of(
+        heads=heads,
+        monuments=monuments,
+        telescope=telescope,
+        points=points,
+        returns=ordered,
+        air=air,
+        thermometer_offsets_c=offsets,
+        pose=pose,
+    )
+    return Night(
+        name=f"simulated-{seed}",
+        seed=seed,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=elevation_deg,
+        start_mjd_utc=START_MJD_UTC,
+        conditions=conditions,
+        monuments=monuments,
+        heads=heads,
+        telescope=telescope,
+        benchmarks=marks,
+        single_targets=[*telescope.dish, *telescope.structural, *cubes],
+        weather=weather,
+        shots=[r.shot for r in ordered],
+        frames=frames,
+        truth=truth,
+        sounded=soundings(air, warm, points, u_sound_c, streams, ordered[-1].shot.seconds),
+    )
+
+
+def soundings(
+    air: Air,
+    warm: Mapping[tuple[str, str], float],
+    points: Mapping[str, np.ndarray],
+    u_sound_c: float | None,
+    streams: Streams,
+    until_s: float,
+) -> tuple[Sounding, ...]:
+    """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
+    if u_sound_c is None:
+        return ()
+    found = []
+    for (ranger, target), warmer in warm.items():
+        rng = streams(f"sound/{ranger}/{target}")
+        offset = u_sound_c * rng.normal()
+        z = np.linspace(points[ranger][2], points[target][2], 2001)
+        for seconds in np.arange(0.0, until_s + SOUNDING_INTERVAL_S, SOUNDING_INTERVAL_S):
+            mean = float(np.mean(air.temperature_c(z, seconds))) + warmer
+            read = mean + offset + 0.2 * u_sound_c * rng.normal()
+            found.append(Sounding(float(seconds), ranger, target, read, u_sound_c))
+    return tuple(sorted(found, key=lambda row: row.seconds))
+
+
+def benchmark_targets(marks: list[Benchmark], streams: Streams, planted: Planted) -> list[Target]:
+    """The benchmarks as targets with approximate positions."""
+    rng = streams("benchmark positions")
+    typed = [typed_mm(b.true_point + typing_error(planted, rng)) for b in marks]
+    return [Target(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
+
+
+def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.ndarray]:
+    """The points with the planted shifts."""
+    for name in planted.shifts:
+        if name not in points:
+            raise InputError(f"a shift planted on {name!r}: the night has no such point")
+    return points | {name: points[name] + np.asarray(by, dtype=float) for name, by in planted.shifts.items()}
+
+
+def in_time(
+    heads: dict[str, Head], returns: dict[str, list[Return]], streams: Streams, planted: Planted
+) -> tuple[list[Return], np.ndarray]:
+    """All returns in the order of their triggers, with their frames."""
+    every = [r for ranger in heads for r in returns[ranger]]
+    order = np.argsort([r.shot.seconds for r in every], kind="stable")
+    frames = np.concatenate([sampled_frames(heads[z], returns[z], streams, planted) for z in heads])
+    return [every[i] for i in order], frames[order]

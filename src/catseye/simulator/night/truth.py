@@ -1,0 +1,86 @@
+"""What really was, beside what the files say."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.simulator.night.air import Air
+from catseye.simulator.night.head import Return
+from catseye.simulator.night.paraboloid import Paraboloid, best_paraboloid
+from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.schedule import REFERENCE
+from catseye.simulator.night.structure import Structure
+from catseye.simulator.night.world import Head, Monument
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What really was. Metres, radians, ground frame; shots are keyed by their id as text, from '1'.
+
+    points             every scan point, triplet target, dish prism, structural target, benchmark: name -> (3,)
+    shot_status        'good', 'blocked' or 'reflected' (reference shots are good)
+    shot_ranges        straight distance scan point to reference point (a reference shot: D0)
+    shot_phase_errors  what a foreign return adds to the phase, rad (0 for the others)
+    path_refractivity_ppm   (n_path - 1) 1e6 of every shot on a target
+    refractivity_ppm   its mean over the good ones; None when there are none
+    d0, leakage, fixed_points, mirror_offsets   of the rangers (the last two: ground rangers)
+    thermometer_offsets_c   reading minus air, station -> value, the lie included
+    normals            of prisms (entry face) and balls (their axis, the way they look), unit vectors
+    paraboloid         best fit to the true dish prisms: axis, vertex, focus, normal deviations; None below six prisms
+    posture            the departure from the nominal posture that placed everything
+    air                the air itself, a function of height and seconds since the start
+    wrongly_typed      whose approximate position carries the gross error (a triplet: TRnn)
+    """
+
+    points: dict[str, np.ndarray]
+    shot_status: dict[str, str]
+    shot_ranges: dict[str, float]
+    shot_phase_errors: dict[str, float]
+    path_refractivity_ppm: dict[str, float]
+    refractivity_ppm: float | None
+    d0: dict[str, float]
+    leakage: dict[str, complex]
+    fixed_points: dict[str, np.ndarray]
+    mirror_offsets: dict[str, np.ndarray]
+    thermometer_offsets_c: dict[str, float]
+    normals: dict[str, np.ndarray]
+    paraboloid: Paraboloid | None
+    posture: Posture
+    air: Air
+    wrongly_typed: str | None
+
+
+def truth_of(
+    *,
+    heads: dict[str, Head],
+    monuments: dict[str, Monument],
+    telescope: Structure,
+    points: dict[str, np.ndarray],
+    returns: list[Return],
+    air: Air,
+    thermometer_offsets_c: dict[str, float],
+    pose: Posture,
+) -> Truth:
+    """Gather the truth; returns in the order of the shots."""
+    shots = {str(i + 1): r for i, r in enumerate(returns)}
+    ranged = {i: r for i, r in shots.items() if r.shot.target != REFERENCE}
+    good = [(r.index - 1.0) / PPM for r in ranged.values() if r.status == "good"]
+    return Truth(
+        points=points,
+        shot_status={i: r.status for i, r in shots.items()},
+        shot_ranges={i: r.range for i, r in shots.items()},
+        shot_phase_errors={i: r.phase_error for i, r in shots.items()},
+        path_refractivity_ppm={i: (r.index - 1.0) / PPM for i, r in ranged.items()},
+        refractivity_ppm=float(np.mean(good)) if good else None,
+        d0={r: h.true_d0 for r, h in heads.items()},
+        leakage={r: h.true_leakage for r, h in heads.items()},
+        fixed_points={r: m.true_fixed_point for r, m in monuments.items()},
+        mirror_offsets={r: heads[r].true_offset for r in monuments},
+        thermometer_offsets_c=thermometer_offsets_c,
+        normals={name: t.normal for name, t in telescope.targets.items() if t.normal is not None},
+        paraboloid=best_paraboloid({t.name: points[t.name] for t in telescope.dish}, pose),
+        posture=pose,
+        air=air,
+        wrongly_typed=telescope.wrongly_typed,
+    )

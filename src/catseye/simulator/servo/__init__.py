@@ -1,0 +1,1 @@
+"""A mirror's motion chip, its motor and axis, step by step."""

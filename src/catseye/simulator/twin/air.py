@@ -1,0 +1,140 @@
+"""The air of a living site: a function of place and time; what it does to a path, to readings, to wet glass."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import DEGREE, PPM, SECONDS_PER_DAY, TWO_PI
+from catseye.records.site_folder import SiteFolder
+from catseye.simulator.night.air import PRESSURE_LAPSE_HPA_PER_M, group_refractivity_ppm
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.twin.conditions import LivingConditions
+from catseye.simulator.twin.waves import Waves, correlated, joined, walk
+
+Array = NDArray[np.float64]
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # below 1e-10 of the index on a profile of 10 m scale height
+SHARES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
+WARMEST_HOUR, BRIGHTEST_HOUR = 15.0, 12.5  # local mean time
+STEEL_LAG_HOURS, STEEL_SHARE = 1.0, 0.8  # steel follows the day's swing so much later and so much less
+WET, WET_WIDTH_C = 0.03, 0.15  # amplitude left on wet glass; width of the change about the dew point
+
+
+def saturation_hpa(temperature_c: ArrayLike, pressure_hpa: ArrayLike) -> Array:
+    """Saturation vapour pressure over water as in `air.group_refractivity_ppm`, hPa."""
+    t = np.asarray(temperature_c, dtype=float)
+    return 6.1121 * (1.0007 + 3.46e-6 * np.asarray(pressure_hpa)) * np.exp(17.502 * t / (240.97 + t))
+
+
+@dataclass(frozen=True, eq=False)
+class LivingAir:
+    """True air at points (..., 3), m, ground frame, and times (...), s since the start.
+
+    start_hour        local mean solar time at the start
+    slope             (2,) °C/m east and north
+    wander            waves: temperature, pressure, dew point
+    stratification    factor on what changes with height; diurnal, dew: on these
+    """
+
+    conditions: LivingConditions
+    start_hour: float
+    slope: Array
+    wander: Waves
+    stratification: float
+    diurnal: float
+    dew: float
+    dew_point_c: float
+
+    @staticmethod
+    def of(
+        site: SiteFolder, conditions: LivingConditions, start_mjd: float, *, streams: Streams, planted: Planted
+    ) -> "LivingAir":
+        """The air over a site, drawn."""
+        c, rng = conditions, streams("living air")
+        slope = planted.gain("horizontal_gradient") * c.horizontal_c_per_100m / 100.0 * rng.normal(size=2)
+        wander = joined(
+            correlated(rng, c.wander_c, 1200.0),
+            walk(rng, c.pressure_walk_hpa / 60.0, shortest=600.0),
+            correlated(rng, c.dew_point_wander_c, 10_800.0),
+        ).scaled(planted.gain("weather_wander"))
+        vapour = saturation_hpa(c.temperature_c, c.pressure_hpa) * c.humidity_percent / 100.0
+        return LivingAir(
+            c,
+            float((start_mjd % 1.0) * 24.0 + site.site.site.longitude_deg / 15.0),
+            slope,
+            wander,
+            planted.gain("stratification"),
+            planted.gain("diurnal"),
+            planted.gain("dew"),
+            float(_dew_point_c(vapour, c.pressure_hpa)),
+        )
+
+    def sunshine(self, seconds: ArrayLike) -> Array:
+        """0 at midnight to 1 at noon; without the day's effects as at the start."""
+        hours = self.start_hour + self.diurnal * np.asarray(seconds, dtype=float) / 3600.0
+        return 0.5 * (1.0 + np.cos(TWO_PI * (hours - BRIGHTEST_HOUR) / 24.0))
+
+    def _day(self, seconds: ArrayLike, lag_hours: float = 0.0) -> Array:
+        """Temperature of the day's swing less that at the start, °C."""
+        begin = TWO_PI * (self.start_hour - lag_hours - WARMEST_HOUR) / 24.0
+        turn = np.asarray(seconds, dtype=float) * (TWO_PI / SECONDS_PER_DAY)
+        return self.diurnal * self.conditions.diurnal_c * (np.cos(begin + turn) - np.cos(begin))
+
+    def steel_c(self, seconds: ArrayLike) -> Array:
+        """Temperature of the structure less that at the start (...), °C."""
+        return STEEL_SHARE * self._day(seconds, STEEL_LAG_HOURS)
+
+    def weather(self, points: Array, seconds: Array) -> tuple[Array, Array, Array]:
+        """Temperature, °C, pressure, hPa, and humidity over water, %, each (k, m), at points (k, m, 3), times (k,)."""
+        c, sun, drift = self.conditions, self.sunshine(seconds), self.wander(seconds)
+        z = points[..., 2]
+        gradient, layer = (a + (b - a) * sun for a, b in (c.gradient_c_per_m, c.surface_layer_c))
+        layered = gradient[:, None] * z + layer[:, None] * (1.0 - np.exp(-z / c.surface_layer_m))
+        level = c.temperature_c + self._day(seconds) + drift[:, 0]
+        temperature = level[:, None] + self.stratification * layered + points[..., :2] @ self.slope
+        pressure = (c.pressure_hpa + drift[:, 1])[:, None] - self.stratification * PRESSURE_LAPSE_HPA_PER_M * z
+        # vapour is well mixed: its pressure is one, relative humidity changes with temperature
+        vapour = saturation_hpa(self.dew_point_c + drift[:, 2], c.pressure_hpa)
+        humidity = np.minimum(100.0 * vapour[:, None] / saturation_hpa(temperature, pressure), 100.0)
+        return temperature, pressure, humidity
+
+    def index(self, points: Array, seconds: Array) -> Array:
+        """Group index (k,) at points (k, 3)."""
+        return 1.0 + PPM * group_refractivity_ppm(*self.weather(points[:, None], seconds))[:, 0]
+
+    def along(self, start: Array, end: Array, seconds: Array) -> tuple[Array, Array, Array]:
+        """Straight lines from start to end, points (k, 3): their mean group index, that at the end, and the share of
+        amplitude that a retroreflector outside at the end keeps, wet below the dew point; (k,) each.
+
+        By quadrature; the ray itself is bent, by less than 0.1 um of path here.
+        """
+        on = start[:, None] + (end - start)[:, None] * np.append(SHARES, 1.0)[:, None]
+        weather = self.weather(on, seconds)
+        index = 1.0 + PPM * group_refractivity_ppm(*weather)
+        temperature_c, pressure_hpa, humidity_percent = (v[:, -1] for v in weather)
+        kept = self._kept(temperature_c, pressure_hpa, humidity_percent, seconds)
+        return index[:, :-1] @ WEIGHTS, index[:, -1], kept
+
+    def _kept(self, temperature_c: Array, pressure_hpa: Array, humidity_percent: Array, seconds: Array) -> Array:
+        """Share of amplitude (k,) that glass outside keeps: it is colder than the air by what it radiates at night."""
+        calm = 1.0 / (1.0 + self.conditions.wind_m_s / 4.0)
+        cooling = self.conditions.sky_cooling_c * calm * (1.0 - self.sunshine(seconds))
+        dew_point = _dew_point_c(saturation_hpa(temperature_c, pressure_hpa) * humidity_percent / 100.0, pressure_hpa)
+        below = np.clip((dew_point - temperature_c + cooling) / WET_WIDTH_C, -50.0, 50.0)
+        return 1.0 - self.dew * (1.0 - WET) / (1.0 + np.exp(-below))
+
+
+def _dew_point_c(vapour_hpa: ArrayLike, pressure_hpa: ArrayLike) -> Array:
+    """Temperature at which vapour is saturated, °C: the inverse of `saturation_hpa`."""
+    ratio = np.log(np.asarray(vapour_hpa) / (6.1121 * (1.0007 + 3.46e-6 * np.asarray(pressure_hpa))))
+    return 240.97 * ratio / (17.502 - ratio)
+
+
+def station_places(site: SiteFolder, streams: Streams) -> dict[str, Array]:
+    """Where the weather stations stand (3,), m, ground: at their elevation; 130 m out, bearings drawn (chosen)."""
+    places = {}
+    for station in site.site.weather_station:
+        bearing = streams(f"weather station/{station.name}").uniform(0.0, 360.0) * DEGREE
+        z = station.elevation_m - site.site.site.elevation_of_z0_m
+        places[station.name] = np.array([130.0 * np.sin(bearing), 130.0 * np.cos(bearing), z])
+    return places

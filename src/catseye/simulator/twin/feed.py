@@ -1,0 +1,192 @@
+"""The site's feed: what its weather stations read and where the telescope says it is, in lines of the ZY language.
+
+    HELLO This is SITE gbt ver. 1 · CONNECT 1, port          the greeting, and then, unasked, TID 0, TS of the reading:
+    WX 1, station, temperature_c, pressure_hpa, humidity_percent          `none` where the sensor is silent
+    TEL 1, azimuth_deg, elevation_deg, azimuth_rate_deg_s, elevation_rate_deg_s
+
+A station that says nothing at all has no line. `bye` ends a connection, all else that a client says is not read.
+"""
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE
+from catseye.errors import InputError
+from catseye.geometry.time_tag import PER_SECOND
+from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
+from catseye.ranger.network import Listener, Network, Sockets
+from catseye.records.live import LiveWeather
+from catseye.simulator.clock.world_clock import Clock
+from catseye.simulator.twin.faults import FaultBoard
+
+WEATHER_EVERY = 10.0  # s
+POSTURES_A_SECOND = 10
+MOST_CLIENTS = 32
+MOST_UNSENT = 2**20  # bytes that a client does not take: an hour and a half of lines
+VERSION = "1"
+LOG = logging.getLogger(__name__)
+
+
+class FeedWorld(Protocol):
+    """What the feed tells of; `Twin` is one."""
+
+    faults: FaultBoard
+
+    def seconds(self, ns: int, /) -> float:
+        """s since the start, of nanoseconds since MJD 0."""
+        ...
+
+    def posture(self, seconds: float, /) -> Sequence[NDArray[np.float64]]:
+        """Azimuth, elevation, rad, and their rates, rad/s, each (1,) or a number: what the encoders tell."""
+        ...
+
+    def weather(self, station: str, seconds: float, /) -> LiveWeather:
+        """What a station reads."""
+        ...
+
+
+class SiteFeed:
+    """A server of the feed language, for many clients.
+
+    name       of the site
+    stations   of weather
+    world      what it tells of
+    clock      UTC, the stamps of the readings
+    """
+
+    def __init__(
+        self,
+        name: str,
+        stations: Sequence[str],
+        world: FeedWorld,
+        clock: Clock,
+        *,
+        weather_every: float = WEATHER_EVERY,
+        network: Network | None = None,
+    ):
+        if weather_every <= 0.0:
+            raise InputError(f"weather every {weather_every:g} s (expected more than 0)")
+        self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
+        self._network: Network = network or Sockets()
+        self._weather_ns = round(weather_every * PER_SECOND)
+        self._listener: Listener | None = None
+        self.clients: set[FeedConnection] = set()
+        self.port = 0
+
+    async def start(self, host: str, port: int) -> None:
+        """Listen. Raises InputError where the port cannot be had."""
+        try:
+            self._listener = await self._network.serve(self._joining, host, port)
+        except OSError as problem:
+            raise InputError(
+                f"feed: {host} port {port} cannot be had: {problem.strerror or problem} (expected a free one)"
+            ) from problem
+        self.port = self._listener.port
+
+    async def stop(self) -> None:
+        """Close the connections and listen no more."""
+        for client in tuple(self.clients):
+            client.close()
+        if self._listener is not None:
+            listener, self._listener = self._listener, None
+            await listener.close()
+
+    async def serve(self) -> None:
+        """Tell every reading at its time, until cancelled; `start` first. What is late is left out, not caught up."""
+        step = PER_SECOND // POSTURES_A_SECOND
+        next_weather = 0
+        while True:
+            now = self.clock.now_ns()
+            ticks = nanoseconds_to_ticks(now)
+            if now >= next_weather:
+                next_weather = now - now % self._weather_ns + self._weather_ns
+                self._send(b"".join(self._weather(ticks)))
+            self._send(self._posture(ticks))
+            now = self.clock.now_ns()
+            await asyncio.sleep((step - now % step) / PER_SECOND)
+
+    def greeting(self) -> bytes:
+        """What a new client hears: who this is, and the weather, read now: what is older than 5 s nobody would use."""
+        ticks = nanoseconds_to_ticks(self.clock.now_ns())
+        hello = Reply("HELLO", None, (f"This is SITE {self.name} ver. {VERSION}",), 0, ticks)
+        connected = Reply("CONNECT", True, (str(self.port),), 0, ticks)
+        return b"".join([_line(hello), _line(connected), *self._weather(ticks)])
+
+    def _joining(self) -> "FeedConnection":
+        return FeedConnection(self)
+
+    def _send(self, data: bytes) -> None:
+        for client in tuple(self.clients):
+            client.write(data)
+
+    def _weather(self, ticks: int) -> list[bytes]:
+        told = []
+        for station in self.stations:
+            read = self.world.weather(station, self.world.seconds(ticks * TICK_NS))
+            values = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
+            if np.isfinite(values).any():
+                said = (
+                    f"{v:.{digits}f}" if np.isfinite(v) else "none" for v, digits in zip(values, (3, 3, 2), strict=True)
+                )
+                told.append(_line(Reply("WX", True, (station, *said), 0, ticks)))
+        return told
+
+    def _posture(self, ticks: int) -> bytes:
+        """The place at exactly the stamp's time."""
+        seconds = self.world.seconds(ticks * TICK_NS)
+        if self.world.faults.active("silent-telescope", "telescope", at=seconds) is not None:
+            return b""
+        angles = (np.asarray(v, dtype=float).item() / DEGREE for v in self.world.posture(seconds))
+        return _line(Reply("TEL", True, tuple(f"{v:.9f}" for v in angles), 0, ticks))
+
+
+class FeedConnection(asyncio.Protocol):
+    """One client of the feed."""
+
+    def __init__(self, feed: SiteFeed):
+        self._feed = feed
+        self._transport: asyncio.Transport | None = None
+        self._unread = b""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        if len(self._feed.clients) >= MOST_CLIENTS:
+            text = f"{MOST_CLIENTS} clients listen already (expected fewer)"
+            ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
+            transport.write(_line(Reply("CONNECT", False, (text,), 0, ticks)))
+            transport.close()
+            return
+        self._feed.clients.add(self)
+        self.write(self._feed.greeting())
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._feed.clients.discard(self)
+
+    def data_received(self, data: bytes) -> None:
+        *lines, rest = (self._unread + data).split(b"\n")
+        if any(line.strip().lower() == b"bye" for line in lines):
+            self.close()
+        self._unread = rest[-LONGEST_REQUEST:]
+
+    def write(self, data: bytes) -> None:
+        """Send; who does not take it is cut off."""
+        if self._transport is None or self._transport.is_closing() or not data:
+            return
+        self._transport.write(data)
+        if self._transport.get_write_buffer_size() > MOST_UNSENT:
+            LOG.warning("feed: a client is cut off: more than %d bytes not taken", MOST_UNSENT)
+            self._transport.abort()
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.close()
+
+
+def _line(reply: Reply) -> bytes:
+    return format_reply(reply).encode("ascii") + b"\n"

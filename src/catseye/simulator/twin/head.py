@@ -1,0 +1,277 @@
+"""The hardware of one ranger of the twin, behind the Head that its server knows: mirror, converter, clock, power.
+
+No thread and no sleep: at each call the head looks at the clock and lets the past happen, servo and all. While a mirror
+rests, its past is not computed at all. A return is sampled along the beam's true way during the buffer.
+
+Five zeros as filter mean the head's own tuning: a ranger loads them at its boot, and they drive nothing.
+"""
+
+from math import ceil
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import TWO_PI
+from catseye.errors import InputError
+from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
+from catseye.ranger.head import Buffer, Homing, Sampling
+from catseye.ranger.motion_units import CLOCK_HZ, CLOCKS_PER_SAMPLE, SAMPLE_TIME
+from catseye.simulator.clock.world_clock import Clock
+from catseye.simulator.night.faults import Streams
+from catseye.simulator.night.head import VOLT_PER_CODE
+from catseye.simulator.twin.converter import Converter
+from catseye.simulator.twin.faults import FaultBoard
+from catseye.simulator.twin.mirror import NEAR_STOP, TRAVEL, MirrorTuning, Track, TwinMirror
+
+POINTS = 24  # along a buffer, where mirror and return are looked at: 5.3 ms of 128 ms
+LONGEST_STEP = 15  # samples between two of them, 5 ms, in longer buffers
+MOST_POINTS = 4096  # a buffer of more than 20 s is looked at less often
+LARGEST_CLOCK_ERROR = 5e-4  # s, of a clock that follows its time signal: a pulse per second and IRIG-B
+BEHIND = 3_000  # samples that a head may be behind before a call that asks for nothing else catches up, 1 s
+SUPPLIES = {"+5": 5.0, "+12": 12.0, "-12": -12.0, "+24": 24.0}  # V
+
+
+class World(Protocol):
+    """What a head needs of the site's truth."""
+
+    def seconds(self, ns: int, /) -> float:
+        """s since the twin's start, of nanoseconds since MJD 0."""
+        ...
+
+    def phasors(
+        self, ranger: str, counts: NDArray[np.float64], seconds: NDArray[np.float64], /
+    ) -> NDArray[np.complex128]:
+        """What returns (k,), V, with the mirror truly at counts (k, 2) from its indices at times (k,)."""
+        ...
+
+
+class TwinHead:
+    """A `ranger.head.Head` of the twin.
+
+    ranger        whose it is
+    world         the site's truth
+    clock         true UTC
+    seed          of the twin: where the mirror stands at power on, offset, noise
+    faults        of the twin: stuck-axis, lost-index, saturated-adc, drifting-clock are the head's
+    tuning        how the mirror is driven where no command says it
+    travel        counts between the stops of azimuth and elevation: `twin_mirror.travel_of(record)`
+    clock_error   s, the most that the head's clock is off while it follows its time signal
+    converter     its electronics; drawn by the seed if None
+
+    Raises InputError: stops that leave the index out, or hold it twice.
+    """
+
+    def __init__(
+        self,
+        ranger: str,
+        world: World,
+        clock: Clock,
+        *,
+        seed: int,
+        faults: FaultBoard | None = None,
+        tuning: MirrorTuning | None = None,
+        travel: tuple[tuple[float, float], tuple[float, float]] = TRAVEL,
+        clock_error: float = LARGEST_CLOCK_ERROR,
+        converter: Converter | None = None,
+    ):
+        self.ranger, self._world, self._clock, self._seed = ranger, world, clock, seed
+        self._faults = FaultBoard() if faults is None else faults
+        rng = Streams(seed)(f"head/{ranger}")
+        self._boot = clock.now_ns()
+        self._mirror = TwinMirror(
+            ranger,
+            np.array([rng.uniform(low + NEAR_STOP, high - NEAR_STOP) for low, high in travel]),
+            travel=travel,
+            tuning=tuning,
+            faults=self._faults,
+            origin=world.seconds(self._boot),
+        )
+        self._offset = round(rng.uniform(-clock_error, clock_error) * PER_SECOND)
+        self._set_at, self._latest = -float("inf"), 0
+        self._converter = converter or Converter.of(ranger, seed)
+        self._supplies = {name: volt * (1.0 + 0.01 * rng.uniform(-1.0, 1.0)) for name, volt in SUPPLIES.items()}
+        self._warmth = rng.uniform(24.0, 30.0), rng.uniform(1.0, 3.0), rng.uniform(0.0, TWO_PI)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._taking: tuple[Sampling, int, TimeTag, bool] | None = None
+        self._last: Buffer | None = None
+        self._laser = True
+
+    # Time -----------------------------------------------------------------------------------------------------------
+
+    def now(self) -> TimeTag:
+        """UTC of the head's clock; one that ran ahead stands still until true time has caught up."""
+        reading = self._reading(self._clock.now_ns())
+        return TimeTag(np.asarray(reading // PER_DAY), np.asarray(reading % PER_DAY))
+
+    def now_ns(self) -> int:
+        """The same, nanoseconds since MJD 0: what a server asks a thousand times a second."""
+        return self._reading(self._clock.now_ns())
+
+    def _reading(self, now: int) -> int:
+        seconds = self._world.seconds(now)
+        fault = self._faults.active("drifting-clock", self.ranger, at=seconds)
+        drift = 0.0 if fault is None else fault.size * (seconds - max(fault.start, self._set_at))
+        self._latest = max(self._latest, now + self._offset + round(drift * PER_SECOND))
+        return self._latest
+
+    def set_clock(self, tag: TimeTag) -> None:
+        """Set the clock; what drifts goes on from there."""
+        now = self._clock.now_ns()
+        self._set_at = self._world.seconds(now)
+        self._latest = _nanoseconds(tag)
+        self._offset = self._latest - now
+
+    def clock_locked(self) -> bool:
+        """Whether the clock follows its time signal."""
+        now = self._world.seconds(self._clock.now_ns())
+        return self._faults.active("drifting-clock", self.ranger, at=now) is None
+
+    def _sample_of(self, ns: int) -> int:
+        """Samples of the motion chips until a time, exact."""
+        return (ns - self._boot) * round(CLOCK_HZ) // (CLOCKS_PER_SAMPLE * PER_SECOND)
+
+    def _caught_up(self, *, exactly: bool = False) -> TwinMirror:
+        """The mirror as it is now; `exactly` in time, too, where a command follows."""
+        if exactly or not self._mirror.idle:
+            self._mirror.pass_to(self._sample_of(self._clock.now_ns()))
+        return self._mirror
+
+    # Buffers --------------------------------------------------------------------------------------------------------
+
+    def trigger(self, sampling: Sampling) -> None:
+        """Begin to take a buffer; one being taken is given up."""
+        now = self._clock.now_ns()
+        self._taking, self._last = (sampling, now, self.now(), self._laser), None
+        first, last = self._sample_of(now), self._sample_of(now + _duration_ns(sampling))
+        most = max(1, last - first)
+        step = max(1, min(most // POINTS, LONGEST_STEP), ceil(most / MOST_POINTS))
+        mirror = self._caught_up(exactly=True)
+        mirror.mark([*range(first, first + most, step), first + most])
+
+    def buffer(self) -> Buffer | None:
+        """The last buffer whole; None before the first and while one is being taken."""
+        if self._taking is not None:
+            sampling, begun, tag, lit = self._taking
+            now = self._clock.now_ns()
+            if now < begun + _duration_ns(sampling):
+                if self._sample_of(now) - self._mirror.samples > BEHIND:
+                    self._caught_up()
+                return None
+            self._mirror.pass_to(max(self._sample_of(now), self._sample_of(begun) + 1))
+            self._last = Buffer(self._codes(sampling, begun, lit), tag, sampling, VOLT_PER_CODE)
+            self._taking = None
+        return self._last
+
+    def _codes(self, sampling: Sampling, begun: int, lit: bool) -> NDArray[np.int16]:
+        """What the converter made of the return along the way that the mirror went."""
+        since_boot = np.array([sample for sample, _ in self._mirror.marked]) * SAMPLE_TIME
+        counts = np.array([counts for _, counts in self._mirror.marked])
+        seconds = self._mirror.origin + since_boot
+        phasors = self._world.phasors(self.ranger, counts, seconds) if lit else np.zeros(len(seconds), dtype=complex)
+        fault = self._faults.active("saturated-adc", self.ranger, at=self._world.seconds(begun))
+        return self._converter.codes(
+            since_boot - (begun - self._boot) / PER_SECOND,
+            phasors,
+            sampling=sampling,
+            generator=Streams(self._seed)(f"buffer/{self.ranger}/{begun}"),
+            gain=1.0 if fault is None else fault.size,
+        )
+
+    # Axes -----------------------------------------------------------------------------------------------------------
+
+    def enable(self, axis: int, on: bool) -> None:
+        """The amplifier of an axis; off at boot."""
+        self._caught_up(exactly=True).enable(axis, on)
+
+    def enabled(self, axis: int) -> bool:
+        """Whether the amplifier is on."""
+        return self._mirror.enabled(axis)
+
+    def actual(self, axis: int) -> int:
+        """Where the encoder says the axis is: counts from the index once homed, from where it stood before."""
+        return self._caught_up().axes.actual(axis)
+
+    def desired(self, axis: int) -> int:
+        """Where the profile wants it, counts."""
+        return self._caught_up().axes.desired(axis)
+
+    def start(self, axis: int, position: int, *, velocity: int, acceleration: int) -> bool:
+        """Begin a trapezoidal move in the motion chip's integers; a track is given up for it."""
+        return self._caught_up(exactly=True).start(axis, position, velocity=velocity, acceleration=acceleration)
+
+    def follow(self, counts: tuple[NDArray[np.float64], NDArray[np.float64]], when: tuple[TimeTag, TimeTag]) -> bool:
+        """Follow counts (2,) linearly from the first time of the head's clock to the second, held at the ends.
+
+        Raises InputError: the second time is not after the first.
+        """
+        now = self._clock.now_ns()
+        ahead = now - self._reading(now)
+        begin, end = ((_nanoseconds(tag) + ahead - self._boot) / PER_SECOND / SAMPLE_TIME for tag in when)
+        if not begin < end:
+            raise InputError(f"{self.ranger}: a track from {when[0].text()} to {when[1].text()} (expected later)")
+        return self._caught_up(exactly=True).follow(Track((begin, end), counts))
+
+    def moving(self, axis: int) -> bool:
+        """Whether a profile, a track, or a search for the index, is under way."""
+        mirror = self._caught_up()
+        return mirror.following or mirror.homing[axis] == "searching" or not mirror.axes.complete(axis)
+
+    def motor_off(self, axis: int) -> bool:
+        """Whether the chip switched the motor off: position error past its limit. The next move clears it."""
+        axes = self._caught_up().axes
+        return axes.motor_off(axis) and axes.excessive(axis)
+
+    def set_filter(self, axis: int, values: tuple[int, int, int, int, int]) -> None:
+        """Filter: kp, ki, kd, integration limit, derivative interval; five zeros: the head's own."""
+        self._caught_up(exactly=True).set_filter(axis, values)
+
+    def set_error_limit(self, axis: int, counts: int) -> None:
+        """Position error past which the motor goes off."""
+        self._caught_up(exactly=True).set_error_limit(axis, counts)
+
+    def find_home(self, axis: int) -> None:
+        """Begin to look for the index, which becomes zero."""
+        self._caught_up(exactly=True).find_home(axis)
+
+    def homing(self, axis: int) -> Homing:
+        """How the last search stands."""
+        return self._caught_up().homing[axis]
+
+    def stop(self) -> None:
+        """Both axes slow down; a search or a track is given up."""
+        self._caught_up(exactly=True).stop()
+
+    # Power ----------------------------------------------------------------------------------------------------------
+
+    def switch_laser(self, on: bool) -> None:
+        """The laser's power: counts from the next buffer on."""
+        self._laser = on
+
+    def laser_on(self) -> bool:
+        """Whether the laser shines."""
+        return self._laser
+
+    def supplies(self) -> dict[str, float]:
+        """Power supplies by name, V: within 1 % of their names."""
+        return dict(self._supplies)
+
+    def enclosure_temperature_c(self) -> float:
+        """Temperature in the enclosure: slow, warmer in the afternoon (UTC of the clock)."""
+        mean, swing, phase = self._warmth
+        return mean + swing * float(np.sin(TWO_PI * (self._clock.now_ns() % PER_DAY) / PER_DAY + phase))
+
+    def reset(self) -> None:
+        """As when power comes on: amplifiers off, nothing homed, no buffer, laser on; the mirror stays where it is."""
+        self._caught_up(exactly=True).reset()
+        self._forget()
+
+
+def _nanoseconds(tag: TimeTag) -> int:
+    return int(tag.day) * PER_DAY + int(tag.nanoseconds)
+
+
+def _duration_ns(sampling: Sampling) -> int:
+    return sampling.cycles * PER_SECOND // sampling.frequency_hz

@@ -1,0 +1,91 @@
+"""What comes back to a living ranger: the way of the light, its strength, and the phase of the electronics."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE, TWO_PI
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.night.head import DRIFT_RAD_PER_ROOT_HOUR
+from catseye.simulator.twin.targets import Retro
+from catseye.simulator.twin.waves import Waves, correlated, joined, walk
+
+Array = NDArray[np.float64]
+SPOT = 0.014  # m: amplitude exp(-d^2 / 2 SPOT^2) where the beam passes the middle at d: 10 mm of beam and the receiver
+CUBE_RADIUS = 0.005  # m, of what the internal cube takes: some hundred counts
+PRISM_END = 45.0 * DEGREE  # incidence at which a prism's aperture is gone
+BALL_FULL, BALL_END = 60.0 * DEGREE, 79.0 * DEGREE  # off a ball's axis
+SCINTILLATION, FLICKER = 0.022, 0.3  # of amplitude, one sigma; s of correlation
+GUST, SPELL = 4.0, 1800.0  # s of correlation of a path's index: turbulence, and what is local to the path
+GUST_SHARE = 0.7  # of its standard deviation that is turbulence; the squares of both shares make one
+
+
+def prism_way(height: float, cosine: Array, *, group: float, phase: float) -> Array:
+    """Way that a prism adds to its reference point, one way, air metres (k,), at cosines of incidence (k,).
+
+    height         apex below the entry face, m; the reference point lies height / group below the face
+    group, phase   indices of the glass over air's: how long it takes, and how it bends
+
+    By a ray through the prism unfolded about its apex, a slab of twice the height, between the plane wavefronts through
+    the reference point and through its image.
+
+    >>> bool(np.isclose(prism_way(0.038205, np.array([1.0]), group=1.527077, phase=1.511)[0], 0.0333236, atol=1e-7))
+    True
+    """
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / phase  # inside the glass
+    inside = np.sqrt(1.0 - sine**2)
+    return height * (group / inside - cosine / group - phase * sine * sine / inside)
+
+
+def glass_way(retro: Retro, cosine: Array, *, group: float, phase: float, obliquity: float) -> Array:
+    """Way (k,), air metres, that a retroreflector's glass adds one way, light coming in at cosines of incidence (k,).
+
+    obliquity   factor on what the angle changes
+    """
+    if retro.kind == "ball":
+        r1, r2 = retro.sizes
+        return np.full_like(cosine, group * (r1 + r2) - r1)
+    if retro.kind == "hollow" or not retro.sizes:
+        return np.zeros_like(cosine)
+    straight = (group - 1.0 / group) * retro.sizes[0]
+    return straight + obliquity * (prism_way(retro.sizes[0], cosine, group=group, phase=phase) - straight)
+
+
+def acceptance(retro: Retro, cosine: Array) -> Array:
+    """Share of amplitude (k,) that comes back at cosines (k,) of the angle off where the retroreflector looks."""
+    if retro.facing is None:
+        return np.ones_like(cosine)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    if retro.kind == "ball":
+        past = np.clip((angle - BALL_FULL) / (BALL_END - BALL_FULL), 0.0, 1.0)
+        return 1.0 - past**2 * (3.0 - 2.0 * past)
+    return np.where(angle < PRISM_END, np.cos(2.0 * np.minimum(angle, PRISM_END)), 0.0)
+
+
+def path_waves(ranger: str, target: str, *, index_ppm: float, streams: Streams, planted: Planted) -> Waves:
+    """Noise of one path: its index, ppm, and its amplitude's relative change; 2 channels."""
+    rng = streams(f"path noise/{ranger}/{target}")
+    ppm = planted.gain("index_fluctuation") * index_ppm
+    gust = correlated(rng, GUST_SHARE * ppm, GUST)
+    spell = correlated(rng, np.sqrt(1.0 - GUST_SHARE**2) * ppm, SPELL)
+    flicker = correlated(rng, planted.gain("scintillation") * SCINTILLATION, FLICKER)
+    whole = joined(gust, spell, flicker)
+    mixing = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    return Waves(whole.omega, whole.cosine @ mixing, whole.sine @ mixing, np.zeros(2))
+
+
+class Electronics:
+    """Phase of a head's electronics: a random walk of 10 mrad in the root of an hour; every third warms up.
+
+    It is a sum of waves with a 1/f^2 spectrum (`twin_waves.walk`): smooth below 5 s, a walk up to some days.
+    """
+
+    def __init__(self, ranger: str, streams: Streams, planted: Planted):
+        rng = streams(f"electronics/{ranger}")
+        self._start, warms, rise = rng.uniform(0.0, TWO_PI), rng.uniform() < 1.0 / 3.0, rng.uniform(0.010, 0.030)
+        self._rise = planted.gain("warm_up") * warms * rise * rng.choice((-1.0, 1.0))
+        step = planted.gain("drift") * DRIFT_RAD_PER_ROOT_HOUR / 60.0
+        self._walk = walk(rng, step, shortest=5.0)
+
+    def __call__(self, seconds: Array) -> Array:
+        """rad (k,), at times (k,) since the start."""
+        return self._start + self._walk(seconds)[:, 0] + self._rise * np.exp(-np.maximum(seconds, 0.0) / 300.0)

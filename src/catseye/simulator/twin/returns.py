@@ -1,0 +1,168 @@
+"""What a beam falls on, and what comes back of it: the phasors of a living site's rangers."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import SPEED_OF_LIGHT, TWO_PI
+from catseye.records.site import Ranging
+from catseye.records.site_folder import REFERENCE
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.night.head import REFERENCE_VOLT
+from catseye.simulator.twin.air import LivingAir
+from catseye.simulator.twin.faults import FaultBoard
+from catseye.simulator.twin.light import CUBE_RADIUS, SPOT, Electronics, acceptance, glass_way, path_waves
+from catseye.simulator.twin.scene import Beam, Scene
+from catseye.simulator.twin.stations import Station, reference_cube
+from catseye.simulator.twin.telescope import Standing
+from catseye.simulator.twin.waves import Waves
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is looked at three times
+SWEEP = 0.1  # m
+
+
+class Meeting(NamedTuple):
+    """A beam and one retroreflector at k times.
+
+    along, off   (k,) m: how far along the beam its point lies, and how far off it
+    cosine       (k,) of the angle off where it looks
+    """
+
+    along: Array
+    off: Array
+    cosine: Array
+
+
+class Returns:
+    """The light of a living site.
+
+    scene, air   where things are, and what is between them
+    faults       blocked-beam, wrong-target, dew
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        air: LivingAir,
+        ranging: Ranging,
+        *,
+        faults: FaultBoard,
+        streams: Streams,
+        planted: Planted,
+    ):
+        self._scene, self._air, self._faults, self._streams, self._planted = scene, air, faults, streams, planted
+        self.radians_per_metre = 2.0 * TWO_PI * ranging.modulation_hz / SPEED_OF_LIGHT  # of one-way optical path
+        self._group = ranging.bk7_to_air_group_index_ratio
+        self._bending = ranging.bk7_to_air_phase_index_ratio or self._group
+        self._index_ppm = air.conditions.turbulence * ranging.path_index_fluctuation_ppm
+        self.electronics = {name: Electronics(name, streams, planted) for name in scene.stations}
+        self._cubes = {name: reference_cube(station) for name, station in scene.stations.items()}
+        self._paths: dict[tuple[str, str], tuple[Waves, float]] = {}
+
+    def lit(self, ranger: str, counts: Array, t: Array, standing: Standing) -> str | None:
+        """The retroreflector on which a beam falls at counts (1, 2) and one time (1,), the nearest; None: on none."""
+        if self._off_cube(self._scene.station(ranger), counts)[0][0] < CUBE_RADIUS:
+            return REFERENCE
+        beam = self.beam(ranger, counts, t, standing)
+        taken: dict[str, float] = {}
+        for name in self._scene.near(beam, standing, 0):
+            retro, meeting = self._scene.retros[name], self._meeting(name, beam, t, standing)
+            if meeting.off[0] < retro.radius and acceptance(retro, meeting.cosine)[0] > 0.0:
+                taken[name] = float(meeting.off[0])
+        return min(taken, key=lambda name: taken[name], default=None)
+
+    def beam(self, ranger: str, counts: Array, t: Array, standing: Standing) -> Beam:
+        """Where the light goes at what the encoders read (k, 2)."""
+        return self._scene.beam(self._scene.frame(ranger, t, standing), self._scene.station(ranger).ray(counts))
+
+    def phasors(
+        self, ranger: str, counts: Array, t: Array, standing: Standing, *, among: tuple[str, ...] | None = None
+    ) -> Complex:
+        """What returns (k,), V, at counts (k, 2) and times (k,), and what leaks.
+
+        among   names that the beam may fall on, where they are known; None: they are looked for
+        """
+        station = self._scene.station(ranger)
+        turned = np.exp(1j * self.electronics[ranger](t))
+        if among is None or REFERENCE in among:
+            off, way = self._off_cube(station, counts)
+            if np.any(off < CUBE_RADIUS):
+                return station.leakage + turned * self._reference(ranger, off, way, t, standing)
+        beam = self.beam(ranger, counts, t, standing)
+        found = np.zeros(len(t), dtype=complex)
+        for name in self._near(beam, standing) if among is None else among:
+            found = found + self._return(ranger, name, beam, t, standing)
+        return station.leakage + turned * found
+
+    def _near(self, beam: Beam, standing: Standing) -> list[str]:
+        """Names of what the beam may fall on at any of its times."""
+        last = len(beam.way) - 1
+        sweep = FARTHEST * float(np.max(np.abs(beam.direction[-1] - beam.direction[0])))
+        at = (last // 2,) if sweep < SWEEP else (0, last // 2, last)
+        return list(dict.fromkeys(name for k in at for name in self._scene.near(beam, standing, k)))
+
+    def _meeting(self, name: str, beam: Beam, t: Array, standing: Standing) -> Meeting:
+        sight = self._scene.point(name, t, standing) - beam.origin
+        along = np.einsum("ij,ij->i", sight, beam.direction)
+        aside = sight - along[:, None] * beam.direction
+        facing = self._scene.facing(name, standing)
+        cosine = np.ones(len(t)) if facing is None else -np.einsum("ij,ij->i", facing, beam.direction)
+        return Meeting(along, np.sqrt(np.einsum("ij,ij->i", aside, aside)), cosine)
+
+    def _return(self, ranger: str, name: str, beam: Beam, t: Array, standing: Standing) -> Complex:
+        """What one retroreflector returns (k,), V, but for the electronics' phase."""
+        retro, at = self._scene.retros[name], float(t[len(t) // 2])
+        met = self._meeting(name, beam, t, standing)
+        accepted = np.where(met.off < retro.radius, acceptance(retro, met.cosine), 0.0)
+        if not accepted.any() or self._faults.active("blocked-beam", ranger, name, at=at) is not None:
+            return np.zeros(len(t), dtype=complex)
+        noise, draw = self._path(ranger, name)
+        ppm, flicker = noise(t).T
+        place = beam.origin + met.along[:, None] * beam.direction
+        index, end_index, dry = self._air.along(beam.origin, place, t)
+        usual = retro.volts[0] + (retro.volts[1] - retro.volts[0]) * draw
+        dew = self._faults.active("dew", name, at=at)
+        usual *= 1.0 if dew is None else dew.size
+        volts = usual * accepted * (1.0 + flicker) * dry * np.exp(-0.5 * (met.off / SPOT) ** 2)
+        obliquity = self._planted.gain("obliquity")
+        glass = glass_way(retro, met.cosine, group=self._group, phase=self._bending, obliquity=obliquity)
+        wrong = self._faults.active("wrong-target", ranger, name, at=at)
+        length = beam.way + met.along + (0.0 if wrong is None else wrong.size)
+        phase = -self.radians_per_metre * ((index + 1e-6 * ppm) * length + end_index * glass)
+        return volts * np.exp(1j * (phase + self._coupled(self._scene.stations[ranger], volts, phase)))
+
+    def _coupled(self, station: Station, volts: Array, phase: Array) -> Array | float:
+        """Phase that a head adds by amplitude and by phase (k,), rad; to the reference it adds none."""
+        added: Array | float = 0.0
+        if station.amplitude_to_phase:
+            added = station.amplitude_to_phase * np.log(np.maximum(volts, 1e-6) / REFERENCE_VOLT)
+        if station.cyclic.size:
+            angle = phase[:, None] * np.arange(1, station.cyclic.shape[1] + 1)
+            long = np.cos(angle) @ station.cyclic[0] + np.sin(angle) @ station.cyclic[1]
+            added = added - self.radians_per_metre * long
+        return added
+
+    def _off_cube(self, station: Station, counts: Array) -> tuple[Array, Array]:
+        """How far the beam passes the internal cube (k,), m, and the way of the light to it (k,), m."""
+        ray, (cube, _) = station.ray(counts), self._cubes[station.name]
+        sight = cube - ray.leaves
+        along = np.einsum("ij,ij->i", sight, ray.direction)
+        aside = sight - along[:, None] * ray.direction
+        off = np.sqrt(np.einsum("ij,ij->i", aside, aside))
+        return np.where(along > 0.0, off, np.inf), ray.way + along
+
+    def _reference(self, ranger: str, off: Array, way: Array, t: Array, standing: Standing) -> Complex:
+        """What the internal cube returns (k,), V, but for the electronics' phase: nothing blocks or wets it."""
+        volts = np.where(off < CUBE_RADIUS, REFERENCE_VOLT * np.exp(-0.5 * (off / SPOT) ** 2), 0.0)
+        index = self._air.index(self._scene.point(ranger, t, standing), t)
+        return volts * np.exp(-1j * self.radians_per_metre * index * way)
+
+    def _path(self, ranger: str, name: str) -> tuple[Waves, float]:
+        """Noise of a path, and where between least and most its usual amplitude is: drawn when first asked for."""
+        if (ranger, name) not in self._paths:
+            noise = path_waves(ranger, name, index_ppm=self._index_ppm, streams=self._streams, planted=self._planted)
+            self._paths[ranger, name] = noise, float(self._streams(f"path/{ranger}/{name}").uniform())
+        return self._paths[ranger, name]

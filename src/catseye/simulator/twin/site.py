@@ -1,0 +1,226 @@
+"""The truth of a living site: what stands where, what light comes back, what instruments read, at any time.
+
+A twin is a pure function of its arguments and of time: nothing is stepped or stored, so that processes which make the
+same twin agree without talking. Only faults come and go, by the board that is handed in. Times are s since the start,
+arrays (k,); places m, ground frame. Where its parts are:
+
+    twin_motion      where the telescope's axes turn          twin_air       weather, index, dew
+    twin_telescope   how it stands and bends                  twin_stations  rangers and their mirrors
+    twin_targets     where everything truly rests             twin_light     glass, acceptance, noise
+    twin_scene       all of these at a time                   twin_returns   what comes back
+
+Left out, as below 1 um here: the time of flight (0.3 um at the rim in a slew), the bending of rays. What is not here at
+all: things that stand in a beam's way.
+"""
+
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import InputError
+from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.ranger.head import Sampling
+from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.night.head import VOLT_PER_CODE
+from catseye.simulator.twin.air import LivingAir, station_places
+from catseye.simulator.twin.conditions import LIVING_NIGHT, LivingConditions
+from catseye.simulator.twin.converter import Converter
+from catseye.simulator.twin.faults import FaultBoard
+from catseye.simulator.twin.motion import Angles, Motion
+from catseye.simulator.twin.returns import Returns
+from catseye.simulator.twin.scene import Beam, Scene, StationFrame
+from catseye.simulator.twin.telescope import Standing, telescope
+
+Array = NDArray[np.float64]
+NS_PER_TICK = PER_DAY // TICKS_PER_DAY
+READ_SCATTER = (0.05, 0.05, 0.5)  # °C, hPa, %: one sigma of a reading, as the night's stations have
+POINTS, POINTS_A_SECOND = 17, 125.0  # of a buffer at which a shot's return is looked at: 8 ms apart
+RATE_STEP = 1e-3  # s
+
+
+class Drawn(TypedDict):
+    """What every part of a twin is drawn with."""
+
+    streams: Streams
+    planted: Planted
+
+
+class Twin:
+    """A living site.
+
+    site         its records: what the truth is drawn around
+    seed         of every draw
+    start_mjd    UTC, where its seconds begin
+    motion       of the telescope
+    conditions   of the weather
+    faults       what goes wrong, and when; may change while it runs
+    planted      changes of the truth: shifts, D0, effects left out (`LivingPlanted` knows all of them)
+
+    Raises InputError: a motion that this latitude cannot have, a planted name that the site does not have.
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        *,
+        seed: int,
+        start_mjd: float,
+        motion: Motion,
+        conditions: LivingConditions = LIVING_NIGHT,
+        faults: FaultBoard | None = None,
+        planted: Planted | None = None,
+    ):
+        self.site, self.seed = site, seed
+        self.faults = FaultBoard() if faults is None else faults
+        drawn: Drawn = {"streams": Streams(seed), "planted": Planted() if planted is None else planted}
+        self._streams, self._planted = drawn["streams"], drawn["planted"]
+        self._start_ns = round(start_mjd * PER_DAY)
+        self.air = LivingAir.of(site, conditions, start_mjd, **drawn)
+        self.telescope = telescope(site, motion, start_mjd, self.air, **drawn)
+        self.telescope.angles(np.zeros(1))  # a motion that cannot be is refused here
+        self.scene = Scene(site, **drawn)
+        self.returns = Returns(self.scene, self.air, site.site.ranging, faults=self.faults, **drawn)
+        self._converters = {name: Converter.of(name, seed) for name in self.scene.stations}
+        self._weather_at = station_places(site, self._streams)
+        self._thermometers = {
+            name: self._planted.gain("thermometer_offsets")
+            * float(self._streams(f"thermometer/{name}").normal(0.0, conditions.thermometer_offset_c))
+            for name in self._weather_at
+        }
+
+    # Time -----------------------------------------------------------------------------------------------------------
+
+    def seconds(self, ns: int, /) -> float:
+        """s since the start, of nanoseconds since MJD 0."""
+        return (ns - self._start_ns) / PER_SECOND
+
+    def seconds_of_ticks(self, ticks: int) -> float:
+        """s since the start, of ticks since MJD 0."""
+        return self.seconds(ticks * NS_PER_TICK)
+
+    def ticks(self, seconds: float) -> int:
+        """The tick nearest to a time, since MJD 0."""
+        ns = self._start_ns + round(seconds * PER_SECOND)
+        return (2 * ns + NS_PER_TICK) // (2 * NS_PER_TICK)
+
+    # Places ---------------------------------------------------------------------------------------------------------
+
+    def posture(self, seconds: ArrayLike) -> Angles:
+        """What the telescope's encoders tell: angles (k,), rad, and rates (k,), rad/s."""
+        return self.telescope.told(_times(seconds))
+
+    def told(self, ticks: int) -> LivePosture:
+        """The same at one instant, as the site's feed says it."""
+        return LivePosture(ticks, *(float(values[0]) for values in self.posture(self.seconds_of_ticks(ticks))))
+
+    def standing(self, seconds: ArrayLike) -> Standing:
+        """Where the telescope's bodies stand."""
+        return self.telescope.standing(_times(seconds))
+
+    def point(self, name: str, seconds: ArrayLike) -> Array:
+        """True place (k, 3) of a target, a triplet's part, a ranger's scan point, or its Kelvin point ("ZY105-F")."""
+        t = _times(seconds)
+        return self.scene.point(name, t, self.telescope.standing(t))
+
+    def points(self, names: list[str] | tuple[str, ...], seconds: ArrayLike) -> Array:
+        """True places (k, n, 3) of many."""
+        t = _times(seconds)
+        return self.scene.points(names, t, self.telescope.standing(t))
+
+    def truth(self, names: list[str] | tuple[str, ...], seconds: float) -> dict[str, Array]:
+        """True places (3,) of points at one time, by name: to hold an answer against."""
+        return dict(zip(names, self.points(names, seconds)[0], strict=True))
+
+    def rate(self, name: str, seconds: ArrayLike) -> Array:
+        """True velocity (k, 3), m/s, of a point, by a difference over 2 ms: good to 0.1 um/s."""
+        t = _times(seconds)
+        return (self.point(name, t + RATE_STEP) - self.point(name, t - RATE_STEP)) / (2.0 * RATE_STEP)
+
+    # Mirrors and light ----------------------------------------------------------------------------------------------
+
+    def station_frame(self, ranger: str, seconds: ArrayLike) -> StationFrame:
+        """Scan point and axes of a ranger's mirror, as they truly are."""
+        t = _times(seconds)
+        return self.scene.frame(ranger, t, self.telescope.standing(t))
+
+    def counts(self, ranger: str, name: str, seconds: ArrayLike) -> Array:
+        """What the encoders read (k, 2), not rounded, when a ranger's beam truly meets a point, ZRG too: direct."""
+        t = _times(seconds)
+        return self._counts(ranger, name, t, self.telescope.standing(t))
+
+    def _counts(self, ranger: str, name: str, t: Array, standing: Standing) -> Array:
+        station = self.scene.station(ranger)
+        if name == REFERENCE:
+            return np.broadcast_to(station.zrg, (len(t), 2))
+        if name == ranger:
+            raise InputError(f"ranger {ranger} as its own target (expected another point of the site)")
+        scan, turn = self.scene.frame(ranger, t, standing)
+        away = self.scene.point(name, t, standing) - scan
+        return station.counts((turn @ away[..., None])[..., 0])
+
+    def beam(self, ranger: str, counts: ArrayLike, seconds: ArrayLike) -> Beam:
+        """Where the light really goes at what the encoders read (k, 2)."""
+        t = _times(seconds)
+        return self.returns.beam(ranger, _pairs(counts, t), t, self.telescope.standing(t))
+
+    def lit(self, ranger: str, counts: ArrayLike, seconds: float) -> str | None:
+        """The retroreflector on which a beam falls at counts (2,), ZRG among them; None where it falls on none."""
+        t = _times(seconds)
+        return self.returns.lit(ranger, _pairs(counts, t), t, self.telescope.standing(t))
+
+    def phasors(self, ranger: str, counts: ArrayLike, seconds: ArrayLike, /) -> NDArray[np.complex128]:
+        """What returns (k,), V, with a ranger's mirror at counts (k, 2) at times (k,): all that the beam falls on, and
+        what leaks."""
+        t = _times(seconds)
+        return self.returns.phasors(ranger, _pairs(counts, t), t, self.telescope.standing(t))
+
+    # Readings -------------------------------------------------------------------------------------------------------
+
+    def weather(self, station: str, seconds: float) -> LiveWeather:
+        """What a weather station reads: the air there, its own offset, scatter; NaN while it is silent."""
+        if station not in self._weather_at:
+            raise InputError(
+                f"weather station {station!r} is not at this site (expected {', '.join(self._weather_at)})"
+            )
+        ticks = self.ticks(seconds)
+        if self.faults.active("silent-station", station, at=seconds) is not None:
+            return LiveWeather(station, ticks, float("nan"), float("nan"), float("nan"))
+        true = self.air.weather(self._weather_at[station][None, None], _times(seconds))
+        scatter = self._planted.gain("weather_scatter") * self._streams(f"reading/{station}/{ticks}").normal(size=3)
+        lie = self.faults.active("lying-station", station, at=seconds)
+        offset = self._thermometers[station] + (0.0 if lie is None else lie.size)
+        t, p, h = (float(v[0, 0]) + s * u for v, s, u in zip(true, scatter, READ_SCATTER, strict=True))
+        return LiveWeather(station, ticks, round(t + offset, 3), round(p, 3), round(min(max(h, 0.0), 100.0), 2))
+
+    def shot(
+        self, ranger: str, target: str, seconds: float, *, cycles: int = 128, samples: int = 64, if_hz: int = 1000
+    ) -> LiveShot:
+        """A whole buffer of one ranger whose beam follows a target's middle perfectly, from a time on.
+
+        Without servers and servos, for tests and scatter. The stamp is rounded to the nearest tick.
+        """
+        sampling = Sampling(samples, cycles, if_hz)
+        t = seconds + np.linspace(0.0, sampling.duration, max(POINTS, round(sampling.duration * POINTS_A_SECOND)))
+        standing = self.telescope.standing(t)
+        aimed = self._counts(ranger, target, t, standing)
+        hot = self.faults.active("saturated-adc", ranger, at=seconds)
+        ticks = self.ticks(seconds)
+        codes = self._converters[ranger].codes(
+            t - seconds,
+            self.returns.phasors(ranger, aimed, t, standing, among=(target,)),
+            sampling=sampling,
+            generator=self._streams(f"shot/{ranger}/{target}/{ticks}"),
+            gain=1.0 if hot is None else hot.size,
+        )
+        return LiveShot(ranger, target, ticks, cycles, samples, if_hz, VOLT_PER_CODE, codes)
+
+
+def _times(seconds: ArrayLike) -> Array:
+    return np.atleast_1d(np.asarray(seconds, dtype=float))
+
+
+def _pairs(counts: ArrayLike, t: Array) -> Array:
+    return np.broadcast_to(np.asarray(counts, dtype=float), (len(t), 2))

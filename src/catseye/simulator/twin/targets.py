@@ -1,0 +1,180 @@
+"""Where everything on a living site truly rests, against what the files say, and what each retroreflector is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.records.site_folder import SiteFolder
+from catseye.records.target import FrameName
+from catseye.records.target import Target as TargetRecord
+from catseye.records.triplet import Triplet, TripletPrism
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.night.head import BENCHMARK_VOLT, USUAL_VOLT
+from catseye.simulator.night.structure import tilted, unit
+from catseye.simulator.twin.telescope import low_orders
+
+Array = NDArray[np.float64]
+TYPING_MM, MOST_TYPING = 8.0, 2.0  # of each coordinate where its record says nothing; clipped at so many sigma
+SURFACE_MM, ROUGH_MM = 0.25, 0.15  # normal deviations of the dish: low orders, and from prism to prism
+NEAR_SURFACE, BEYOND_RIM = 2.0, 3.0  # m: what is so near to the paraboloid rides on the dish, else on the feed arm
+PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: how far off its middle a beam still comes back
+
+
+@dataclass(frozen=True, eq=False)
+class Retro:
+    """A retroreflector in the frame of its body.
+
+    kind     "prism", "ball" or "hollow"
+    body     "ground", "alidade", "dish" or "arm"
+    rest     (3,) m, true
+    facing   (3,) unit vector: outward normal of the entry face, a ball's axis; None: any way
+    sizes    m, true: height of the prism; both radii of the ball
+    volts    the least and the most of its usual amplitude
+    """
+
+    kind: str
+    body: str
+    rest: Array
+    facing: Array | None
+    sizes: tuple[float, ...]
+    volts: tuple[float, float]
+
+    @property
+    def radius(self) -> float:
+        """m: a beam that passes farther off does not come back."""
+        return BALL_RADIUS if self.kind == "ball" else PRISM_RADIUS
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The design paraboloid, and the true dish's normal deviations from it.
+
+    focal_length, centre (2,), radius   m
+    orders   (6,) m of `low_orders`
+    """
+
+    focal_length: float
+    centre: Array
+    radius: float
+    orders: Array
+
+    @staticmethod
+    def of(site: SiteFolder, streams: Streams, planted: Planted) -> "Surface":
+        p = site.site.paraboloid
+        size = planted.gain("surface") * SURFACE_MM * MILLIMETRE / np.sqrt(6.0)
+        centre = np.array(p.aperture_centre_mm) * MILLIMETRE
+        orders = size * streams("surface").normal(size=6)
+        return Surface(p.focal_length_mm * MILLIMETRE, centre, p.aperture_radius_mm * MILLIMETRE, orders)
+
+    def height(self, xy: Array) -> Array:
+        """z of the design (...) at (..., 2), m."""
+        return np.sum(xy**2, axis=-1) / (4.0 * self.focal_length)
+
+    def up(self, xy: Array) -> Array:
+        """Unit normals (n, 3) towards the focus at (n, 2), m."""
+        return unit(np.column_stack([-xy / (2.0 * self.focal_length), np.ones(len(xy))]))
+
+    def body(self, rest: Array) -> str:
+        """Whether a point of the reflector frame rides on the dish or on the arm."""
+        near = abs(rest[2] - self.height(rest[:2])) < NEAR_SURFACE
+        return "dish" if near and np.hypot(*(rest[:2] - self.centre)) < self.radius + BEYOND_RIM else "arm"
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """What the truth of a site is drawn from."""
+
+    streams: Streams
+    planted: Planted
+    surface: Surface
+
+    def typed(self, rng: np.random.Generator, u_mm: float | None, shape: int = 3) -> Array:
+        """True minus typed coordinates, m."""
+        draw = np.clip(rng.normal(size=shape), -MOST_TYPING, MOST_TYPING)
+        return self.planted.gain("typing") * (TYPING_MM if u_mm is None else u_mm) * MILLIMETRE * draw
+
+    def body(self, frame: FrameName, rest: Array) -> str:
+        """What carries a point that rests at (3,), m, in a file's frame."""
+        return self.surface.body(rest) if frame == "reflector" else frame
+
+
+def drawing(site: SiteFolder, streams: Streams, planted: Planted) -> Drawing:
+    """The drawing of a site."""
+    return Drawing(streams, planted, Surface.of(site, streams, planted))
+
+
+def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Drawing) -> dict[str, Retro]:
+    """Every single target and triplet part of a site.
+
+    scan_points   true, ground frame, of the rangers from which benchmarks are certified
+    """
+    found = {name: single(record, draw) for name, record in site.targets.items()}
+    for record in site.triplets.values():
+        found |= triplet(record, draw)
+    gain = draw.planted.gain("calibration")
+    for row in site.benchmarks:
+        if row.target in found and found[row.target].body == "ground" and row.ranger in scan_points:
+            station, old = scan_points[row.ranger], found[row.target]
+            miss = gain * row.u_mm * draw.streams(f"benchmark/{row.target}").normal()
+            rest = station + unit(old.rest - station) * (row.certified_distance_mm + miss) * MILLIMETRE
+            found[row.target] = Retro(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
+    return found
+
+
+def single(record: TargetRecord, draw: Drawing) -> Retro:
+    """The truth of one target: on the dish it slides along the surface by typing, and off it by the deviations."""
+    rng = draw.streams(f"place/{record.name}")
+    miss, rough, lean = draw.typed(rng, record.u_position_mm), rng.normal(), rng.normal(size=3)
+    rest = np.array(record.position_mm) * MILLIMETRE
+    if record.frame == "reflector" and draw.surface.body(rest) == "dish":
+        surface = draw.surface
+        above = rest[2] - surface.height(rest[:2])
+        xy = (rest + miss)[None, :2]
+        off = low_orders(xy, surface.centre, surface.radius) @ surface.orders
+        off = off + draw.planted.gain("surface") * ROUGH_MM * MILLIMETRE * rough
+        rest = np.array([*xy[0], surface.height(xy[0]) + above]) + off * surface.up(xy)[0]
+    else:
+        rest = rest + miss
+    facing: Array | None = None
+    sizes: tuple[float, ...] = ()
+    if record.normal is not None and record.height_mm is not None:
+        normal = unit(np.array(record.normal))
+        facing = unit(normal + np.cross(normal, draw.planted.gain("normals") * 0.1 * DEGREE * lean))
+        u = draw.planted.gain("calibration") * (record.u_height_mm or 0.0)
+        sizes = ((record.height_mm + u * rng.normal()) * MILLIMETRE,)
+    body = draw.body(record.frame, rest)
+    volts = USUAL_VOLT["hollow" if facing is None else "dish" if body == "dish" else "prism"]
+    return Retro(record.type, body, rest, facing, sizes, volts)
+
+
+def triplet(record: Triplet, draw: Drawing) -> dict[str, Retro]:
+    """The truth of a triplet: two prisms and the ball, as `structure.triplet` has them, by the data sheet and its u."""
+    rng, gain = draw.streams(f"place/{record.triplet}"), draw.planted.gain
+    ball = np.array(record.nominal_position_mm) * MILLIMETRE + draw.typed(rng, record.u_position_mm)
+    normal = tilted(unit(np.array(record.normal)), gain("normals") * 0.3, rng)
+    axis = tilted(unit(np.array(record.axis)), gain("normals") * 0.3, rng)
+    axis = unit(axis - axis @ normal * normal)
+    u = np.array([record.u_d12_mm, record.u_h_corr_mm, record.u_lateral_mm, record.u_lateral_mm])
+    miss = rng.normal(size=4) * u
+    d12 = (record.d12_mm + gain("calibration") * miss[0]) * MILLIMETRE
+    high = gain("h_corr") * (record.h_corr_mm + gain("calibration") * miss[1]) * MILLIMETRE
+    aside = gain("lateral") * MILLIMETRE * (miss[2] * axis + miss[3] * np.cross(normal, axis))
+    middle = ball - high * normal - aside
+    body = draw.body(record.frame, ball)
+    r1, r2 = (
+        (r + gain("calibration") * record.ball.u_r_mm * rng.normal()) * MILLIMETRE
+        for r in (record.ball.r1_mm, record.ball.r2_mm)
+    )
+
+    def prism(side: TripletPrism, sign: float) -> Retro:
+        height = (side.height_mm + gain("calibration") * side.u_height_mm * rng.normal()) * MILLIMETRE
+        return Retro("prism", body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["prism"])
+
+    return {
+        record.left_prism.target: prism(record.left_prism, -1.0),
+        record.right_prism.target: prism(record.right_prism, 1.0),
+        record.ball.target: Retro("ball", body, ball, -normal, (r1, r2), USUAL_VOLT["ball"]),
+    }

@@ -1,0 +1,229 @@
+"""The telescope in motion: where its bodies stand at times, and how they bend.
+
+    ground <- (bearing tilt) <- alidade <- (elevation) <- dish <- feed arm
+
+Points rest in the frame of their body: "ground", "alidade", "dish" and "arm", both in the reflector frame. The nominal
+posture is [PARKER04] eq. 2.44, written here a second time; departures from it are drawn, their sizes chosen:
+millimetres and arc seconds as the generator of nights has them, a centimetre of sag at the arm's tip over the sky.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.records.site_folder import SiteFolder
+from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.twin.air import LivingAir
+from catseye.simulator.twin.motion import Angles, Motion
+from catseye.simulator.twin.waves import Waves, band, joined
+
+Array = NDArray[np.float64]
+ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `posture`
+GRAVITY_DISH = 0.6 * MILLIMETRE  # rms of the surface's low orders for a unit of sine or cosine of elevation
+GRAVITY_SHIFT = 2.0 * MILLIMETRE
+GRAVITY_SAG = 12.0 * MILLIMETRE  # of the arm's tip for a unit of cosine of elevation, the way gravity pulls
+STEEL_RISE, STEEL_SHIFT, STEEL_DISH = 0.3e-3, 0.3e-3, 0.05e-3  # m/°C: elevation axis, arm's tip, low orders
+WIND_TIP = 0.3 * MILLIMETRE  # rms of the arm's tip in each direction at 5 m/s; grows with the square
+MODES_HZ, MODE_TIP = (0.8, 1.2, 2.4), 50e-6  # of the arm; m, mean amplitude at the tip, drawn between 0.4 and 2 of it
+TILT, ENCODER = 4.0 * ARCSECOND, 2.0 * ARCSECOND
+ENCODER_ORDERS = np.array([1.0, 2.0, 16.0])
+
+
+def turning(vector: Array) -> Array:
+    """Matrices (..., 3, 3) that turn points about vectors (..., 3) by their length, rad: Rodrigues' formula."""
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    angle = np.sqrt(x * x + y * y + z * z)
+    safe = np.where(angle > 0.0, angle, 1.0)
+    first = np.where(angle > 0.0, np.sin(angle) / safe, 1.0)
+    second = np.where(angle > 0.0, 2.0 * (np.sin(0.5 * angle) / safe) ** 2, 0.5)
+    found = np.empty((*angle.shape, 3, 3))
+    for i, j, k, u, v, w in ((0, 1, 2, x, y, z), (1, 2, 0, y, z, x), (2, 0, 1, z, x, y)):
+        found[..., i, i] = 1.0 - second * (v * v + w * w)
+        found[..., i, j] = second * u * v - first * w
+        found[..., i, k] = second * u * w + first * v
+    return found
+
+
+def low_orders(xy: Array, centre: Array, radius: float) -> Array:
+    """Six smooth shapes (n, 6) of the aperture, each of rms 1 over it, at (n, 2), m."""
+    x, y = ((xy - centre) / radius).T
+    r2 = x**2 + y**2
+    shapes = (x**2 - y**2, 2 * x * y, (3 * r2 - 2) * x, (3 * r2 - 2) * y, x**3 - 3 * x * y**2, 6 * r2**2 - 6 * r2 + 1)
+    return np.column_stack(shapes) * np.sqrt([6.0, 6.0, 8.0, 8.0, 8.0, 5.0])
+
+
+class Body(NamedTuple):
+    """ground = turn @ (rest + bending) + shift at k times: turn (k, 3, 3), shift (k, 3), m."""
+
+    turn: Array
+    shift: Array
+
+
+class Standing(NamedTuple):
+    """The telescope at k times: its bodies, and what its surface's low orders are (k, 6), m along the normals."""
+
+    bodies: dict[str, Body]
+    orders: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Telescope:
+    """A telescope that moves and bends; every draw is made once.
+
+    reflector_to_elevation, axis_height   m, from site.toml
+    rest_elevation   rad: where positions on the dish and on the arm are what the files mean
+    rigid_shift, rigid_turn   (3,) m, (3, 3): departure of the dish that stays; turned about the elevation axis
+    arm              (6,) shift of the tip, m, and turn about the foot, rad, that stay
+    gravity          (2, 9) for sine and cosine of elevation: shift of the dish, orders
+    sag              m
+    steel            (10,) a °C: rise of the elevation axis, shift of the arm, orders
+    sway             waves (6): shift of the arm's tip by wind and by vibration, m
+    tilt             (2, 3) rad: lean of the bearing to east and north, constant, cosine and sine of twice the azimuth
+    encoder          (2, 2, 3) rad: cosines and sines of both encoders' errors by `ENCODER_ORDERS`
+    """
+
+    motion: Motion
+    latitude: float
+    start_mjd: float
+    air: LivingAir
+    reflector_to_elevation: Array
+    axis_height: float
+    rest_elevation: float
+    rigid_shift: Array
+    rigid_turn: Array
+    arm: Array
+    gravity: Array
+    sag: float
+    steel: Array
+    sway: Waves
+    tilt: Array
+    encoder: Array
+
+    def angles(self, seconds: Array) -> Angles:
+        """Where the axes truly are, at times (k,)."""
+        return self.motion.angles(seconds, latitude=self.latitude, start_mjd=self.start_mjd)
+
+    def told(self, seconds: Array) -> Angles:
+        """What the encoders tell, at times (k,)."""
+        true, told = self.angles(seconds), []
+        for axis in (0, 1):
+            wave = ENCODER_ORDERS * true[axis][:, None]
+            cosine, sine = self.encoder[:, axis]
+            error = np.cos(wave) @ cosine + np.sin(wave) @ sine
+            slope = np.cos(wave) @ (ENCODER_ORDERS * sine) - np.sin(wave) @ (ENCODER_ORDERS * cosine)
+            told.append((true[axis] + error, true[axis + 2] * (1.0 + slope)))
+        return Angles(told[0][0], told[1][0], told[0][1], told[1][1])
+
+    def standing(self, seconds: Array) -> Standing:
+        """Where all stands at times (k,), s since the start."""
+        a, e, _, _ = self.angles(seconds)
+        steel = self.air.steel_c(seconds)[:, None]
+        pull = np.column_stack([np.sin(e) - np.sin(self.rest_elevation), np.cos(e) - np.cos(self.rest_elevation)])
+        bent, warm, sway = pull @ self.gravity, steel * self.steel, self.sway(seconds)
+
+        alidade = self._leaning(a) @ _azimuth(a)
+        axis = np.zeros((len(seconds), 3))
+        axis[:, 2] = self.axis_height + warm[:, 0]
+        dish = alidade @ _elevation(e) @ self.rigid_turn
+        away = self.reflector_to_elevation + self.rigid_shift + bent[:, :3]
+        dish_shift = _moved(dish, away) + _moved(alidade, axis)
+
+        tip = self.arm[:3] + warm[:, 1:4] + sway[:, :3] + sway[:, 3:]
+        tip[:, 1] += self.sag * pull[:, 1]  # with the elevation falling, gravity pulls the arm towards the dish
+        turn = np.zeros_like(tip)
+        turn[:, 0], turn[:, 1] = -tip[:, 1] / ARM_LENGTH, tip[:, 0] / ARM_LENGTH  # tip = turn x (0, 0, length)
+        along = np.zeros_like(tip)
+        along[:, 2] = tip[:, 2]
+        bend = turning(turn + self.arm[3:])
+        arm_shift = _moved(dish, ARM_FOOT + along - _moved(bend, ARM_FOOT)) + dish_shift
+        bodies = {
+            "ground": Body(np.broadcast_to(np.eye(3), dish.shape), np.zeros_like(axis)),
+            "alidade": Body(alidade, np.zeros_like(axis)),
+            "dish": Body(dish, dish_shift),
+            "arm": Body(dish @ bend, arm_shift),
+        }
+        return Standing(bodies, bent[:, 3:] + warm[:, 4:])
+
+    def _leaning(self, azimuth: Array) -> Array:
+        """Turn of the alidade (k, 3, 3) by the bearing's lean."""
+        waves = np.column_stack([np.ones_like(azimuth), np.cos(2.0 * azimuth), np.sin(2.0 * azimuth)])
+        lean = np.zeros((len(azimuth), 3))
+        lean[:, :2] = waves @ self.tilt.T
+        return turning(lean)
+
+
+def telescope(
+    site: SiteFolder, motion: Motion, start_mjd: float, air: LivingAir, *, streams: Streams, planted: Planted
+) -> Telescope:
+    """The telescope of a site, drawn."""
+    rest = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)
+    rigid, arm = planted.gain("posture"), planted.gain("feed_arm")
+    turn = rest[1] * np.array([18.0, 8.0, 8.0]) * ARCSECOND
+    bending, steel = streams("gravity").normal(size=(2, 9)), streams("steel").normal(size=10)
+    bending[:, :3] *= GRAVITY_SHIFT
+    bending[:, 3:] *= GRAVITY_DISH / np.sqrt(6.0)
+    steel *= np.array([0.0, *[STEEL_SHIFT] * 3, *[STEEL_DISH / np.sqrt(6.0)] * 6])
+    steel[0] = STEEL_RISE
+    nominal = site.site.frames.reflector
+    return Telescope(
+        motion,
+        site.site.site.latitude_deg * DEGREE,
+        start_mjd,
+        air,
+        np.array(nominal.reflector_to_elevation_mm) * MILLIMETRE,
+        nominal.elevation_axis_height_mm * MILLIMETRE,
+        site.site.campaign.elevation_deg * DEGREE,
+        rigid_shift=rigid * rest[0] * 3.0 * MILLIMETRE,
+        rigid_turn=turning(rigid * turn),
+        arm=arm * np.concatenate([rest[2] * 4.0 * MILLIMETRE, rest[3] * 12.0 * ARCSECOND]),
+        gravity=planted.gain("gravity") * bending,
+        sag=planted.gain("gravity") * GRAVITY_SAG,
+        steel=planted.gain("thermal") * steel,
+        sway=_sway(air.conditions.wind_m_s, streams, planted),
+        tilt=planted.gain("bearing_tilt") * TILT * streams("bearing").normal(size=(2, 3)) * (1.0, 0.4, 0.4),
+        encoder=planted.gain("encoder") * ENCODER * streams("encoders").normal(size=(2, 2, 3)) * (1.0, 0.5, 0.1),
+    )
+
+
+def _sway(wind_m_s: float, streams: Streams, planted: Planted) -> Waves:
+    """Shift of the arm's tip (6 channels): wind along x, y, z, then vibration; along the arm a tenth."""
+    stiff = np.array([1.0, 1.0, 0.1])
+    wind = band(streams("wind"), WIND_TIP * (wind_m_s / 5.0) ** 2, 0.1, 0.3, channels=3).scaled(stiff)
+    rng = streams("vibration")
+    parts = []
+    for hertz in MODES_HZ:
+        size, way = MODE_TIP * rng.uniform(0.4, 2.0), rng.normal(size=3) * stiff
+        mode = band(rng, size / np.sqrt(2.0), 0.985 * hertz, 1.015 * hertz)  # amplitude sqrt(2) times the rms
+        way /= np.linalg.norm(way)
+        parts.append(Waves(mode.omega, mode.cosine * way, mode.sine * way, np.zeros(3)))
+    shaken = Waves(
+        np.concatenate([p.omega for p in parts]),
+        np.concatenate([p.cosine for p in parts]),
+        np.concatenate([p.sine for p in parts]),
+        np.zeros(3),
+    )
+    return joined(wind.scaled(planted.gain("wind")), shaken.scaled(planted.gain("vibration")))
+
+
+def _moved(turn: Array, vector: Array) -> Array:
+    """Vectors (k, 3) or (3,) turned by (k, 3, 3)."""
+    return (turn @ np.broadcast_to(vector, (len(turn), 3))[..., None])[..., 0]
+
+
+def _azimuth(angle: Array) -> Array:
+    """Alidade to ground (k, 3, 3), clockwise from north. Source: [PARKER04] eq. 2.40."""
+    found = np.zeros((len(angle), 3, 3))
+    c, s = np.cos(angle), np.sin(angle)
+    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1], found[:, 2, 2] = c, s, -s, c, 1.0
+    return found
+
+
+def _elevation(angle: Array) -> Array:
+    """Elevation structure to alidade (k, 3, 3), parallel at the zenith. Source: [PARKER04] eq. 2.41."""
+    found = np.zeros((len(angle), 3, 3))
+    s, c = np.sin(angle), np.cos(angle)
+    found[:, 0, 0], found[:, 1, 1], found[:, 1, 2], found[:, 2, 1], found[:, 2, 2] = 1.0, s, c, -c, s
+    return found

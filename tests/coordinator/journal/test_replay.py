@@ -1,0 +1,223 @@
+"""Replay: a run is fed again in its order, and held against what was said then, bit for bit."""
+
+from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.replay import replay
+from catseye.coordinator.journal.writer import Journal
+from catseye.errors import InputError
+from catseye.records.live import Happening, LivePosture, LiveWeather
+from catseye.simulator.clock.world_clock import ManualClock
+from journal_scene import MOST_WAIT, START, scene_run, scene_shot
+
+
+@dataclass(frozen=True)
+class Verdict:
+    status: str
+    range_: float
+    text: str = ""
+    u_range: float = float("nan")
+    misfit: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Epoch:
+    points: dict
+    covariance: np.ndarray
+    shots: int
+
+
+class OrderedLive:
+    """A reduction whose every answer depends on all it was fed before, and on the order."""
+
+    def __init__(self, site, gain):
+        self.state, self.shots, self.gain = float(len(site.rangers)), 0, gain
+
+    def _fed(self, value):
+        self.state = np.sin(self.gain * self.state + value)
+
+    def weather(self, read):
+        self._fed(read.temperature_c)
+
+    def posture(self, read):
+        self._fed(read.azimuth)
+
+    def shot(self, shot):
+        self._fed(float(shot.samples.astype(float) @ np.arange(len(shot.samples))) * shot.volts_per_code)
+        self.shots += 1
+        return Verdict("used", self.state)
+
+    def solve(self, ticks):
+        if not self.shots:
+            return None
+        root = np.outer([self.state, 1.0, ticks % 7], [0.1, self.state, 0.3])
+        answer = Epoch({"ZEG": np.array([self.state, float("nan")])}, root + root.T, self.shots)
+        self.shots = 0
+        return answer
+
+    failed = ""
+
+    def begin(self, ticks):
+        return SimpleNamespace(solve=partial(self.solve, ticks))
+
+    def take_in(self, job, found):
+        return found
+
+    def place(self, name, mjd):
+        return np.zeros((len(mjd), 3))
+
+
+def recorded(path, solves=6, gain=1.1):
+    """A run as the coordinator makes one: what the reduction is fed is what is journalled."""
+    live = OrderedLive(scene_run().site, gain)
+    with Journal.open(path, run=scene_run(seed=5), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(7 * solves):
+            when = START + 200 * k
+            if k % 3 == 0:
+                read = LivePosture(when, 0.1 * k, 0.5)
+                live.posture(read)
+                journal.append(read)
+            if k % 4 == 0:
+                read = LiveWeather("WX1", when, 10.0 + 1 / (k + 1), 930.0, 50.0)
+                live.weather(read)
+                journal.append(read)
+            shot = scene_shot(k)
+            journal.append(AnsweredShot.of(shot, live.shot(shot)), Happening(when, "ZY105", "x", "y"))
+            if k % 7 == 6:
+                journal.append(Document(when, EPOCH_BEGUN, ""), Solution.of(when, live.solve(when)))
+        journal.append().result(MOST_WAIT)
+    return path
+
+
+def again(path, gain=1.1, **more):
+    with JournalReader(path) as reader:
+        return list(replay(reader, 1, lambda site, run: OrderedLive(site, gain), **more))
+
+
+def test_the_same_reduction_says_the_same_to_the_last_bit(tmp_path):
+    found = again(recorded(tmp_path / "j.db"))
+    assert [replayed.same for replayed in found] == [True] * 6
+    assert [replayed.shots for replayed in found] == [7] * 6
+    assert all(replayed.differing == () for replayed in found)
+    states = [replayed.new.answer["points"]["ZEG"][0] for replayed in found]
+    assert len(set(states)) == 6
+
+
+def test_another_reduction_is_told_with_the_shots_that_differ(tmp_path):
+    found = again(recorded(tmp_path / "j.db"), gain=1.1 + 1e-12)
+    assert not found[0].same
+    assert found[0].differing
+    assert found[0].stored.answer["points"] != found[0].new.answer["points"]
+
+
+def test_a_reduction_that_finds_nothing_is_told(tmp_path):
+    class Mute(OrderedLive):
+        def solve(self, ticks):
+            return None
+
+    with JournalReader(recorded(tmp_path / "j.db")) as reader:
+        found = list(replay(reader, 1, lambda site, run: Mute(site, 1.1)))
+    assert [(replayed.new.answer, replayed.same) for replayed in found] == [({}, False)] * 6
+
+
+def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
+    """It used up its shots: without it all that follows would differ."""
+
+    class Failing(OrderedLive):
+        def solve(self, ticks):
+            answer = super().solve(ticks)
+            if answer is not None and self.state < 0.0:
+                self.state = 0.25
+                return None
+            return answer
+
+        def shot(self, shot):
+            verdict = super().shot(shot)
+            if shot.number % 5 == 0:
+                raise InputError("no such ranger")
+            return verdict
+
+    live = Failing(scene_run().site, 1.1)
+    with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(40):
+            shot = scene_shot(k)
+            try:
+                journal.append(AnsweredShot.of(shot, live.shot(shot)))
+            except InputError as problem:
+                journal.append(AnsweredShot(shot, "refused", str(problem)))
+            if k % 3 == 2:
+                begun = Document(shot.ticks, EPOCH_BEGUN, "")
+                journal.append(begun, Solution.of(shot.ticks, live.solve(shot.ticks)))
+    with JournalReader(tmp_path / "j.db") as reader:
+        found = list(replay(reader, 1, lambda site, run: Failing(site, 1.1)))
+    assert len(found) == 13
+    assert all(replayed.same for replayed in found)
+    assert {bool(replayed.new.answer) for replayed in found} == {True, False}
+
+
+def test_it_ends_where_it_is_told_to(tmp_path):
+    path = recorded(tmp_path / "j.db")
+    whole = again(path)
+    for until in (whole[2].seq, whole[3].seq - 1):
+        assert [replayed.seq for replayed in again(path, until=until)] == [replayed.seq for replayed in whole[:3]]
+
+
+def test_the_factory_gets_the_runs_site_and_settings(tmp_path):
+    def made(site, run):
+        assert (len(site.rangers), run.settings["solve_every"], run.seed) == (18, 0.5, 5)
+        return OrderedLive(site, 1.1)
+
+    with JournalReader(recorded(tmp_path / "j.db", solves=1)) as reader:
+        assert len(list(replay(reader, 1, made))) == 1
+
+
+@pytest.mark.parametrize("part", ["ticks", "answer", "covariance", "shape", "none"])
+def test_sameness_is_of_every_part(part):
+    answer = {"a": [0.1, None], "b": "x"}
+    one = Solution(5, answer, np.array([[1.0, 2.0], [2.0, 3.0]]))
+    others = {
+        "ticks": Solution(6, answer, one.covariance),
+        "answer": Solution(5, {"a": [np.nextafter(0.1, 1.0).item(), None], "b": "x"}, one.covariance),
+        "covariance": Solution(5, answer, np.array([[1.0, 2.0], [2.0, np.nextafter(3.0, 4.0)]])),
+        "shape": Solution(5, answer, one.covariance.reshape(1, 4)),
+        "none": Solution(5, answer, None),
+    }
+    assert one.same(Solution(5, dict(reversed(answer.items())), one.covariance.T.copy()))
+    assert not one.same(others[part])
+    assert not others[part].same(one)
+    assert not one.same(None)
+
+
+def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
+    """An epoch is taken out, solved beside the loop, and taken in: what is fed between changes neither."""
+
+    class Beside(OrderedLive):
+        def begin(self, ticks):
+            taken, self.shots = self.shots, 0
+            return SimpleNamespace(solve=lambda: (ticks, taken))
+
+        def take_in(self, job, found):
+            _, taken = found
+            self.state = np.sin(self.state + taken)
+            return Epoch({"ZEG": np.array([self.state])}, np.eye(2) * self.state, taken)
+
+    live = Beside(scene_run().site, 1.1)
+    with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(30):
+            shot = scene_shot(k)
+            if k % 10 == 5:
+                job = live.begin(shot.ticks)
+                journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
+            journal.append(AnsweredShot.of(shot, live.shot(shot)))
+            if k % 10 == 8:
+                journal.append(Solution.of(shot.ticks, live.take_in(job, job.solve())))
+    with JournalReader(tmp_path / "j.db") as reader:
+        found = list(replay(reader, 1, lambda site, run: Beside(site, 1.1)))
+    assert [replayed.same for replayed in found] == [True] * 3
+    assert [replayed.new.answer["shots"] for replayed in found] == [5, 10, 10]

@@ -1,0 +1,562 @@
+"""A link to a real server whose head is scripted; time jumps, nothing sleeps. One story goes over real sockets."""
+
+import asyncio
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catseye.coordinator.link.settings import Address, LinkSettings
+from catseye.coordinator.parts import ticks_now
+from catseye.ranger.line import Request
+from catseye.ranger.server import LOOPBACK
+from coordinator.link_scene import COMMANDS, Free, Linked, LoopClock, Served, network, planned, run, until
+
+
+def test_a_cold_ranger_is_made_ready_and_its_shot_comes_whole():
+    async def story():
+        async with Linked() as (served, link):
+            assert served.ranger.initialised
+            assert [served.head.homing(axis) for axis in (0, 1)] == ["home", "home"]
+            assert served.kinds() == ["ready"]
+            shot = await link.fire(planned("ZG11"))
+            assert (shot.ranger, shot.target, shot.number) == ("ZY101", "ZG11", 0)
+            assert np.array_equal(shot.samples, served.ranger.measured.buffer.samples)
+            assert shot.amplitude == pytest.approx(2.67, abs=1e-3)
+            assert (shot.cycles, shot.samples_per_cycle, shot.if_hz) == (128, 64, 1000)
+            assert shot.volts_per_code == 10 / 32768
+            assert shot.duration == 0.128
+            reference = await link.fire(planned("ZRG"))
+            assert reference.target == "ZRG"
+            assert reference.phase == pytest.approx(0.7, abs=1e-3)
+            assert served.kinds() == ["ready"]
+            assert link.shots == 2
+
+    run(story)
+
+
+def test_the_same_over_real_sockets_in_real_time():
+    async def story():
+        async with Linked() as (served, link):
+            assert network() is None
+            shot = await link.fire(planned("ZRG", ahead=0.0))
+            assert np.array_equal(shot.samples, served.ranger.measured.buffer.samples)
+
+    asyncio.run(asyncio.wait_for(story(), 60.0))
+
+
+def test_a_moving_target_is_followed_and_fired_at_its_time():
+    async def story():
+        async with Linked() as (served, link):
+            shot_at = planned("ZG11", fixed=False, rate=(0.5, 0.0, 0.0), ahead=0.4)
+            shot = await link.fire(shot_at)
+            assert 0 <= shot.ticks - shot_at.begin_ticks <= 15  # never early; a turn of 5 ms and the poll behind it
+            x = float(link.counts[0])
+            ends = [link.settings.slack + 0.128 + late for late in (-864e-6, 864e-6)]  # a stamp has steps
+            there = [shot_at.at_begin + np.array([0.5, 0.0, 0.0]) * end for end in ends]
+            high, low = (served.ranger.cubes.look(tuple(place * 1e3))[0] for place in there)
+            assert low < x < high  # the line goes on behind the shot
+
+    run(story)
+
+
+def test_a_shot_whose_turn_comes_late_slides_along_its_line_and_is_given_up_when_too_late():
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, link):
+            late = planned("ZG11", fixed=False, rate=(0.5, 0.0, 0.0), ahead=-2.0)
+            assert (await link.fire(late)).ticks > late.begin_ticks + 2000
+            track = next(r for r in reversed(guard.asked) if r.command == "TRK")
+            assert float(track.parameters[2]) == pytest.approx(1e3 * (0.5 * (2.0 + link.settings.lead)), abs=1.0)
+            assert await link.fire(planned("ZG11", fixed=False, ahead=-6.0)) is None
+            assert served.kinds()[-1] == "late"
+
+    run(story)
+
+
+@pytest.mark.parametrize(("knows_streams", "longest_gap"), [(True, 0.004), (False, 0.004)])
+def test_a_stream_points_once_and_wastes_little_between_its_buffers(knows_streams, longest_gap):
+    async def story():
+        guard, shots = Free(), []
+        async with Linked(guard=guard) as (served, link):
+            if not knows_streams:  # a ZY of 2002
+                receive = served.ranger.receive
+                served.ranger.receive = lambda client, line: receive(client, line.replace("STM", "XYZ"))
+            assert await link.stream(planned("ZG12", ahead=0.0), shots.append, count=20) == 20
+            assert sum(r.command == "CIL" for r in guard.asked) == 1
+            gaps = np.diff([s.ticks for s in shots]) * 864e-6 - 0.128
+            assert gaps.min() > -1e-3  # half a stamp's step at each end
+            assert gaps.max() < longest_gap
+            assert all(s.samples is not None and s.target == "ZG12" for s in shots)
+            moving = []
+            follow = planned("ZG11", fixed=False, rate=(0.01, 0, 0))
+            assert await link.stream(follow, moving.append, count=5) == 5
+            assert moving[0].ticks >= follow.begin_ticks
+            track = [r for r in guard.asked if r.command == "TRK"]
+            assert len(track) == 1
+            end = float(track[0].parameters[5]) * 1e8 - moving[-1].ticks
+            assert end * 864e-6 > 0.128  # the track is longer than all five
+            assert served.ranger.stream is None
+            assert served.kinds() == ["ready"]
+
+    run(story)
+
+
+def test_a_stream_that_is_given_up_is_stopped_at_the_ranger():
+    async def story():
+        async with Linked() as (served, link):
+            shots = []
+            task = asyncio.ensure_future(link.stream(planned("ZG11", ahead=0.0), shots.append, count=1000))
+            await until(lambda: len(shots) > 3)
+            assert served.ranger.stream is not None
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+            await until(lambda: served.ranger.stream is None, 1.0)
+            assert not link.busy
+            assert await link.fire(planned("ZG12")) is not None
+
+    run(story)
+
+
+def test_a_stream_that_falls_silent_or_brings_nonsense_ends_and_is_told(monkeypatch):
+    async def story():
+        async with Linked() as (served, link):
+            shots = []
+
+            def take(shot):
+                shots.append(shot)
+                if len(shots) == 3:
+                    served.ranger.receive(0, "0\tPS 0")  # the laser goes off: CMEAS 0, text
+
+            assert await link.stream(planned("ZG11", ahead=0.0), take, count=50) < 8
+            assert "laser" in served.happenings[-1].text
+            served.ranger.receive(0, "PS 1")
+            await asyncio.sleep(0.1)
+            send = served.server.send
+            served.server.send = lambda told: send([o for o in told if o.reply.command != "BUF"])
+            assert await link.stream(planned("ZG12", ahead=0.0), shots.append, count=50) == 0
+            assert served.kinds()[-1] == "bad-shot"
+            assert "expected BUF" in served.happenings[-1].text
+
+    run(story)
+
+
+def test_what_the_guard_refuses_is_never_sent_and_the_next_shot_goes_on():
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, link):
+            before = served.head.actual(0)
+            guard.refused = ("CIL",)
+            assert await link.fire(planned("ZG11")) is None
+            assert served.head.actual(0) == before
+            assert served.kinds()[-1] == "refused"
+            guard.refused = ()
+            assert await link.fire(planned("ZG12")) is not None
+            seen = [(r.command, r.parameters[0]) for r in guard.asked if r.command in ("COO", "AXIS", "FHM", "CMEAS")]
+            assert ("COO", "1") in seen
+            assert ("FHM", "0") in seen
+            assert ("CMEAS", "2") in seen
+
+    run(story)
+
+
+def test_a_reconnect_within_two_seconds_needs_nothing_sent_again():
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, link):
+            await served.stop()
+            await until(lambda: link.state == "down")
+            assert served.kinds() == ["ready", "lost"]
+            assert await link.fire(planned("ZG11")) is None
+            await served.start()
+            began = asyncio.get_running_loop().time()
+            guard.asked.clear()
+            await until(lambda: link.ready)
+            assert asyncio.get_running_loop().time() - began < 2.0
+            assert not {"FHM", "AXIS"} & {r.command for r in guard.asked}
+            assert "was ready still" in served.happenings[-1].text
+            assert "lost-over" in served.kinds()
+            assert await link.fire(planned("ZG11")) is not None
+
+    run(story)
+
+
+def test_another_coordinator_takes_a_ranger_over_as_it_is_and_one_with_other_records_does_not():
+    async def story():
+        async with Linked() as (served, first):
+            for commands, text in (
+                (COMMANDS, "was ready still"),
+                ([*COMMANDS, Request("KND", ("1", "S", "-30"))], "made"),
+            ):
+                other = served.link(commands=commands)
+                task = asyncio.ensure_future(other.run())
+                await until(lambda other=other: other.ready)
+                assert text in served.happenings[-1].text
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
+            assert first.connected
+
+    run(story)
+
+
+@pytest.mark.parametrize("changed", ["BP 0, 0, 1", "AZM 0, -901", "INI 4"])
+def test_a_ranger_that_was_changed_by_hand_is_told_everything_again(changed):
+    async def story():
+        async with Linked() as (served, link):
+            served.ranger.receive(1, changed)
+            await asyncio.sleep(0.1)
+            await served.stop()
+            await until(lambda: link.state == "down")
+            await served.start()
+            await until(lambda: link.ready)
+            assert sum("made ready" in h.text for h in served.happenings) == 2
+            served.light()
+            assert (await link.fire(planned("ZRG"))).amplitude == pytest.approx(3.0, abs=0.01)
+
+    run(story)
+
+
+def test_a_ranger_that_restarts_under_a_standing_connection_is_noticed_and_made_ready():
+    async def story():
+        async with Linked() as (served, link):
+            served.ranger.receive(1, "RST")
+            await until(lambda: not link.ready)
+            await until(lambda: link.ready)
+            assert served.kinds() == ["ready", "restarted", "ready"]
+            served.light()
+            assert await link.fire(planned("ZG11")) is not None
+
+    run(story)
+
+
+def test_a_ranger_that_answers_nothing_is_hung_within_seconds_and_found_again():
+    async def story():
+        async with Linked() as (served, link):
+            send, served.server.send = served.server.send, lambda told: None
+            began = asyncio.get_running_loop().time()
+            assert await link.fire(planned("ZG11", ahead=0.0)) is None
+            await until(lambda: link.state == "down")
+            assert asyncio.get_running_loop().time() - began < link.settings.move_timeout + 5.0
+            assert "no-reply" in served.kinds()
+            assert "hung" in served.happenings[-1].text
+            served.server.send = send
+            await until(lambda: link.ready)
+            await until(lambda: link.state == "ready", 1.0)
+            assert await link.fire(planned("ZG11")) is not None
+
+    run(story)
+
+
+def test_an_idle_ranger_that_hangs_is_noticed_by_the_probe():
+    async def story():
+        async with Linked() as (served, link):
+            served.server.send = lambda told: None
+            began = asyncio.get_running_loop().time()
+            await until(lambda: link.state == "down")
+            assert asyncio.get_running_loop().time() - began < 5.0
+
+    run(story)
+
+
+def test_waits_between_attempts_grow_by_a_third_to_thirty_seconds():
+    async def story():
+        served = await Served().start()
+        await served.stop()
+        link = served.link()
+        attempts, connect = [], link._session
+
+        async def session():
+            attempts.append(asyncio.get_running_loop().time())
+            return await connect()
+
+        link._session = session
+        task = asyncio.ensure_future(link.run())
+        await asyncio.sleep(200.0)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        gaps = np.diff(attempts)
+        assert np.all(np.abs(gaps[:20] / (0.2 * 1.33 ** np.arange(20)).clip(max=30.0) - 1.0) <= 0.21)  # jitter of 20 %
+        assert gaps[-1] > 23.0
+        assert served.kinds() == ["lost"]  # told once
+
+    run(story)
+
+
+def test_a_clock_that_is_off_is_set_and_one_that_runs_away_is_named():
+    async def story():
+        async with Linked() as (served, link):
+            served.head.offset = 0.5
+            await until(lambda: "clock-off" in served.kinds())
+            assert served.happenings[-1].details["offset_s"] == pytest.approx(0.5, abs=0.01)
+            await asyncio.sleep(3.0)
+            assert abs(served.head.offset) < 5e-3
+            served.head.rate = 1e-3
+            await until(lambda: "clock-drift" in served.kinds())
+            told = next(h for h in served.happenings if h.kind == "clock-drift")
+            assert 2e-4 < told.details["rate"] < 1.2e-3
+            assert link.ready
+
+    run(story)
+
+
+def test_a_right_clock_is_left_alone():
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard):
+            await asyncio.sleep(60.0)
+            assert "STI" not in {r.command for r in guard.asked}
+
+    run(story)
+
+
+def test_a_slow_line_is_told_when_it_begins_and_when_it_ends():
+    async def story():
+        async with Linked() as (served, link):
+            send = served.server.send
+
+            def late(told):
+                asyncio.get_running_loop().call_later(0.4, send, told) if told else None
+
+            served.server.send = late
+            await until(lambda: "slow" in served.kinds())
+            assert await link.fire(planned("ZG11")) is not None
+            served.server.send = send
+            await until(lambda: "slow-over" in served.kinds())
+            assert served.kinds().count("slow") == 1
+
+    run(story)
+
+
+def test_a_stuck_axis_and_a_missing_index_have_their_names():
+    async def story():
+        async with Linked() as (served, link):
+            served.head.inner.stuck = True
+            assert await link.fire(planned("ZG11")) is None
+            assert served.kinds()[-1] in ("stuck-axis", "no-reply")
+            served.head.inner.stuck = False
+            served.head.inner.off[1] = True
+            await until(lambda: "motor-off-1" in served.kinds())
+
+        lost = Linked(wait=False)
+        async with lost as (served, link):
+            served.head.inner.find_home = lambda axis: served.head.inner.homes.__setitem__(axis, "failed")
+            await until(lambda: "lost-index" in served.kinds())
+            assert not link.ready
+            del served.head.inner.find_home
+            await until(lambda: link.ready, 300.0)
+
+    run(story)
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        (lambda v: (*v[:6], v[6][:-8] + "AAAAAA=="), "CRC"),
+        (lambda v: (*v[:6], v[6][:-8]), "bytes"),
+        (lambda v: (*v[:6], "!" + v[6][1:]), "base64"),
+        (lambda v: ("2", *v[1:]), "cube 2"),
+        (lambda v: (v[0], "127", *v[2:]), "bytes"),
+        (lambda v: (*v[:4], "nan", *v[5:]), "number"),
+        (lambda v: v[:6], "values"),
+    ],
+)
+def test_a_damaged_buffer_is_told_and_not_used(damage, word, monkeypatch):
+    async def story():
+        async with Linked() as (served, link):
+            whole = served.ranger._handlers["BUF"]
+            monkeypatch.setitem(served.ranger._handlers, "BUF", lambda z, client: damage(whole(z, client)))
+            assert await link.fire(planned("ZG11")) is None
+            assert served.kinds()[-1] == "bad-shot"
+            assert word in served.happenings[-1].text
+            monkeypatch.setitem(served.ranger._handlers, "BUF", whole)
+            assert await link.fire(planned("ZG11")) is not None
+
+    run(story)
+
+
+def test_a_buffer_that_another_client_took_meanwhile_is_not_this_shots():
+    async def story():
+        async with Linked() as (served, link):
+            send = served.server.send
+
+            def mixed(told):
+                send(
+                    [replace(o, reply=replace(o.reply, ticks=o.reply.ticks + (o.reply.command == "BUF"))) for o in told]
+                )
+
+            served.server.send = mixed
+            assert await link.fire(planned("ZG11")) is None
+            assert "BUF is of cube 1 at" in served.happenings[-1].text
+
+    run(story)
+
+
+def test_the_laser_is_off_while_the_indices_are_searched():
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, _):
+            lines = [(r.command, r.parameters) for r in guard.asked if r.command in ("PS", "FHM")]
+            assert lines == [("PS", ("0",)), ("FHM", ("0",)), ("FHM", ("1",)), ("PS", ("1",))]
+            assert served.head.laser_on()
+
+    run(story)
+
+
+def test_where_the_buffer_is_refused_the_rangers_own_amplitude_and_phase_count(monkeypatch):
+    async def story():
+        async with Linked() as (served, link):
+
+            def refuse(z, client):
+                from catseye.errors import InputError
+
+                raise InputError("out of memory")
+
+            monkeypatch.setitem(served.ranger._handlers, "BUF", refuse)
+            shot = await link.fire(planned("ZG11"))
+            assert shot.samples is None
+            assert shot.amplitude == pytest.approx(2.67, abs=1e-3)
+            assert shot.cycles == 128
+            assert served.kinds()[-1] == "no-buffer"
+
+    run(story)
+
+
+def test_another_rangers_greeting_is_an_alarm_and_a_taken_port_is_left_for_the_second():
+    async def story():
+        served = await Served("ZY102").start()
+        link = served.link()
+        link.ranger = "ZY101"
+        task = asyncio.ensure_future(link.run())
+        await until(lambda: "wrong-ranger" in served.kinds())
+        assert not link.connected
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        one, two = served.link(), served.link()
+        tasks = [asyncio.ensure_future(link.run()) for link in (one, two)]
+        await until(lambda: one.connected and two.connected)
+        assert sorted(c.number for c in served.server.connections.values()) == [0, 1]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await served.stop()
+
+    run(story)
+
+
+def test_a_listening_link_hears_another_clients_shots_and_sends_nothing_that_changes_the_ranger():
+    async def story():
+        async with Linked() as (served, link):
+            heard, guard = [], Free()
+            ear = served.link(wanted="listen", guard=guard, heard=lambda who, reply: heard.append(reply))
+            task = asyncio.ensure_future(ear.run())
+            await until(lambda: ear.connected)
+            await asyncio.sleep(5.0)
+            assert await link.fire(planned("ZG11")) is not None
+            await until(lambda: heard)
+            assert heard[0].values[2] == "ZG11"
+            assert guard.asked == []
+            assert await ear.fire(planned("ZG11")) is None
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    run(story)
+
+
+def test_leaving_switches_off_a_laser_that_was_switched_on_here_and_no_other():
+    async def story(dark):
+        served = await Served().start()
+        served.head.switch_laser(not dark)
+        link = served.link()
+        task = asyncio.ensure_future(link.run())
+        await until(lambda: link.ready)
+        assert served.head.laser_on()
+        await link.leave()
+        await asyncio.sleep(0.1)
+        assert served.head.laser_on() is not dark
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await served.stop()
+
+    run(lambda: story(True))
+    run(lambda: story(False))
+
+
+class Babbler(asyncio.Protocol):
+    """A "ranger" that says anything."""
+
+    def __init__(self, rng, lines):
+        self.rng, self.lines = rng, lines
+
+    def connection_made(self, transport):
+        self.transport = transport
+        transport.write(
+            b"0\t52889.0\tHELLO This is ZY101 ver. 2.20\n0\t52889.0\tCONNECT 1, 1\n0\t52889.0\tSTW 1, 0x00013007\n"
+        )
+
+    def data_received(self, data):
+        tids = [line.split(b"\t")[0] for line in data.split(b"\n") if b"\t" in line] or [b"0"]
+        for _ in range(self.rng.randrange(1, 4)):
+            self.lines[0] += 1
+            self.transport.write(self.line(self.rng.choice(tids)))
+        if self.rng.random() < 0.01:
+            self.transport.abort()
+
+    def line(self, tid):
+        rng = self.rng
+        word = rng.choice(
+            [b"VER", b"CIL", b"CMEAS", b"BUF", b"STW", b"COO", b"CYC", b"SUN", b"UNKNOWN", b"ACP", b"AXIS"]
+        )
+        values = b", ".join(
+            rng.choice([b"1", b"0", b"-1e999", b"nan", b"0x1", b"ZG11", b"", b"9" * 40])
+            for _ in range(rng.randrange(9))
+        )
+        return rng.choice(
+            [
+                tid + b"\t52889.1\t" + word + b" 1, " + values + b"\n",
+                tid + b"\t52889.1\t" + word + b" 0, no\n",
+                rng.randbytes(rng.randrange(200)) + b"\n",
+                rng.randbytes(rng.randrange(5000)),
+                b"\n",
+                tid + b"\t\t\t\n",
+            ]
+        )
+
+
+def babble(lines, seed):
+    """Random lines and bytes from a "ranger": the link neither ends nor hangs, nor keeps what it hears."""
+
+    async def story():
+        rng, count = random.Random(seed), [0]
+        loop = asyncio.get_running_loop()
+        server = await network().serve(lambda: Babbler(rng, count), LOOPBACK, 0)
+        port = server.port
+        happenings = []
+        quick = LinkSettings(longest_wait=0.4, probe_every=0.2, probe_timeout=0.5, move_timeout=0.5, buffer_timeout=0.5)
+        served = Served()
+        link = served.link(address=Address(LOOPBACK, (port, port)), tell=happenings.append, settings=quick)
+        task = asyncio.ensure_future(link.run())
+        while count[0] < lines:
+            assert not task.done()
+            if link.connected:
+                link.state = "ready"
+                await link.fire(planned(rng.choice(["ZG11", "ZRG", "NONE"]), fixed=rng.random() < 0.5))
+            await asyncio.sleep(0.05)
+            if link._client is not None:
+                assert link._client.outstanding < 200
+        assert len(happenings) < 20 * loop.time()
+        assert ticks_now(LoopClock()) > 0
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await server.close()
+
+    run(story, 1e7)
+
+
+def test_random_bytes_from_a_ranger_do_no_harm():
+    babble(1500, 8)
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_random_lines_from_a_ranger_do_no_harm():
+    babble(100_000, 9)
