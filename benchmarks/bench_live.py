@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 from catseye.service.coordinator import LiveCoordinator, Orders
 from load_scene import LoadChild, load_site, lost_and_doubled
 

@@ -30,7 +30,7 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
-from catseye.estimation.multilateration import PointPriors, RangingNetwork, adjust_ranges
+from catseye.estimation.network.multilateration import PointPriors, RangingNetwork, adjust_ranges
 
 HERE = Path(__file__).parent
 SMALL, LARGE = (18, 2209), (40, 20_000)

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from catseye.estimation.adjustment import adjust
-from catseye.estimation.rows import full_jacobian
-from catseye.records.campaign import read_campaign
+from catseye.estimation.least_squares.adjustment import adjust
+from catseye.estimation.least_squares.rows import full_jacobian
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from catseye.estimation.harmonic_series import Spread, fit_harmonics
+from catseye.estimation.harmonic.series import Spread, fit_harmonics
 
 
 def main(prisms: int = 2209, epochs: int = 1000) -> None:

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from catseye.estimation.surface_series import fit_series
+from catseye.estimation.shapes.surface_series import fit_series
 from surface_scene import OWN, PLACES
 
 ROUNDS, SAMPLE = 5, 20

@@ -12,7 +12,7 @@ from catseye.atmosphere.air import group_refractivity
 from catseye.atmosphere.sound import sound
 from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.atmosphere.sound_path import bent_ray_excess, travel_time
-from catseye.estimation.tomography import Prior, Scale
+from catseye.estimation.shapes.tomography import Prior, Scale
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.air.acoustic import path_temperatures
 from catseye.reduction.air.acoustic_field import sound_field

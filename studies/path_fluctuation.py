@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 
 DEFAULT = Path(__file__).parents[1] / "examples" / "night-01"

@@ -13,7 +13,7 @@ import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.records.campaign import REFERENCE, read_campaign
+from catseye.records.night.campaign import REFERENCE, read_campaign
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.signal.amplitude import amplitude_phase

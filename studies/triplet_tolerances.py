@@ -17,7 +17,7 @@ from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, 
 from catseye.geometry import visibility
 from catseye.geometry.triplet_mount import aim_angles, misaim
 from catseye.optics.prism import obliquity_correction
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.memo import median_series
 from catseye.reduction.triplet.sensitivity import Departures, calibration_error, telescope_error, triplet_sensitivities

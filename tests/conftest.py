@@ -15,7 +15,7 @@ EXAMPLE = ROOT / "examples" / "night-01"
 @pytest.fixture(scope="session")
 def night_01():
     """The campaign that ships with catseye."""
-    from catseye.records.campaign import read_campaign
+    from catseye.records.night.campaign import read_campaign
 
     return read_campaign(EXAMPLE)
 
@@ -33,7 +33,7 @@ def ranging_network():
     """A function that makes networks of ranges: stations about targets, all free, stations marked as the datum."""
     import numpy as np
 
-    from catseye.estimation.network import Network, Points
+    from catseye.estimation.network.model import Network, Points
     from catseye.estimation.observations import Distances
 
     def made(seed=0, *, stations=6, targets=12, sigma=5e-5, size=100.0, off=0.01, seen=1.0, flat=False):

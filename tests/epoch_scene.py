@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from catseye.estimation.congruence import Epochs
-from catseye.estimation.rigid_body import motion_columns
+from catseye.estimation.deformation.congruence import Epochs
+from catseye.estimation.shapes.rigid_body import motion_columns
 
 SIGMA = 20e-6  # m
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Run, Solution
-from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import read_site
+from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import read_site
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

@@ -12,7 +12,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, norm
 
-from catseye.records.readings import Readings
+from catseye.records.files.readings import Readings
 from repository import ROOT
 
 ARC = np.pi / 180 / 3600

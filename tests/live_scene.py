@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import REFERENCE, SiteFolder, read_site
 from catseye.reduction.live.live import EpochAnswer, Live, LiveSettings
 from catseye.reduction.live.shots import ShotAnswer
 from catseye.reduction.site.motion import ground_from

@@ -20,9 +20,9 @@ from catseye.coordinator.visibility.vantage import vantages_of
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer
 from catseye.ranger.line import nanoseconds_to_ticks
-from catseye.records.live import TICKS_PER_DAY
-from catseye.records.site_folder import REFERENCE, SiteFolder, read_site
-from catseye.records.target import Target
+from catseye.records.night.live import TICKS_PER_DAY
+from catseye.records.site.folder import REFERENCE, SiteFolder, read_site
+from catseye.records.site.target import Target
 from catseye.simulator.clock.world_clock import SystemClock
 from repository import ROOT
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from catseye.geometry.panel_surface import warps
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelLayout, layout_of_site
-from catseye.records.panel_readings import PanelReadings, PanelSurvey, read_panel_readings
-from catseye.records.reading import read_record
-from catseye.records.site_folder import read_site
+from catseye.records.files.reading import read_record
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelLayout, layout_of_site
+from catseye.records.panels.readings import PanelReadings, PanelSurvey, read_panel_readings
+from catseye.records.site.folder import read_site
 from catseye.reduction.panels.model import corner_places
 from catseye.simulator.laboratory.panels import SolidPanels, screwed, solid_panels
 from repository import ROOT

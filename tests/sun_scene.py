@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from catseye.geometry.pointing import Station
 from catseye.geometry.slew import Pace
-from catseye.records.keep_out import KeepOut
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.site.keep_out import KeepOut
 from catseye.reduction.site.earth_rotation import Place
 from catseye.reduction.steering.guard import Guard
 from repository import ROOT

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from catseye.geometry.frame import Transform
 from catseye.optics.aperture import cos_incidence
 from catseye.optics.zernike import zernike
-from catseye.records.site_folder import read_site
+from catseye.records.site.folder import read_site
 from catseye.reduction.surface.actuators import actuators_of
 from catseye.reduction.surface.shape import Aperture, Prisms
 from repository import ROOT

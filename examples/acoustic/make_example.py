@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.records.recording import wav_bytes
+from catseye.records.night.recording import wav_bytes
 from catseye.signal.waveform import chirp
 from catseye.simulator.laboratory.acoustic import Recorder, SoundPath
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import layout_of_site
-from catseye.records.panel_readings import read_maps, read_panel_readings, read_survey
-from catseye.records.reading import read_record
-from catseye.records.site_folder import read_site
+from catseye.records.files.reading import read_record
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import layout_of_site
+from catseye.records.panels.readings import read_maps, read_panel_readings, read_survey
+from catseye.records.site.folder import read_site
 from catseye.reduction.panels.heights import reduce_panels
 from catseye.reduction.panels.maps import fitted_map
 from catseye.simulator.laboratory.panels import Crew, screwed, solid_panels, taken

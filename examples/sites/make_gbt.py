@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.records.record import Record
-from catseye.records.target import FeedArm, Target, Targets
-from catseye.records.toml_text import record_toml
+from catseye.records.files.record import Record
+from catseye.records.files.toml_text import record_toml
+from catseye.records.site.target import FeedArm, Target, Targets
 
 HERE = Path(__file__).parent
 NIGHT, GBT = HERE.parent / "night-01", HERE / "gbt"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.records.structural_model import StructuralModel, structural_model_toml
+from catseye.records.site.structural_model import StructuralModel, structural_model_toml
 
 STEEL = 11.7e-6  # for each degree C
 TILT_X, TILT_Y = 3.0, -2.2  # arc seconds, of the azimuth axis about east and about north; the size of published AN, AW

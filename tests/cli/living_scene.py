@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-from catseye.records.site_folder import site_files
+from catseye.records.site.folder import site_files
 from simulator.living_scene import site
 
 RUN = (sys.executable, "-P", "-c", "from catseye.cli.main import run; run()")

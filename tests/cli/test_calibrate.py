@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from catseye.records.calibration import CalibrationRecord
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.laboratory.calibration import CalibrationRecord
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples" / "calibrations"

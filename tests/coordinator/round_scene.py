@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from catseye.coordinator.parts import SiteState
 from catseye.coordinator.visibility.vantage import retros_of, vantages_of
 from catseye.ranger.initialisation import mount_from_reflector
-from catseye.records.keep_out import KeepOut
-from catseye.records.live import TICK_SECONDS, LivePosture
-from catseye.records.reading import read_record
-from catseye.records.site_folder import read_site
+from catseye.records.files.reading import read_record
+from catseye.records.night.live import TICK_SECONDS, LivePosture
+from catseye.records.site.folder import read_site
+from catseye.records.site.keep_out import KeepOut
 from repository import ROOT
 
 DAY = 100_000_000

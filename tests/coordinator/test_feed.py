@@ -14,7 +14,7 @@ from catseye.coordinator.parts import ticks_now
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, parse_reply, stamp_text
 from catseye.ranger.server import LOOPBACK
-from catseye.records.live import LivePosture
+from catseye.records.night.live import LivePosture
 from coordinator.link_scene import LoopClock, network, run, until
 
 

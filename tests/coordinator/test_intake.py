@@ -8,7 +8,7 @@ import pytest
 from catseye.coordinator.herald import Herald
 from catseye.coordinator.intake import Intake
 from catseye.coordinator.parts import NotDurable
-from catseye.records.live import Happening, LiveWeather
+from catseye.records.night.live import Happening, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 
 CLOCK = ManualClock(60_635.125)

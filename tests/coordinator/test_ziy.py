@@ -7,7 +7,7 @@ import pytest
 
 from catseye.coordinator.journal.entries import AnsweredShot, Command, Solution
 from catseye.errors import EstimationError, InputError
-from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from coordinator.link_scene import COMMANDS, MemoryJournal, run, until
 from coordinator.ziy_scene import ListLive, ListPlanner, Site, posture, weather
 

@@ -10,8 +10,8 @@ import numpy as np
 from catseye.coordinator.feed import MotionScript
 from catseye.coordinator.parts import Round, ticks_now
 from catseye.coordinator.ziy import Coordinator
-from catseye.records.live import LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import read_site
+from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import read_site
 from coordinator.link_scene import COMMANDS, Free, LoopClock, MemoryJournal, Served, network, planned, until
 from repository import ROOT
 

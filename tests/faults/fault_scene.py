@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
-from catseye.records.live import Happening
-from catseye.records.site_folder import SiteFolder, read_site
+from catseye.records.night.live import Happening
+from catseye.records.site.folder import SiteFolder, read_site
 from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.coordinator import LiveCoordinator, Orders
 from catseye.service.rangers import Listening, RangersServed

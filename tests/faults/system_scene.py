@@ -17,7 +17,7 @@ from catseye.coordinator.clients.server import PUSHED
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.ranger.addresses import ranger_addresses
-from catseye.records.site_folder import read_site
+from catseye.records.site.folder import read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 from catseye.simulator.clock.world_clock import SystemClock

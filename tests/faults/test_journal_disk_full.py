@@ -16,7 +16,7 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.coordinator.parts import NotDurable
 from catseye.errors import InputError
-from catseye.records.live import Happening
+from catseye.records.night.live import Happening
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, scene_answer, scene_run
 

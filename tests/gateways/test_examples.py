@@ -11,7 +11,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.gateways import examples
 from catseye.gateways.examples import bundled_site, example_campaign, site_directory
-from catseye.records.site_folder import read_site, site_files
+from catseye.records.site.folder import read_site, site_files
 from catseye.reduction.site.places import places_of
 from repository import ROOT
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from catseye.estimation.ambiguity import AmbiguityStatus, locate
+from catseye.estimation.ambiguity.search import AmbiguityStatus, locate
 from catseye.signal.cycles import decision, fraction, memo_whole_cycles, slip_probability, unwrapped_length
 from catseye.signal.joint_length import JointStatus, joint_length
 

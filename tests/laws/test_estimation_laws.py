@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Distances, Linear
 
 seeds = st.integers(0, 2**32 - 1)

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation.network import Network, Parameter, Points
-from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.model import Network, Parameter, Points
 from catseye.estimation.observations import (
     Coordinates,
     Directions,

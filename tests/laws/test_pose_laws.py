@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation.pose import fit_pose
+from catseye.estimation.shapes.pose import fit_pose
 from catseye.geometry.frame import Transform
 
 coordinate = st.floats(-100.0, 100.0)

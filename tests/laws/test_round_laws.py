@@ -20,7 +20,7 @@ from catseye.coordinator.visibility.vantage import Vantage
 from catseye.geometry.pointing import Station
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
-from catseye.records.live import TICK_SECONDS, LivePosture
+from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.reduction.site.earth_rotation import Place
 from coordinator.round_scene import DEGREE, angle, axes, beams, gbt, hits, keep_out, origin, stands, state, walk
 from ranger.ranger_scene import ready

@@ -5,7 +5,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.optics.zernike import Term, disk_quadrature, number, orthonormal, term, terms, zernike
-from catseye.records.site_folder import read_site
+from catseye.records.site.folder import read_site
 from repository import ROOT
 
 SITE = ROOT / "examples" / "sites" / "gbt"

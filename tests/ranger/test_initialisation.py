@@ -24,7 +24,7 @@ from catseye.ranger.initialisation import (
 from catseye.ranger.line import format_request
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.status import Status
-from catseye.records.site_folder import read_site
+from catseye.records.site.folder import read_site
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.site.stations import station_in
 from ranger.ranger_scene import Told

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
 from catseye.ranger import motion_units as units
-from catseye.records.mirror import MirrorGeometry
+from catseye.records.site.mirror import MirrorGeometry
 
 
 def test_the_data_sheet_s_worked_example():

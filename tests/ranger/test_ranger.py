@@ -803,7 +803,7 @@ def test_the_way_out_keeps_clear_of_other_suns():
 
 def test_the_ranger_s_own_sun_is_the_almanac_s_within_half_a_second_and_sets():
     from catseye.ranger.sun_watch import own_sun
-    from catseye.records.site import Location
+    from catseye.records.site.site import Location
     from catseye.reduction.site.earth_rotation import sun_at
 
     place = Location(latitude_deg=38.433, longitude_deg=-79.84, elevation_of_z0_m=806.0)

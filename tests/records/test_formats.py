@@ -5,27 +5,27 @@ from datetime import date
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.actuators import ActuatorCorrection, ActuatorPosition
-from catseye.records.beam import BeamTrain
-from catseye.records.interlock import Interlocks
-from catseye.records.keep_out import KeepOut
-from catseye.records.mirror import Mirror, MirrorGeometry
-from catseye.records.monument import Monument, MonumentGeometry
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelCorner
-from catseye.records.path_temperature import PathTemperature
-from catseye.records.pointing_model import PointingModel
-from catseye.records.reading import Folder, read_record
-from catseye.records.record import Record
-from catseye.records.recording import AcousticSheet
-from catseye.records.shot import Shot, read_buffers
-from catseye.records.site import Site
-from catseye.records.solids import Solids
-from catseye.records.structural_model import StructuralModel
-from catseye.records.target import Benchmark, FeedArm, Targets
-from catseye.records.triplet import Triplet
-from catseye.records.triplet_measurement import TripletMeasurement
-from catseye.records.weather import WeatherSample
+from catseye.records.files.reading import Folder, read_record
+from catseye.records.files.record import Record
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
+from catseye.records.night.path_temperature import PathTemperature
+from catseye.records.night.recording import AcousticSheet
+from catseye.records.night.shot import Shot, read_buffers
+from catseye.records.night.weather import WeatherSample
+from catseye.records.panels.actuators import ActuatorCorrection, ActuatorPosition
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelCorner
+from catseye.records.site.beam import BeamTrain
+from catseye.records.site.interlock import Interlocks
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.mirror import Mirror, MirrorGeometry
+from catseye.records.site.monument import Monument, MonumentGeometry
+from catseye.records.site.pointing_model import PointingModel
+from catseye.records.site.site import Site
+from catseye.records.site.solids import Solids
+from catseye.records.site.structural_model import StructuralModel
+from catseye.records.site.target import Benchmark, FeedArm, Targets
+from catseye.records.site.triplet import Triplet
 from catseye.reduction.air.refractometer_night import PathSheet
 from repository import TESTS
 

@@ -8,12 +8,12 @@ import pytest
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.geometry.pointing_series import TERMS
-from catseye.records.pointing_model import PointingModel
-from catseye.records.reading import read_record
-from catseye.records.solved_points import read_solved_points
-from catseye.records.star_offsets import read_star_offsets
-from catseye.records.tilts import read_tilts
-from catseye.records.toml_text import record_toml
+from catseye.records.files.reading import read_record
+from catseye.records.files.toml_text import record_toml
+from catseye.records.laboratory.star_offsets import read_star_offsets
+from catseye.records.laboratory.tilts import read_tilts
+from catseye.records.network.solved_points import read_solved_points
+from catseye.records.site.pointing_model import PointingModel
 from repository import TESTS
 
 MODEL = """\

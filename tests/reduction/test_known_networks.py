@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from catseye.estimation.network_adjustment import adjust_network
-from catseye.records.network import read_network
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.records.network.any_file import read_network
 from repository import TESTS
 
 NETWORKS = TESTS / "vectors" / "networks"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from catseye.estimation.propagation import draw_inputs
-from catseye.records.campaign import REFERENCE, read_campaign
+from catseye.estimation.quality.propagation import draw_inputs
+from catseye.records.night.campaign import REFERENCE, read_campaign
 from catseye.reduction.budget import Assumptions, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import budget_of, scatter_of

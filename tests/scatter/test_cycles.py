@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from catseye.estimation.ambiguity import AmbiguityStatus, locate
+from catseye.estimation.ambiguity.search import AmbiguityStatus, locate
 
 HALF = 0.0999
 RUNS = [pytest.param(200, id="quick"), pytest.param(3000, id="full", marks=pytest.mark.slow)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 from live_scene import begun, deviations, lasting, site
 
 TRACK = "track 145.3 45"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from catseye.geometry.frame import Transforms
-from catseye.records.live import TICKS_PER_DAY
+from catseye.records.night.live import TICKS_PER_DAY
 from catseye.reduction.live.live import LiveSettings
 from catseye.reduction.site.motion import ground_from
 from catseye.simulator.twin.beam import TracedDish

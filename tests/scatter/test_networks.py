@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from catseye.estimation.network_adjustment import adjust_network
-from catseye.estimation.reliability import single_level, w_critical
-from catseye.estimation.robustness import MOST_INFLATION, snoop
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.quality.reliability import single_level, w_critical
+from catseye.estimation.quality.robustness import MOST_INFLATION, snoop
 
 SIGMA = 5e-5  # m
 RUNS = [pytest.param(200, id="quick"), pytest.param(2000, id="full", marks=pytest.mark.slow)]

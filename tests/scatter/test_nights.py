@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Conditions, simulate_night, write_night
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.gateways.writers.objects import json_line
-from catseye.records.live import Happening, LivePosture, LiveShot
+from catseye.records.night.live import Happening, LivePosture, LiveShot
 from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.objects import epoch_line, simulation_object, summary

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
-from catseye.records.live import LiveShot
+from catseye.records.night.live import LiveShot
 from catseye.service.comparison import TwinComparison
 from simulator.living_scene import only, site, twin
 

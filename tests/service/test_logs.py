@@ -5,7 +5,7 @@ import json
 import pytest
 
 from catseye.coordinator.journal.entries import Solution
-from catseye.records.live import Happening, LiveWeather
+from catseye.records.night.live import Happening, LiveWeather
 from catseye.service.logs import LiveLog
 from catseye.simulator.clock.world_clock import ManualClock
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from catseye.records.site_folder import SiteFolder, read_site
+from catseye.records.site.folder import SiteFolder, read_site
 from catseye.simulator.night.faults import EFFECTS
 from catseye.simulator.twin.conditions import LIVING_EFFECTS, LIVING_NIGHT, LivingPlanted
 from catseye.simulator.twin.motion import Motion

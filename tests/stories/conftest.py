@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Faults, simulate_night, write_night
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.records.campaign import REFERENCE
+from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import reduce_epoch
 
 

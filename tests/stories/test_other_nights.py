@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import SUMMER_DAY, WINTER, simulate_night, write_night
 

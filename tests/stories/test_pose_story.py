@@ -11,10 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.estimation.pose import fit_pose
-from catseye.estimation.rigid_body import motion_columns
-from catseye.records.site_folder import read_site
-from catseye.records.solved_points import SolvedPoints
+from catseye.estimation.shapes.pose import fit_pose
+from catseye.estimation.shapes.rigid_body import motion_columns
+from catseye.records.network.solved_points import SolvedPoints
+from catseye.records.site.folder import read_site
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose.pose import pose_of_group
 from catseye.reduction.site.bodies import bodies_of

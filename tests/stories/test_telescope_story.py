@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.optics.zernike import Term, zernike
-from catseye.records.solved_points import SolvedPoints
+from catseye.records.network.solved_points import SolvedPoints
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose.pose import pose_of_group

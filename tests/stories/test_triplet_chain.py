@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from catseye.estimation.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Coordinates, Distances, Linear
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.ties import (

@@ -13,7 +13,7 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.records.baseline import Baseline, Heights, Observations
+    from catseye.records.laboratory.baseline import Baseline, Heights, Observations
     from catseye.reduction.baseline.instrument import BaselineCalibration
     from catseye.reduction.baseline.lengths import BaselineSettings
 
@@ -185,7 +185,7 @@ def _calibrated(
     observations: Path, heights: Path | None, against: Path | None, settings: "BaselineSettings", progress: ProgressLine
 ) -> "tuple[BaselineCalibration, dict[str, str]]":
     """The calibration, and the SHA-256 of each file that was read."""
-    from catseye.records.baseline import digest_of, read_baseline, read_heights, read_observations
+    from catseye.records.laboratory.baseline import digest_of, read_baseline, read_heights, read_observations
     from catseye.reduction.baseline.instrument import calibrate_baseline
 
     seen: Observations = read_observations(observations)

@@ -11,7 +11,7 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.reduction.epoch.settings import Settings
 
 if TYPE_CHECKING:
-    from catseye.records.campaign import Campaign
+    from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget import Explanation
 
 FEWEST = 1000  # draws that show a 95 % interval at all

@@ -11,7 +11,7 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
-    from catseye.estimation.network import Network
+    from catseye.estimation.network.model import Network
     from catseye.gateways.network.findings import Findings
     from catseye.gateways.network.plan import PlanFindings
     from catseye.reduction.network import Adjusted
@@ -117,7 +117,7 @@ def adjust(
             refuse_output(out, source)
     try:
         from catseye.gateways.network.findings import findings
-        from catseye.records.network import read_network
+        from catseye.records.network.any_file import read_network
         from catseye.reduction.network import adjusted
 
         treated = [
@@ -207,7 +207,7 @@ def _compared(
     quiet: bool,
     progress: ProgressLine,
 ) -> None:
-    from catseye.estimation.comparison import compare
+    from catseye.estimation.deformation.comparison import compare
     from catseye.gateways.network.comparison import Comparison, comparison_object
     from catseye.gateways.writers.objects import json_line
 
@@ -277,11 +277,11 @@ def plan(
 
         refuse_output(out, network)
     try:
-        from catseye.estimation.plan import plan as planned
-        from catseye.estimation.plan import schedule
+        from catseye.estimation.network.plan import plan as planned
+        from catseye.estimation.network.plan import schedule
         from catseye.gateways.network.findings import findings
         from catseye.gateways.network.plan import PlanFindings
-        from catseye.records.network import read_network
+        from catseye.records.network.any_file import read_network
         from catseye.reduction.network import measured_on_paper
 
         read = _read(read_network, network)

@@ -142,12 +142,12 @@ def point(
     )
     from catseye.gateways.writers.objects import json_line
     from catseye.geometry.time_tag import mjd_of
-    from catseye.records.coordinate_list import read_coordinates
-    from catseye.records.keep_out import KeepOut
-    from catseye.records.mirror import MirrorGeometry
-    from catseye.records.monument import MonumentGeometry
-    from catseye.records.reading import read_record
-    from catseye.records.solids import Solids
+    from catseye.records.files.reading import read_record
+    from catseye.records.laboratory.coordinate_list import read_coordinates
+    from catseye.records.site.keep_out import KeepOut
+    from catseye.records.site.mirror import MirrorGeometry
+    from catseye.records.site.monument import MonumentGeometry
+    from catseye.records.site.solids import Solids
     from catseye.reduction.site.stations import point as pointed
     from catseye.reduction.site.stations import station_of
     from catseye.reduction.steering.sighting import place_of_monument, seen_from, sightings

@@ -52,8 +52,8 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
         return []
     from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
     from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.records.reading import Folder
-    from catseye.records.triplet_measurement import TripletMeasurement
+    from catseye.records.files.reading import Folder
+    from catseye.records.laboratory.triplet_measurement import TripletMeasurement
     from catseye.reduction.triplet.unit import reduce_triplet
 
     if out is not None:

@@ -28,7 +28,7 @@ from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import Reply
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveWeather
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
 
 REAL = re.compile(r"[+-]?[0-9]{1,9}(\.[0-9]{0,20})?([eE][+-]?[0-9]{1,2})?")
 STATION = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")

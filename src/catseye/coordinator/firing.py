@@ -16,8 +16,8 @@ from catseye.coordinator.modes import Suspensions
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, LiveReduction, PlannedShot, Round, ticks_now
 from catseye.errors import CatseyeError
 from catseye.ranger.initialisation import frame_of
-from catseye.records.live import TICKS_PER_DAY
-from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.night.live import TICKS_PER_DAY
+from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.reduction.site.motion import frames_of
 
 GOOD = frozenset(["used", "reference"])

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
-from catseye.records.live import Happening, Severity
+from catseye.records.night.live import Happening, Severity
 
 QUIET = 10.0  # s between two of one kind
 MOST_KINDS = 4096  # kept; the oldest are forgotten

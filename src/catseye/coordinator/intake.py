@@ -16,7 +16,7 @@ from catseye.coordinator.herald import Herald
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Command, Document, Solution
 from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
-from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 
 TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back

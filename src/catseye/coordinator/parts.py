@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request
-from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
 
 TICKS_PER_SECOND = TICKS_PER_DAY / SECONDS_PER_DAY
 

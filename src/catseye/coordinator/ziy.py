@@ -33,8 +33,8 @@ from catseye.coordinator.parts import (
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
-from catseye.records.live import Happening, LivePosture, LiveWeather
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import Happening, LivePosture, LiveWeather
+from catseye.records.site.folder import SiteFolder
 
 WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.records.refusal import shown
+from catseye.records.files.refusal import shown
 
 NIGHT = Path("examples", "night-01")
 SITES = Path("examples", "sites")

@@ -10,7 +10,7 @@ from typing import Literal
 
 from catseye.errors import InputError
 from catseye.ranger.server import LOOPBACK, PORTS
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 
 PORT_BASE = 24_100
 FEED_PORT = 5250

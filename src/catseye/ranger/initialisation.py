@@ -16,9 +16,9 @@ from catseye.errors import InputError
 from catseye.geometry.pointing import Station
 from catseye.ranger.commands import MOST_CUBES
 from catseye.ranger.line import Request
-from catseye.records.mirror import Mirror
-from catseye.records.site_folder import REFERENCE, SiteFolder
-from catseye.records.target import FeedArmRanger
+from catseye.records.site.folder import REFERENCE, SiteFolder
+from catseye.records.site.mirror import Mirror
+from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.places import Place, nominal_frame, places_of
 from catseye.reduction.site.stations import offset_of, station_of
 

@@ -12,7 +12,7 @@ from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.slew import Pace
-from catseye.records.mirror import MirrorGeometry
+from catseye.records.site.mirror import MirrorGeometry
 
 CLOCK_HZ = 6e6
 CLOCKS_PER_SAMPLE = 2048

@@ -16,7 +16,7 @@ from catseye.geometry.encoder import COUNTS_PER_TURN
 from catseye.geometry.keep_out import servo_margin
 from catseye.geometry.pointing import Station, beam
 from catseye.geometry.sun import EARLIEST_MJD, altitude_azimuth
-from catseye.records.site import Location
+from catseye.records.site.site import Location
 from catseye.reduction.site.earth_rotation import Place, place_of, rotation_at, sun_at
 
 HALF_ANGLE = 5.0 * DEGREE

@@ -7,15 +7,15 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import CONVERGED, Fit
-from catseye.estimation.approximate import approximate
-from catseye.estimation.monte_carlo import Disturbance, Scatter, scatter
-from catseye.estimation.network import Network, NetworkSolution, points_of
-from catseye.estimation.network_adjustment import adjust_network, with_datum
+from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
+from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.approximate import approximate
+from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.network.monte_carlo import Disturbance, Scatter, scatter
+from catseye.estimation.network.ranging_engine import RangingCovariance
 from catseye.estimation.observations import Distances
-from catseye.estimation.ranging_engine import RangingCovariance
-from catseye.estimation.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
-from catseye.estimation.variance_components import Components, GroupFactors, RowModel, variance_components
+from catseye.estimation.quality.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
+from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
 
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 

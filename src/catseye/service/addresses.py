@@ -13,10 +13,10 @@ from pathlib import Path
 
 from catseye.coordinator.link.settings import Address
 from catseye.ranger.server import PORTS
-from catseye.records.reading import Folder, toml_of
-from catseye.records.refusal import refusal, shown
-from catseye.records.site_folder import SiteFolder
-from catseye.records.toml_fields import Fields
+from catseye.records.files.reading import Folder, toml_of
+from catseye.records.files.refusal import refusal, shown
+from catseye.records.files.toml_fields import Fields
+from catseye.records.site.folder import SiteFolder
 
 FORMAT = "catseye-addresses-1"
 LAST_PORT = 65_535

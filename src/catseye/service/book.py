@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
-from catseye.records.live import Happening, LivePosture
+from catseye.records.night.live import Happening, LivePosture
 from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.logs import epoch_of
 

@@ -27,11 +27,11 @@ from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.network import Network
 from catseye.ranger.server import LOOPBACK
-from catseye.records.interlock import Interlocks
-from catseye.records.keep_out import KeepOut
-from catseye.records.reading import read_record
-from catseye.records.site_folder import SiteFolder
-from catseye.records.solids import Solids
+from catseye.records.files.reading import read_record
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.interlock import Interlocks
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.solids import Solids
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess

@@ -6,7 +6,7 @@ from typing import Any
 
 from catseye.constants import ARCSECOND
 from catseye.coordinator.firing import OF_THE_LINE
-from catseye.records.live import TICKS_PER_DAY
+from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.book import GOOD, LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.world import World

@@ -13,7 +13,7 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
 from catseye.ranger.head import Head
 from catseye.ranger.network import Network, SocketListener, Sockets
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
 from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.twin.faults import FaultBoard

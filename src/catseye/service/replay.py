@@ -13,7 +13,7 @@ from catseye.coordinator.journal.entries import Solution
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
 from catseye.errors import InputError
-from catseye.records.site_folder import SiteFolder, read_site
+from catseye.records.site.folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 

@@ -12,7 +12,7 @@ from catseye.constants import DEGREE
 from catseye.coordinator.firing import OF_THE_LINE
 from catseye.coordinator.journal.entries import Solution
 from catseye.gateways.writers.interruption import undone_when_interrupted
-from catseye.records.live import Happening
+from catseye.records.night.live import Happening
 from catseye.service.book import GOOD, LiveBook
 from catseye.service.logs import one_line, time_text
 from catseye.service.objects import beam_lines, epoch_line

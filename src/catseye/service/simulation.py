@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.service.book import LiveBook
 from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison

@@ -16,7 +16,7 @@ from functools import partial
 from typing import Any, BinaryIO
 
 from catseye.coordinator.parts import EpochJob
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 
 PROGRAM = (sys.executable, "-P", "-c", "from catseye.service.solver import serve; serve()")
 NICE = 5

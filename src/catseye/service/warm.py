@@ -15,8 +15,8 @@ from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
 from catseye.ranger.ranger import Ranger
-from catseye.records.live import LivePosture
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import LivePosture
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.places import places_of
 from catseye.simulator.clock.world_clock import Clock
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from catseye.coordinator.visibility.vantage import pace_by
 from catseye.errors import InputError
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.simulator.clock.world_clock import Clock, SystemClock
 from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
 from catseye.simulator.twin.faults import Fault, FaultBoard

@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from catseye.records.path_temperature import PathTemperature
-from catseye.records.reading import Folder
-from catseye.records.recording import read_sheet, wav_bytes, wav_samples
+from catseye.records.files.reading import Folder
+from catseye.records.night.path_temperature import PathTemperature
+from catseye.records.night.recording import read_sheet, wav_bytes, wav_samples
 from catseye.signal.delay import DelayPlan
 from catseye.signal.waveform import sampled
 from repository import ROOT

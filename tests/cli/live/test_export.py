@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.records.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign
 from cli.living_scene import recorded
 
 

@@ -113,7 +113,7 @@ def test_an_inclinometer_makes_the_alidade_surer(catseye, night, tmp_path):
     # the elevation bearing's targets are typed in the reflector frame at this posture: told as the alidade's
     from catseye.constants import DEGREE
     from catseye.geometry.antenna import ground_from_alidade
-    from catseye.records.solved_points import read_solved_points
+    from catseye.records.network.solved_points import read_solved_points
 
     names = ["ZAG731P", "ZAG731D", "ZEG41040L"]
     x = ground_from_alidade(145.3 * DEGREE).inverse().points(read_solved_points(night).places(names))

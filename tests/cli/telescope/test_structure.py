@@ -12,7 +12,7 @@ from catseye.coordinator.journal.writer import Journal
 from catseye.gateways.writers.samplers_fits import read_samplers
 from catseye.geometry.antenna import ground_from_reflector
 from catseye.geometry.rotation import from_vector
-from catseye.records.live import LiveShot, LiveWeather
+from catseye.records.night.live import LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_run
 

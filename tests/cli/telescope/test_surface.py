@@ -8,7 +8,7 @@ import pytest
 
 from catseye.gateways.epoch.files import write_reduction
 from catseye.optics.zernike import Term
-from catseye.records.actuators import read_corrections
+from catseye.records.panels.actuators import read_corrections
 from surface_scene import NAMES, half_path_of, prisms
 
 ROWS = np.arange(0, len(NAMES), 12)

@@ -12,7 +12,7 @@ from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import LONGEST_REQUEST, parse_reply
 from catseye.ranger.server import LOOPBACK
-from catseye.records.live import Happening, LivePosture, LiveShot
+from catseye.records.night.live import Happening, LivePosture, LiveShot
 from coordinator.link_scene import network, run, until
 from coordinator.ziy_scene import Answer, Site
 

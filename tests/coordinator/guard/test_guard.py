@@ -9,8 +9,8 @@ from catseye.errors import InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
 from catseye.ranger.status import Status
-from catseye.records.interlock import Interlock, Interlocks
-from catseye.records.live import TICK_SECONDS, LivePosture
+from catseye.records.night.live import TICK_SECONDS, LivePosture
+from catseye.records.site.interlock import Interlock, Interlocks
 from coordinator.round_scene import DAY, DEGREE, MORNING, NIGHT, angle, beams, gbt, keep_out, posture, stands
 from sun_scene import astropy_sun
 

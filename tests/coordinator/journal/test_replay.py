@@ -12,7 +12,7 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
-from catseye.records.live import Happening, LivePosture, LiveWeather
+from catseye.records.night.live import Happening, LivePosture, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, scene_run, scene_shot
 

@@ -17,7 +17,7 @@ from catseye.coordinator.journal.place import place_of, reading_engine
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import MOST_WAITING, Journal
 from catseye.errors import InputError
-from catseye.records.live import Happening, LiveWeather
+from catseye.records.night.live import Happening, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import (
     MOST_WAIT,
@@ -116,7 +116,7 @@ def test_a_site_changed_on_disk_is_kept_as_it_was_read(tmp_path):
     import shutil
 
     from catseye.coordinator.journal.entries import Run
-    from catseye.records.site_folder import read_site
+    from catseye.records.site.folder import read_site
     from journal_scene import NIGHT
 
     folder = tmp_path / "site"

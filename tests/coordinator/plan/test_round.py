@@ -9,9 +9,9 @@ from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.visibility.vantage import nominal_posture
 from catseye.errors import InputError
 from catseye.geometry.slew import trapezoid
-from catseye.records.live import TICK_SECONDS, LivePosture
-from catseye.records.reading import read_record
-from catseye.records.solids import Solids
+from catseye.records.files.reading import read_record
+from catseye.records.night.live import TICK_SECONDS, LivePosture
+from catseye.records.site.solids import Solids
 from coordinator.round_scene import DEGREE, MORNING, NIGHT, ROOT, gbt, placed, posture, stands, state, targets
 
 TRACKING = 15 / 3600 * DEGREE

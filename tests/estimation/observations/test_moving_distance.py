@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Distances, Linear, MovingDistances
 
 seeds = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from catseye.estimation import observations as kinds
-from catseye.estimation.observations.pose import right_jacobian
+from catseye.estimation.observations.bodies.pose import right_jacobian
 from catseye.estimation.observations.unit_direction import direction
 from catseye.geometry.rotation import from_vector, skew
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Coordinates, Linear, RigidTriplets
 from catseye.estimation.observations.unit_direction import across
 

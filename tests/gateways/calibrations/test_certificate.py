@@ -13,9 +13,9 @@ from catseye.errors import InputError
 from catseye.gateways.calibrations.certificate import _cell, _form, certificate, rounded
 from catseye.gateways.calibrations.certificate_record import MARK, calibration_object, calibration_toml
 from catseye.gateways.writers.objects import json_line
-from catseye.records.calibration import CalibrationRecord
-from catseye.records.mirror import Mirror
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.laboratory.calibration import CalibrationRecord
+from catseye.records.site.mirror import Mirror
 from catseye.reduction.calibrations import calibrate
 from repository import ROOT
 
@@ -124,7 +124,7 @@ def test_odd_names_survive_toml(made):
 def test_a_bad_record_is_refused_in_one_line(made, tmp_path, change, said):
     from pydantic import ValidationError
 
-    from catseye.records.refusal import explained
+    from catseye.records.files.refusal import explained
 
     document = tomllib.loads(calibration_toml(made("leakage")))
     bad = copy.deepcopy(document)

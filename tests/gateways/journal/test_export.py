@@ -14,8 +14,8 @@ from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.export import FORMAT, TABLES, export_tables, stamp
 from catseye.gateways.writers import output
-from catseye.records.campaign import read_campaign
-from catseye.records.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.campaign import read_campaign
+from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_entries, scene_run, scene_shot
 

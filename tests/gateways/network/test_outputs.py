@@ -12,8 +12,8 @@ import pytest
 from scipy.stats import chi2
 
 from catseye.errors import EstimationError
-from catseye.estimation.comparison import compare
-from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.deformation.comparison import compare
+from catseye.estimation.network.adjustment import adjust_network
 from catseye.gateways.network.comparison import Comparison, comparison_object, comparison_passages, displacements_csv
 from catseye.gateways.network.files import input_hashes, write_comparison, write_network
 from catseye.gateways.network.findings import findings
@@ -21,8 +21,8 @@ from catseye.gateways.network.objects import network_json, network_object
 from catseye.gateways.network.summary import treatment_passages
 from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
 from catseye.gateways.network.xml import NAMESPACE, network_xml
-from catseye.records.gama import read_gama
-from catseye.records.network_folder import read_network_folder
+from catseye.records.network.folder import read_network_folder
+from catseye.records.network.gama import read_gama
 from catseye.reduction.network import adjusted
 from repository import TESTS
 

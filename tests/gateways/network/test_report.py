@@ -12,9 +12,9 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.quiver import Quiver
 from scipy.stats import chi2
 
-from catseye.estimation.comparison import compare
-from catseye.estimation.ellipsoid import PLAN, elevation_view
-from catseye.estimation.network_adjustment import adjust_network
+from catseye.estimation.deformation.comparison import compare
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.quality.ellipsoid import PLAN, elevation_view
 from catseye.gateways.network import comparison_report as comparison
 from catseye.gateways.network import figures
 from catseye.gateways.network.comparison import Comparison
@@ -22,8 +22,8 @@ from catseye.gateways.network.comparison_report import comparison_report
 from catseye.gateways.network.findings import findings
 from catseye.gateways.network.report import network_report
 from catseye.gateways.network.summary import direction_words, passages, verdict
-from catseye.records.gama import read_gama
-from catseye.records.network_folder import read_network_folder
+from catseye.records.network.folder import read_network_folder
+from catseye.records.network.gama import read_gama
 from repository import TESTS
 
 NETWORKS = TESTS / "vectors" / "networks"

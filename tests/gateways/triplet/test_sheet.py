@@ -17,8 +17,8 @@ from catseye.gateways.triplet.sheet import cell, html_sheet, text_sheet, verdict
 from catseye.gateways.triplet.symbols import PLACEMENT, UNIT, point_places, symbol_values
 from catseye.gateways.triplet.symbols import PLATE as PLATE_SYMBOLS
 from catseye.gateways.writers.objects import json_line, plain
-from catseye.records.reading import read_record
-from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.records.files.reading import read_record
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.unit import reduce_triplet
 from triplet_scene import SHEET, document, measurement
 

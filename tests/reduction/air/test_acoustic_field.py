@@ -6,7 +6,7 @@ import pytest
 from catseye.atmosphere.air import group_refractivity
 from catseye.atmosphere.sound import sound
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.tomography import Prior, Scale
+from catseye.estimation.shapes.tomography import Prior, Scale
 from catseye.reduction.air.acoustic import NO_TIME, OUTSIDE, USED
 from catseye.reduction.air.acoustic_field import COMMON, sound_field
 
@@ -106,7 +106,7 @@ def scatter(runs, seed):
 def test_claims_hold_over_fields_of_another_kind_and_all_causes():
     for z in scatter(150, 21):
         # the field is calmer than the prior, so that claims are generous: 0.35; short they must not be, 3 sigma of 150
-        # squares being 0.35 (that claims are exact where the prior is: tests/estimation/test_tomography.py)
+        # squares being 0.35 (that claims are exact where the prior is: tests/estimation/shapes/test_tomography.py)
         assert 0.15 < np.mean(z**2) < 1.35
 
 

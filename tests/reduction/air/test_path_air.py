@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.weather import Weather
+from catseye.records.night.weather import Weather
 from catseye.reduction.air.path_air import site_air, site_readings
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.settings import Settings

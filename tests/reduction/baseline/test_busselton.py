@@ -9,7 +9,14 @@ import csv
 import numpy as np
 import pytest
 
-from catseye.records.baseline import FORMAT, Baseline, baseline_text, read_baseline, read_heights, read_observations
+from catseye.records.laboratory.baseline import (
+    FORMAT,
+    Baseline,
+    baseline_text,
+    read_baseline,
+    read_heights,
+    read_observations,
+)
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
 from catseye.reduction.baseline.lengths import BaselineSettings
 from repository import ROOT

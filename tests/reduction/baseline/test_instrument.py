@@ -9,9 +9,9 @@ import pytest
 from catseye.atmosphere.air import group_refractivity
 from catseye.atmosphere.velocity import EARTH_RADIUS
 from catseye.errors import EstimationError, InputError, ValidityError
-from catseye.estimation.baseline import adjust_baseline
-from catseye.estimation.baseline_model import Claim, Sights
-from catseye.records.baseline import FORMAT, Baseline, read_heights, read_observations
+from catseye.estimation.baseline.adjustment import adjust_baseline
+from catseye.estimation.baseline.model import Claim, Sights
+from catseye.records.laboratory.baseline import FORMAT, Baseline, read_heights, read_observations
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
 from catseye.reduction.baseline.lengths import BaselineSettings, horizontal_distance, reduce_lengths
 from catseye.reduction.baseline.statistical_tests import suspects_of

@@ -8,10 +8,10 @@ from scipy.stats import t as student
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.propagation import agrees, numerical_sensitivity
+from catseye.estimation.quality.propagation import agrees, numerical_sensitivity
 from catseye.optics.prism import oblique_change
-from catseye.records.campaign import REFERENCE
-from catseye.records.path_temperature import PathTemperatureTable
+from catseye.records.night.campaign import REFERENCE
+from catseye.records.night.path_temperature import PathTemperatureTable
 from catseye.reduction.budget import Assumptions, explain_shot, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import _cycles, _places, budget_of, scatter_of

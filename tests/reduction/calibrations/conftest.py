@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibration_scene import PROVENANCE
-from catseye.records.readings import Readings
+from catseye.records.files.readings import Readings
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from datetime import date
 
 import numpy as np
 
-from catseye.records.readings import Readings
+from catseye.records.files.readings import Readings
 
 WHO = {
     "instrument": "G7",

@@ -8,8 +8,8 @@ import pytest
 from catseye.atmosphere.air import group_refractivity, group_refractivity_of_vapour
 from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
-from catseye.records.path_temperature import PathTemperature, path_temperature_columns
-from catseye.records.weather import Weather
+from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
+from catseye.records.night.weather import Weather
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.settings import Settings
 

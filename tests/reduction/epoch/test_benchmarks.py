@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.campaign import read_campaign
-from catseye.records.path_temperature import PathTemperature, path_temperature_columns
+from catseye.records.night.campaign import read_campaign
+from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator import Faults, simulate_night, write_night

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.target import Target
+from catseye.records.site.target import Target
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.cycles import doubtful_points, resolve_cycles
 from catseye.reduction.epoch.epoch import reduce_epoch

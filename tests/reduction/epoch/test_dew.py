@@ -8,7 +8,7 @@ import pytest
 from catseye.atmosphere import humidity
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
-from catseye.records.weather import Weather
+from catseye.records.night.weather import Weather
 from catseye.reduction.epoch.dew import SurfaceTemperature, dew_risk
 
 START = 52889.125

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from catseye.atmosphere.air import group_refractivity
-from catseye.estimation.adjustment import CONVERGED
-from catseye.records.campaign import REFERENCE
+from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.dish import dish_advice, dish_prisms
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.site.places import nominal_frame

@@ -12,8 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.adjustment import adjust
-from catseye.records.campaign import read_campaign
+from catseye.estimation.least_squares.adjustment import adjust
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.head import _axes, head_unknowns

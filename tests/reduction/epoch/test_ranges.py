@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.records.campaign import REFERENCE
+from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases, walk_notes
 from catseye.reduction.epoch.settings import Settings
 

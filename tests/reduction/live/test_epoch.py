@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.live.epoch import _lasts, campaign_of
 from catseye.reduction.site.motion import ground_from
 from live_scene import START, begun, site

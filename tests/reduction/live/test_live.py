@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import REFERENCE
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import REFERENCE
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.simulator.twin.conditions import STILL
 from live_scene import DISH, Feed, Night, begun, deviations, lasting, sights, site, twin

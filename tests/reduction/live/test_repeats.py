@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.records.live import LiveShot
+from catseye.records.night.live import LiveShot
 from catseye.reduction.live.repeats import joined_repeats
 from catseye.reduction.live.shots import Taken
 

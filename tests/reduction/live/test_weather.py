@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from catseye.records.live import LiveWeather
+from catseye.records.night.live import LiveWeather
 from catseye.reduction.live.weather import StationWatch
 
 PER_SECOND = 1e8 / 86400.0

@@ -7,8 +7,8 @@ from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.optics import coating, gaussian_beam
 from catseye.optics.detector import Photodiode, spot_range
-from catseye.records.beam import BeamTrain
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.site.beam import BeamTrain
 from catseye.reduction.optics.beam import beam_profile, reduce_beam
 from repository import ROOT
 

@@ -8,8 +8,8 @@ from scipy.optimize import least_squares
 from scipy.stats import norm
 
 from catseye.errors import InputError
-from catseye.estimation.rows import full_jacobian
-from catseye.records.panel_readings import PanelMap
+from catseye.estimation.least_squares.rows import full_jacobian
+from catseye.records.panels.readings import PanelMap
 from catseye.reduction.panels.crew import members, sessions, setting, standing
 from catseye.reduction.panels.heights import conformity, meetings, reduce_panels, surface_rms
 from catseye.reduction.panels.job import verdicts

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import FrameError, InputError
-from catseye.records.solved_points import SolvedPoints
+from catseye.records.network.solved_points import SolvedPoints
 from catseye.reduction.live.pose import live_pose
 from catseye.reduction.live.state import REFERENCE_EPOCH, Carried
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset

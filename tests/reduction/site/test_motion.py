@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.records.live import TICKS_PER_DAY, LivePosture
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture
 from catseye.reduction.site.motion import Motion, PostureTrack, carried_point, frames_of, ground_from
 from live_scene import site
 

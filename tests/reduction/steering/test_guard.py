@@ -9,9 +9,9 @@ from catseye.geometry.keep_out import TOUCH, Box, servo_margin
 from catseye.geometry.pointing import counts, ray
 from catseye.geometry.slew import straight, trapezoid
 from catseye.geometry.time_tag import utc_text
-from catseye.records.keep_out import KeepOut
-from catseye.records.reading import read_record
-from catseye.records.site import Location
+from catseye.records.files.reading import read_record
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.site import Location
 from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
 from catseye.reduction.steering.guard import _cut, guard_of
 from sun_scene import (

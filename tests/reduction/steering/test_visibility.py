@@ -8,7 +8,7 @@ from catseye.errors import InputError
 from catseye.geometry.frame import Transform
 from catseye.geometry.rotation import from_vector
 from catseye.optics.prism import clear_share
-from catseye.records.solids import Solids, read_solids
+from catseye.records.site.solids import Solids, read_solids
 from catseye.reduction.site.places import places_of
 from catseye.reduction.steering.visibility import (
     ACCEPTANCE,

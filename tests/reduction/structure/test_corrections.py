@@ -13,7 +13,7 @@ import pytest
 from catseye.constants import ARCSECOND
 from catseye.errors import EstimationError, InputError
 from catseye.geometry.deformation import Posture
-from catseye.records.structural_model import StructuralModel, read_structural_model, structural_model_toml
+from catseye.records.site.structural_model import StructuralModel, read_structural_model, structural_model_toml
 from catseye.reduction.structure.antenna import UNITS, antenna_of
 from catseye.reduction.structure.corrections import Measured, correct_posture, frame_motion, measured_of
 from catseye.reduction.structure.fit import fit_model, updated_model

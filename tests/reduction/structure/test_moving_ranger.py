@@ -11,9 +11,9 @@ from catseye.geometry.deformation import Posture
 from catseye.geometry.frame import Transform
 from catseye.geometry.pointing import Station, counts
 from catseye.geometry.rotation import from_vector, to_vector
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.structural_model import read_structural_model
-from catseye.records.target import FeedArmRanger
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.structural_model import read_structural_model
+from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
 from catseye.reduction.structure.moving_ranger import Driven, Known, moving_ranger, projected, tracked, vibrating
@@ -50,7 +50,7 @@ def antenna():
 
 @pytest.fixture(scope="module")
 def mirror():
-    from catseye.records.campaign import read_campaign
+    from catseye.records.night.campaign import read_campaign
 
     record = next(iter(read_campaign(EXAMPLE.parents[1] / "night-01").mirrors.values()))
     return MirrorGeometry.model_validate({key: getattr(record, key) for key in MirrorGeometry.model_fields})

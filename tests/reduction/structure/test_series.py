@@ -5,7 +5,7 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError, ValidityError
-from catseye.estimation.harmonic_series import Spread
+from catseye.estimation.harmonic.series import Spread
 from catseye.geometry.deformation import Posture
 from catseye.geometry.rotation import from_vector
 from catseye.reduction.structure.check import left_out

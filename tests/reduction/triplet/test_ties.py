@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import InputError
-from catseye.estimation.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Coordinates, Distances
 from catseye.estimation.observations.unit_direction import across
 from catseye.optics.prism import obliquity_correction

@@ -13,8 +13,8 @@ from catseye.gateways.triplet.objects import triplet_object
 from catseye.gateways.triplet.sheet import text_sheet
 from catseye.gateways.writers.objects import plain
 from catseye.optics import cats_eye, prism
-from catseye.records.reading import read_record
-from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.records.files.reading import read_record
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import half_wavelengths
 from catseye.reduction.triplet.result import TOLERANCE, conformity_probability
 from catseye.reduction.triplet.unit import combined, reduce_triplet, triplet_readings

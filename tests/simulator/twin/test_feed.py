@@ -8,7 +8,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.line import TICK_NS, parse_reply
-from catseye.records.live import LiveWeather
+from catseye.records.night.live import LiveWeather
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from catseye.simulator.twin import feed as site_feed
 from catseye.simulator.twin.faults import Fault, FaultBoard

@@ -12,8 +12,8 @@ from catseye.geometry.time_tag import PER_SECOND, TimeTag
 from catseye.ranger.head import Sampling
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 from catseye.ranger.ranger import Ranger
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.site.mirror import MirrorGeometry
 from catseye.simulator.clock.world_clock import ManualClock
 from catseye.simulator.twin.converter import Converter
 from catseye.simulator.twin.faults import Fault, FaultBoard

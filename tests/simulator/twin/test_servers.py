@@ -10,7 +10,7 @@ from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import format_request
 from catseye.ranger.status import Status
-from catseye.records.site_folder import read_site
+from catseye.records.site.folder import read_site
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from catseye.simulator.twin.faults import Fault, FaultBoard
 from catseye.simulator.twin.servers import TwinSite

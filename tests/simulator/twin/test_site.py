@@ -12,8 +12,8 @@ import pytest
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.geometry.mirror_path import beam_angles, path_change
-from catseye.records.live import LivePosture
-from catseye.records.site_folder import read_site
+from catseye.records.night.live import LivePosture
+from catseye.records.site.folder import read_site
 from catseye.simulator.night.air import group_refractivity_ppm
 from catseye.simulator.twin.conditions import DEWY_NIGHT, STILL, LivingPlanted
 from catseye.simulator.twin.faults import Fault, FaultBoard

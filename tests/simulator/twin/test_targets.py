@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 from catseye.reduction.site.places import places_of
 from catseye.simulator.twin.conditions import STILL
 from catseye.simulator.twin.telescope import low_orders

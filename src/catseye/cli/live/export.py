@@ -73,7 +73,7 @@ def _span(since: str | None, until: str | None) -> tuple[int, int] | None:
     if since is None and until is None:
         return None
     from catseye.geometry.time_tag import mjd_of
-    from catseye.records.live import TICKS_PER_DAY
+    from catseye.records.night.live import TICKS_PER_DAY
 
     low = 0 if since is None else round(mjd_of(since) * TICKS_PER_DAY)
     high = 10**6 * TICKS_PER_DAY if until is None else round(mjd_of(until) * TICKS_PER_DAY)

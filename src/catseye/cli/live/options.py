@@ -12,7 +12,7 @@ from catseye.cli.terminal import say
 from catseye.errors import CatseyeError
 
 if TYPE_CHECKING:
-    from catseye.records.site_folder import SiteFolder
+    from catseye.records.site.folder import SiteFolder
     from catseye.service.running import LiveRun
 
 CONDITIONS = "night|windy-day|dewy-night"  # as in catseye.service.world, whose import --help spares itself
@@ -148,7 +148,7 @@ SolidsFile = Annotated[Path | None, typer.Option("--solids", metavar="SOLIDS.tom
 def site_of(name: str) -> "SiteFolder":
     """A site's records, by its bundled name or folder."""
     from catseye.gateways.examples import site_directory
-    from catseye.records.site_folder import read_site
+    from catseye.records.site.folder import read_site
 
     return read_site(site_directory(name))
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from catseye.ranger.addresses import Addresses
-    from catseye.records.site_folder import SiteFolder
+    from catseye.records.site.folder import SiteFolder
     from catseye.service.rangers import Listening, RangersServed
 
 

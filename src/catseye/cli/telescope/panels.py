@@ -10,7 +10,7 @@ from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
 
 if TYPE_CHECKING:
-    from catseye.records.panel_layout import PanelLayout
+    from catseye.records.panels.layout import PanelLayout
 
 
 def _focal(value: float) -> float:
@@ -88,8 +88,8 @@ def panels(
 def _layout(given: str, focal_length: float) -> "PanelLayout":
     """The layout of a table, or of a site's prisms."""
     from catseye.gateways.examples import site_directory
-    from catseye.records.panel_layout import layout_of_site, read_layout
-    from catseye.records.site_folder import read_site
+    from catseye.records.panels.layout import layout_of_site, read_layout
+    from catseye.records.site.folder import read_site
 
     if given.endswith(".csv"):
         return read_layout(Path(given), focal_length)

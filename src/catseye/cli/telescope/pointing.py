@@ -164,7 +164,7 @@ def _write_stars(found: "PointingFit", observed: "Observed", path: Path) -> None
     from dataclasses import replace
 
     from catseye.gateways.writers.output import whole_file
-    from catseye.records.star_offsets import MARK, star_offsets_text
+    from catseye.records.laboratory.star_offsets import MARK, star_offsets_text
 
     stars, keep = observed.stars, found.used
     assert stars is not None
@@ -236,8 +236,8 @@ def track(
     from catseye.gateways.pose.pointing_series_files import track_rows, track_words, write_track
     from catseye.gateways.pose.pointing_series_objects import track_object
     from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.records.reading import Folder
-    from catseye.records.tilts import read_tilts
+    from catseye.records.files.reading import Folder
+    from catseye.records.laboratory.tilts import read_tilts
     from catseye.reduction.pose.track_profile import track_profile
 
     if not poses and tilts is None:

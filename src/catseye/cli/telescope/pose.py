@@ -13,10 +13,10 @@ from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.pose.objects import PoseResult
-    from catseye.records.site_folder import SiteFolder
-    from catseye.records.solved_points import SolvedPoints
+    from catseye.records.network.solved_points import SolvedPoints
+    from catseye.records.site.folder import SiteFolder
 
-# as in catseye.reduction.pose.pose and catseye.estimation.pose, whose import --help spares itself
+# as in catseye.reduction.pose.pose and catseye.estimation.shapes.pose, whose import --help spares itself
 GROUPS, FRAMES = "dish|feed-arm|alidade|subreflector", "ground|alidade|reflector"
 METHODS, OPTICS = "l1|huber|igg3|biweight", "prime|gregorian"
 CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
@@ -142,8 +142,8 @@ def pose(
         raise typer.BadParameter("is of the dish in the frame reflector.", param_hint="'--pointing'")
     from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
     from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.records.site_folder import read_site
-    from catseye.records.solved_points import read_solved_points
+    from catseye.records.network.solved_points import read_solved_points
+    from catseye.records.site.folder import read_site
 
     sources = [p for p in (epoch, earlier, site) if p is not None]
     if out is not None:

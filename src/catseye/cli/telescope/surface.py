@@ -14,11 +14,11 @@ from catseye.errors import EstimationError, InputError
 if TYPE_CHECKING:
     from catseye.gateways.surface.inputs import Frame
     from catseye.gateways.surface.report import SurfaceResult
-    from catseye.records.site_folder import SiteFolder
+    from catseye.records.site.folder import SiteFolder
     from catseye.reduction.surface.actuators import Travel
     from catseye.reduction.surface.shape import Prisms, ShapeSettings
 
-PARTS = ("vertex", "axis", "focal-length")  # as catseye.estimation.paraboloid, whose import --help spares itself
+PARTS = ("vertex", "axis", "focal-length")  # as catseye.estimation.shapes.paraboloid, whose import --help spares itself
 TERMS_TOLD = 22  # on a terminal
 
 
@@ -211,8 +211,8 @@ def _found(
     """What the inputs say, and the SHA-256 of each file read."""
     from catseye.gateways.examples import site_directory
     from catseye.gateways.surface.report import SurfaceResult
-    from catseye.records.actuators import read_positions
-    from catseye.records.site_folder import read_site
+    from catseye.records.panels.actuators import read_positions
+    from catseye.records.site.folder import read_site
     from catseye.reduction.surface.actuators import actuators_of, corrections
     from catseye.reduction.surface.change import change_between
     from catseye.reduction.surface.lookup import lookup_of

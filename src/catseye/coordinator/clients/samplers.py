@@ -6,7 +6,7 @@ from typing import Any
 
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.ranger.line import stamp_text
-from catseye.records.live import Happening, LivePosture, LiveWeather
+from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
 KEPT = 4096  # values of each sampler
 Row = tuple[str, ...]  # a stamp, then values as they travel

@@ -24,9 +24,9 @@ from catseye.geometry.time_tag import utc_text
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.line import Reply, Request, stamp_text
 from catseye.ranger.values import Value
-from catseye.records.interlock import Act, Interlock, Interlocks
-from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.interlock import Act, Interlock, Interlocks
 from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from catseye.ranger.motion_units import acceleration_counts, velocity_counts
 from catseye.ranger.state import AxisSettings
 from catseye.ranger.status import Status
 from catseye.ranger.values import Value
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 
 Array = NDArray[np.float64]
 GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.surroundings import KeepClear, later
 from catseye.coordinator.visibility.vantage import Vantage, seconds_between
-from catseye.records.live import LivePosture
+from catseye.records.night.live import LivePosture
 
 AHEAD = 600.0  # s that are looked ahead
 AHEAD_RIDING = 60.0  # s, of a beam that the telescope carries: longer its rates do not hold

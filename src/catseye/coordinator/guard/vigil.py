@@ -8,7 +8,7 @@ from catseye.coordinator.herald import Herald
 from catseye.coordinator.link.ranger import RangerLink
 from catseye.coordinator.parts import Clock, SafetyGuard, ticks_now
 from catseye.errors import InputError
-from catseye.records.live import Severity
+from catseye.records.night.live import Severity
 
 EVERY = 2.0  # s between two looks
 SUN_EVERY = 5.0  # s: a ranger of the feed arm refuses to move by a vector older than a minute

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.errors import InputError
-from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import SiteFolder, site_files
+from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import SiteFolder, site_files
 
 if TYPE_CHECKING:
     from catseye.coordinator.parts import ShotVerdict

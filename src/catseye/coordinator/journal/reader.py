@@ -16,7 +16,7 @@ from catseye.coordinator.journal.place import place_of, reading_engine, refuse_f
 from catseye.coordinator.journal.rows import entry_of, unpack
 from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, version_of
 from catseye.errors import InputError
-from catseye.records.site_folder import SiteFolder, read_site
+from catseye.records.site.folder import SiteFolder, read_site
 
 PIECE = 512  # events read at once: 8 MB where each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]

@@ -7,8 +7,8 @@ from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Docum
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
 from catseye.coordinator.parts import EpochJob, LiveReduction
 from catseye.errors import CatseyeError
-from catseye.records.live import LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import SiteFolder
 
 LiveFactory = Callable[[SiteFolder, StoredRun], LiveReduction]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Entry, Item, Solution
 from catseye.errors import InputError
-from catseye.records.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 
 RAW, PACKED = 0, 1  # int16 little-endian as taken; or the differences from a cycle earlier, in two planes, deflated
 MOST_WHOLE = 2**63 - 1

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from catseye.errors import InputError, ValidityError
 from catseye.ranger.head import Sampling
 from catseye.ranger.line import Reply
-from catseye.records.live import LiveShot
+from catseye.records.night.live import LiveShot
 
 REAL = re.compile(r"[+-]?([0-9]{1,25}(\.[0-9]{0,25})?|\.[0-9]{1,25})([eE][+-]?[0-9]{1,3})?")
 WHOLE = re.compile(r"[0-9]{1,10}")

@@ -15,7 +15,7 @@ from catseye.ranger.commands import MOST_CUBES
 from catseye.ranger.head import Sampling
 from catseye.ranger.line import Reply, Request
 from catseye.ranger.status import Status
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 
 AT_ONCE = 48  # requests on their way together: fewer than a ZY lets wait
 READ_BACK = {  # half of the last digit in which each is told back

@@ -27,7 +27,7 @@ from catseye.ranger.commands import COMMANDS
 from catseye.ranger.head import Sampling
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, stamp_text
 from catseye.ranger.status import Status
-from catseye.records.live import LiveShot
+from catseye.records.night.live import LiveShot
 
 State = Literal["down", "connected", "preparing", "ready"]
 LONGEST_KEPT = 200  # characters of a reply, in the journal

@@ -14,7 +14,7 @@ from catseye.coordinator.link.wire import Sent, Wire
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, PlannedShot, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request, stamp_text
-from catseye.records.live import LiveShot
+from catseye.records.night.live import LiveShot
 
 SURELY = 12  # ticks, 10 ms: a start stamp so long ago is over by the ranger's clock, too
 IN_HAND = 0.05  # s of it for replies and samples, which are over when the next shot is asked for

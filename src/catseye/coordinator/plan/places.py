@@ -11,8 +11,8 @@ from catseye.coordinator.parts import PlannedShot, SiteState
 from catseye.coordinator.visibility.surroundings import later
 from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture
 from catseye.geometry.antenna import ground_from_reflector_at
-from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
-from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site.folder import REFERENCE, SiteFolder
 
 Array = NDArray[np.float64]
 AS_GIVEN = 0.005  # m: a target this near to its record is where the ranger believes it; half a beam's radius

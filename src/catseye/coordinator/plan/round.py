@@ -24,9 +24,9 @@ from catseye.coordinator.visibility.vantage import Retro, Vantage, retros_of, va
 from catseye.errors import InputError
 from catseye.geometry.keep_out import servo_margin
 from catseye.ranger.sun_watch import LARGEST_STEP
-from catseye.records.live import TICK_SECONDS
-from catseye.records.site_folder import REFERENCE, SiteFolder
-from catseye.records.solids import Solids
+from catseye.records.night.live import TICK_SECONDS
+from catseye.records.site.folder import REFERENCE, SiteFolder
+from catseye.records.site.solids import Solids
 
 Array = NDArray[np.float64]
 HOUR_TICKS = 100_000_000 // 24

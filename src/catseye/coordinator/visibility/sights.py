@@ -7,9 +7,9 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture, reflector_at
-from catseye.records.live import LivePosture
-from catseye.records.site_folder import SiteFolder
-from catseye.records.solids import Solids
+from catseye.records.night.live import LivePosture
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.solids import Solids
 from catseye.reduction.steering.visibility import RangeLimits, Retroreflectors, Sight, Visibility, frames_at, visibility
 
 STEP = 0.5 * DEGREE  # of azimuth and elevation, within which the answer is kept

@@ -17,9 +17,9 @@ from catseye.errors import InputError
 from catseye.geometry.frame import Transform
 from catseye.geometry.keep_out import Box
 from catseye.geometry.slew import trapezoid
-from catseye.records.keep_out import KeepOut
-from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.keep_out import KeepOut
 from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
 from catseye.reduction.steering.guard import Guard, guard_of
 

@@ -19,10 +19,10 @@ from catseye.geometry.slew import Pace
 from catseye.ranger.initialisation import frame_of, own_station
 from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
 from catseye.ranger.state import AxisSettings
-from catseye.records.live import TICK_SECONDS, LivePosture
-from catseye.records.mirror import Mirror
-from catseye.records.site_folder import SiteFolder
-from catseye.records.target import FrameName
+from catseye.records.night.live import TICK_SECONDS, LivePosture
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.mirror import Mirror
+from catseye.records.site.target import FrameName
 
 Array = NDArray[np.float64]
 Frame = Literal["ground", "reflector"]

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from catseye.estimation.observations.bodies.pose import require_rotation, turned_back
 from catseye.estimation.observations.kind import Kind, beside, optional, value
-from catseye.estimation.observations.pose import require_rotation, turned_back
 from catseye.estimation.observations.unit_direction import require_direction
 
 

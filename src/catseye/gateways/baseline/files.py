@@ -11,7 +11,7 @@ from catseye.gateways.baseline.tables import distances_csv, observations_csv, pi
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.records.baseline import FORMAT, Baseline, baseline_text
+from catseye.records.laboratory.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline.instrument import record_values
 
 if TYPE_CHECKING:

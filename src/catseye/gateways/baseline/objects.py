@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.estimation.baseline_iso17123 import FullTest
+from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.writers.passage import Passage
-from catseye.records.baseline import FORMAT
+from catseye.records.laboratory.baseline import FORMAT
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline.instrument import BaselineCalibration

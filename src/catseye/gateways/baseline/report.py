@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.estimation.baseline_iso17123 import FullTest
+from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.baseline.figures import baseline_figures
 from catseye.gateways.baseline.objects import baseline_object, passages, spans
 from catseye.gateways.baseline.tables import shot_residuals

@@ -12,9 +12,9 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.calibrations.certificate import rounded
 from catseye.geometry.mount import gamma, lambda_
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.monument import MonumentGeometry
-from catseye.records.reading import Folder
+from catseye.records.files.reading import Folder
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
 
 LEAST_PLACES = 6  # decimals of a matrix, as the notes print them
 U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: nothing is known of an angle, uniform over a turn

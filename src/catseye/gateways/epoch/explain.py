@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.propagation import Input, agreement
+from catseye.estimation.quality.propagation import Input, agreement
 from catseye.gateways.epoch.summary import MEANING
 from catseye.gateways.writers.passage import Passage
-from catseye.records.campaign import REFERENCE
+from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.budget import Explanation
 
 MICROMETRE = 1e-6

@@ -18,7 +18,7 @@ from catseye.gateways.epoch.explain import (
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
-from catseye.records.campaign import Campaign
+from catseye.records.night.campaign import Campaign
 from catseye.reduction.budget import Assumptions, Explanation
 
 MARK = "<title>catseye: shot "  # tells our pages from others' files

@@ -11,7 +11,7 @@ from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.output import FORMAT
 
 if TYPE_CHECKING:
-    from catseye.records.campaign import Campaign
+    from catseye.records.night.campaign import Campaign
     from catseye.reduction.air.group_index import BenchmarkSeries
     from catseye.reduction.epoch.epoch import Reduction
 

@@ -7,7 +7,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
 from catseye.gateways.epoch.tables import kind_of
 from catseye.gateways.writers.passage import Passage
-from catseye.records.campaign import REFERENCE
+from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import Reduction
 
 MEANING = {

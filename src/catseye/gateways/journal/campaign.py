@@ -22,11 +22,11 @@ from catseye.errors import InputError
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
-from catseye.records.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveWeather
-from catseye.records.shot import Shot
-from catseye.records.site_folder import REFERENCE, SiteFolder, site_files
-from catseye.records.weather import WeatherSample
+from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
+from catseye.records.night.shot import Shot
+from catseye.records.night.weather import WeatherSample
+from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
 
 STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks

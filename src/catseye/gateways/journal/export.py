@@ -23,7 +23,7 @@ from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, whole_directory
 from catseye.gateways.writers.written import Progress, origin
-from catseye.records.live import TICKS_PER_DAY
+from catseye.records.night.live import TICKS_PER_DAY
 
 FORMAT = "catseye-journal-export-1"
 Form = Literal["csv", "fits"]

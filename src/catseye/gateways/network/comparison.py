@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.comparison import Comparison as Moved
-from catseye.estimation.congruence import VarianceFactor
-from catseye.estimation.deformation import CongruenceTest, Deformation
+from catseye.estimation.deformation.comparison import Comparison as Moved
+from catseye.estimation.deformation.congruence import VarianceFactor
+from catseye.estimation.deformation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network.findings import Findings, in_file_axes
 from catseye.gateways.network.tables import Formats, cell, table
 from catseye.gateways.writers.objects import plain

@@ -11,7 +11,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.estimation.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
+from catseye.estimation.quality.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
 from catseye.gateways.network.comparison import Comparison, comparison_passages
 from catseye.gateways.network.figures import Drawn, file_ticks, looking, point_names, scale_bar, thousands, view_frame
 from catseye.gateways.network.findings import Findings

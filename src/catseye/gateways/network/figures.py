@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.estimation.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
+from catseye.estimation.quality.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
 

@@ -9,12 +9,12 @@ from operator import itemgetter
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import CONVERGED, NONCENTRALITY
-from catseye.estimation.diagnosis import label
-from catseye.estimation.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
-from catseye.estimation.external import effects_at_ends
-from catseye.estimation.network import Network, NetworkSolution, points_of
-from catseye.estimation.reliability import (
+from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
+from catseye.estimation.network.diagnosis import label
+from catseye.estimation.network.external import effects_at_ends
+from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
+from catseye.estimation.quality.reliability import (
     GlobalTest,
     bias_to_noise,
     checked,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.estimation.adjustment import NONCENTRALITY
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 from catseye.gateways.network.findings import MEASURES, ROLES, Findings
 from catseye.gateways.writers.objects import plain
 

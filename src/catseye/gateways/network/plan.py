@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.monte_carlo import Scatter
-from catseye.estimation.plan import Candidate, Plan
+from catseye.estimation.network.monte_carlo import Scatter
+from catseye.estimation.network.plan import Candidate, Plan
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.summary import direction_words, quantity

@@ -14,7 +14,7 @@ from scipy.special import ndtri, stdtrit
 
 from catseye import __version__
 from catseye.constants import MILLIMETRE, TWO_PI
-from catseye.estimation.diagnosis import unconnected
+from catseye.estimation.network.diagnosis import unconnected
 from catseye.gateways.network.findings import Findings
 
 NAMESPACE = "http://www.gnu.org/software/gama/gama-local-adjustment"

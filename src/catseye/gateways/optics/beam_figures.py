@@ -15,8 +15,8 @@ from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Fig
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
-from catseye.records.beam import BeamTrain
-from catseye.records.reading import Folder
+from catseye.records.files.reading import Folder
+from catseye.records.site.beam import BeamTrain
 from catseye.reduction.optics.beam import BeamPath, beam_profile, reduce_beam
 
 FORMAT = "catseye-beam-1"

@@ -6,8 +6,8 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.pose import COMPONENTS
-from catseye.records.reading import Folder
+from catseye.estimation.shapes.pose import COMPONENTS
+from catseye.records.files.reading import Folder
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 from catseye.reduction.pose.pose import GroupPose

@@ -24,8 +24,8 @@ from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.written import Files, csv_text, origin, write_files
-from catseye.records.pointing_model import FORMAT as MODEL
-from catseye.records.toml_text import record_toml
+from catseye.records.files.toml_text import record_toml
+from catseye.records.site.pointing_model import FORMAT as MODEL
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
 

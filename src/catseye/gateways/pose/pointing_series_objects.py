@@ -12,9 +12,9 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.pose.objects import FORMAT as POSE
 from catseye.geometry.pointing_series import PointingSeries, published
-from catseye.records.pointing_model import PointingModel, Term
-from catseye.records.reading import Folder, read_record
-from catseye.records.star_offsets import StarOffsets, read_star_offsets
+from catseye.records.files.reading import Folder, read_record
+from catseye.records.laboratory.star_offsets import StarOffsets, read_star_offsets
+from catseye.records.site.pointing_model import PointingModel, Term
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
 

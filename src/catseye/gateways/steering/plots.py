@@ -9,10 +9,10 @@ from catseye.gateways.steering.servo_figures import move_figure
 from catseye.gateways.steering.sky_figures import sky_figure
 from catseye.geometry.slew import Pace
 from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, pace_of, velocity_integer
-from catseye.records.keep_out import KeepOut
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.monument import MonumentGeometry
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.guard import guard_of
 from catseye.reduction.steering.reroute import route

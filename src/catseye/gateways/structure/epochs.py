@@ -14,8 +14,8 @@ from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.journal.entries import Solution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from catseye.records.columns import columns_of
-from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.files.columns import columns_of
+from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.reduction.structure.vibration import RangeSeries
 

@@ -14,7 +14,7 @@ BAND = 2.0  # standard uncertainties shown
 
 def motion_figure(fit: StructureFit) -> str:
     """Shift and turn of the group with elevation, its uncertainty, each epoch's residual motion about it."""
-    from catseye.estimation.harmonic_body import rigid_part
+    from catseye.estimation.harmonic.body import rigid_part
 
     series = fit.series
     e = np.asarray(series.posture.elevation, dtype=float)

@@ -11,10 +11,10 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.antenna import ground_from_reflector
 from catseye.geometry.frame import Transform
-from catseye.records.columns import Columns, columns_of
-from catseye.records.reading import Folder
-from catseye.records.refusal import refusal, shown
-from catseye.records.site_folder import SiteFolder
+from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.reading import Folder
+from catseye.records.files.refusal import refusal, shown
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.surface.shape import Prisms
 
 Frame = Literal["reflector", "ground"]

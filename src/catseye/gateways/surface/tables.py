@@ -8,7 +8,7 @@ from catseye.constants import MILLIMETRE
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
 from catseye.gateways.writers.written import csv_text
 from catseye.optics.zernike import Numbering, number
-from catseye.records.actuators import ActuatorCorrection
+from catseye.records.panels.actuators import ActuatorCorrection
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, Shape

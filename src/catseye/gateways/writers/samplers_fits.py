@@ -22,7 +22,7 @@ from catseye import __version__
 from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE, write_whole
-from catseye.records.record import EARLIEST_MJD, LATEST_MJD
+from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
 
 MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
 TIME = "MJD"

@@ -16,7 +16,7 @@ from catseye.atmosphere.model import Limit, check_spreads
 from catseye.atmosphere.sound import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.atmosphere.sound_dispersion import dispersion
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
+from catseye.estimation.shapes.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
 from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
 
 PASSES = 6  # the wind is taken off the speed exactly, again with each better wind

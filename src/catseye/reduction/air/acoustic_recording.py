@@ -12,8 +12,8 @@ import numpy as np
 from catseye.atmosphere.sound import THERMOMETRY, sound
 from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import InputError, ValidityError
-from catseye.records.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
-from catseye.records.refusal import refusal
+from catseye.records.files.refusal import refusal
+from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
 from catseye.reduction.air.acoustic import USED, PathTemperatures, path_temperatures
 from catseye.signal.delay import DelayPlan, DelayStatus
 from catseye.signal.waveform import sampled

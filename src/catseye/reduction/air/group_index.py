@@ -20,7 +20,7 @@ from catseye.reduction.epoch.air import AirField
 from catseye.signal.cycles import CycleStatus, decision, fraction, unwrapped_length
 
 if TYPE_CHECKING:
-    from catseye.records.target import Benchmark
+    from catseye.records.site.target import Benchmark
     from catseye.reduction.epoch.epoch import Reduction
 
 MODULATION_HZ = 1500e6

@@ -17,8 +17,8 @@ from catseye.atmosphere.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPER
 from catseye.atmosphere.suspect_readings import suspect_readings
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
-from catseye.records.site import Site
-from catseye.records.weather import Weather
+from catseye.records.night.weather import Weather
+from catseye.records.site.site import Site
 
 SCREEN = 2.0  # m, height of a station's sensors above the ground, as weather services stand them
 FIELDS = (("temperature", "C"), ("pressure", "hPa"), ("humidity", "%"))

@@ -17,10 +17,10 @@ from pydantic import Field, ValidationError
 from catseye.atmosphere.air import MODELS, air
 from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
-from catseye.records.columns import Columns, columns_of
-from catseye.records.reading import Folder
-from catseye.records.record import EARLIEST_MJD, LATEST_MJD, Certificate, Version, Within
-from catseye.records.refusal import explained, refusal, shown
+from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.reading import Folder
+from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Certificate, Version, Within
+from catseye.records.files.refusal import explained, refusal, shown
 from catseye.reduction.air.group_index import phase_slope
 
 THERMOMETERS = ("temperature_c", *(f"temperature_{k}_c" for k in range(1, 10)))

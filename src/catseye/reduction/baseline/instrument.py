@@ -12,11 +12,11 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.baseline import CEILING, Solution
-from catseye.estimation.baseline_iso17123 import FullTest
-from catseye.estimation.baseline_model import Known
-from catseye.records.baseline import Baseline, Heights, Observations, numbers_of
-from catseye.records.refusal import shown
+from catseye.estimation.baseline.adjustment import CEILING, Solution
+from catseye.estimation.baseline.iso17123 import FullTest
+from catseye.estimation.baseline.model import Known
+from catseye.records.files.refusal import shown
+from catseye.records.laboratory.baseline import Baseline, Heights, Observations, numbers_of
 from catseye.reduction.baseline.job import BaselineJob, Progress
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
 from catseye.reduction.baseline.statistical_tests import FOLLOWS, Suspect, decisions_of

@@ -7,9 +7,9 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
-from catseye.estimation.baseline import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
-from catseye.estimation.baseline_iso17123 import FullTest, full_test
-from catseye.estimation.baseline_model import Claim, Extra, Known, Sights
+from catseye.estimation.baseline.adjustment import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
+from catseye.estimation.baseline.iso17123 import FullTest, full_test
+from catseye.estimation.baseline.model import Claim, Extra, Known, Sights
 from catseye.reduction.baseline.lengths import BaselineSettings
 from catseye.reduction.baseline.statistical_tests import suspects_of
 

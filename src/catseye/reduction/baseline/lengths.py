@@ -13,8 +13,8 @@ from catseye.atmosphere.velocity import (
     second_velocity_correction,
 )
 from catseye.errors import ValidityError
-from catseye.records.baseline import Observations
-from catseye.records.refusal import refusal
+from catseye.records.files.refusal import refusal
+from catseye.records.laboratory.baseline import Observations
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.estimation.baseline import Solution
-from catseye.estimation.baseline_iso17123 import FullTest, is_nothing, same_precision, within_claim
+from catseye.estimation.baseline.adjustment import Solution
+from catseye.estimation.baseline.iso17123 import FullTest, is_nothing, same_precision, within_claim
 from catseye.reduction.calibrations.calibration import Decision
 
 if TYPE_CHECKING:
-    from catseye.records.baseline import Baseline
+    from catseye.records.laboratory.baseline import Baseline
     from catseye.reduction.baseline.lengths import BaselineSettings
 
 FOLLOWS = "the light follows the weather as read"

@@ -10,7 +10,7 @@ from catseye.atmosphere.air import MODELS, air, group_refractivity
 from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.estimation.propagation import Draw, Model, draw_inputs
+from catseye.estimation.quality.propagation import Draw, Model, draw_inputs
 from catseye.geometry.encoder import azimuth_angle, elevation_angle
 from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
 from catseye.optics.prism import range_constant

@@ -6,9 +6,9 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
-from catseye.records.campaign import REFERENCE, Campaign
-from catseye.records.mirror import Mirror
+from catseye.estimation.quality.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
+from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.site.mirror import Mirror
 from catseye.reduction.budget.chain import drawing, measurement
 from catseye.reduction.budget.inputs import Item, correlation_of, items_of
 from catseye.reduction.budget.scene import Assumptions, Scene, scene_of

@@ -23,7 +23,7 @@ from catseye.atmosphere.air import MODELS, air
 from catseye.atmosphere.humidity import saturation, vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
-from catseye.estimation.propagation import STUDENT, Input
+from catseye.estimation.quality.propagation import STUDENT, Input
 from catseye.optics.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, Scene, head_columns
 from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns

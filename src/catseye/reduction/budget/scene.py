@@ -6,8 +6,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT
 from catseye.errors import InputError
-from catseye.records.campaign import REFERENCE, Campaign
-from catseye.records.mirror import Mirror
+from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.air import AirField, PathAir
 from catseye.reduction.epoch.head import head_corrections, head_unknowns
 from catseye.reduction.epoch.ranges import Phases

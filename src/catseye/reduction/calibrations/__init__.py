@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.records.readings import read_readings
+from catseye.records.files.readings import read_readings
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import Kind
 from catseye.reduction.calibrations.length import gauge_blocks, height_gauge, invar_wire

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import Solution, adjust
+from catseye.estimation.least_squares.adjustment import Solution, adjust
 from catseye.estimation.observations import Linear
-from catseye.estimation.reliability import checked, global_test, single_level, tau_critical, w_critical
+from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
 from catseye.reduction.calibrations.calibration import Decision
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from catseye.records.readings import Layout, Readings
+from catseye.records.files.readings import Layout, Readings
 from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.fit import Fit
 

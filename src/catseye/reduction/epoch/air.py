@@ -13,8 +13,8 @@ from catseye.atmosphere.air import MODELS, group_refractivity
 from catseye.atmosphere.humidity import vapour_pressure_hpa
 from catseye.atmosphere.path import mean_over_height, pressure_at
 from catseye.constants import SECONDS_PER_DAY
-from catseye.records.campaign import Campaign
-from catseye.records.path_temperature import PathTemperatureTable
+from catseye.records.night.campaign import Campaign
+from catseye.records.night.path_temperature import PathTemperatureTable
 from catseye.reduction.epoch.settings import Settings
 
 Profile = Callable[[np.ndarray], np.ndarray]

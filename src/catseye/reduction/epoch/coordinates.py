@@ -7,10 +7,10 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.adjustment import CONVERGED, Fit, Solution, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, Fit, Solution, adjust
+from catseye.estimation.least_squares.robust import CHECKED, adjust_robustly
 from catseye.estimation.observations import Linear, Observations
-from catseye.estimation.robust import CHECKED, adjust_robustly
-from catseye.records.campaign import Campaign
+from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns

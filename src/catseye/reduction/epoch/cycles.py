@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
-from catseye.estimation.adjustment import NONCENTRALITY, Fit, Solution, adjust
-from catseye.estimation.ambiguity import AmbiguityStatus, Located
+from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.least_squares.robust import adjust_robustly
+from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations import Observations
-from catseye.estimation.robust import adjust_robustly
-from catseye.estimation.rows import full_jacobian
-from catseye.records.campaign import Campaign
+from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycle_search import Scene, search, spread
 from catseye.reduction.epoch.ranges import Electronics, Phases, Progress
 from catseye.reduction.epoch.settings import Settings

@@ -5,8 +5,8 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.observations import Linear
-from catseye.estimation.paraboloid import fit_paraboloid
-from catseye.records.campaign import Campaign
+from catseye.estimation.shapes.paraboloid import fit_paraboloid
+from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.unknowns import Network
 from catseye.reduction.site.places import nominal_frame
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
-from catseye.records.campaign import REFERENCE, Campaign
+from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.reduction.epoch.coordinates import Coordinates, adjust_coordinates
 from catseye.reduction.epoch.dew import dew_risk
 from catseye.reduction.epoch.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases, walk_notes

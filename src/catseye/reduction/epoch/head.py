@@ -21,9 +21,9 @@ from catseye.errors import ValidityError
 from catseye.geometry.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
 from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
 from catseye.geometry.pointing import Station
-from catseye.records.campaign import Campaign
-from catseye.records.mirror import Mirror
-from catseye.records.refusal import refusal
+from catseye.records.files.refusal import refusal
+from catseye.records.night.campaign import Campaign
+from catseye.records.site.mirror import Mirror
 from catseye.reduction.site.stations import AXES, station_in
 from catseye.signal.amplitude import amplitude_by_coefficient, amplitude_phase
 from catseye.signal.cyclic import cyclic_design, cyclic_range

@@ -8,8 +8,8 @@ import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
-from catseye.records.campaign import REFERENCE, Campaign
-from catseye.records.mirror import Mirror
+from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.settings import Settings
 from catseye.signal.buffers import BufferStatus, inspect_buffers
 from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter

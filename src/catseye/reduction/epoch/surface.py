@@ -7,8 +7,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
-from catseye.records.campaign import Campaign
+from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.coordinates import Coordinates
 from catseye.reduction.epoch.dish import dish_prisms
 from catseye.reduction.site.places import nominal_frame

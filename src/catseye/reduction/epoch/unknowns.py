@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.observations import Distances, Linear, Observations
-from catseye.records.campaign import REFERENCE, Campaign
-from catseye.records.triplet import Triplet
+from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.site.triplet import Triplet
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.ranges import Electronics, Phases

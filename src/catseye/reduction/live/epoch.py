@@ -14,11 +14,11 @@ from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.observations import Linear, Observations
 from catseye.geometry.frame import Transform
-from catseye.records.campaign import Campaign
-from catseye.records.live import TICKS_PER_DAY, LiveWeather
-from catseye.records.shot import Shots
-from catseye.records.site_folder import SiteFolder
-from catseye.records.weather import Weather
+from catseye.records.night.campaign import Campaign
+from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.night.shot import Shots
+from catseye.records.night.weather import Weather
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.coordinates import Coordinates, coordinates_of, settle_network
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.ranges import follow_electronics

@@ -16,8 +16,8 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import CatseyeError
-from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.live.epoch import Epoch, campaign_of, frames_of_points, solve_epoch

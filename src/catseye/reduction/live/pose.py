@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.datum import motions
+from catseye.estimation.network.datum import motions
 from catseye.geometry.beam_deviation import aperture, prime_focus_tilt
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.state import REFERENCE_EPOCH, XYZ, Carried
 
 Array = NDArray[np.float64]

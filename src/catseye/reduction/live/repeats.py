@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
 from catseye.reduction.live.shots import Taken
 
 Array = NDArray[np.float64]

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
-from catseye.records.live import LiveShot
-from catseye.records.mirror import Mirror
-from catseye.records.site import Adc
-from catseye.records.site_folder import REFERENCE
+from catseye.records.night.live import LiveShot
+from catseye.records.site.folder import REFERENCE
+from catseye.records.site.mirror import Mirror
+from catseye.records.site.site import Adc
 from catseye.reduction.epoch.ranges import Detected, Phases, why_not
 from catseye.reduction.epoch.settings import Settings
 from catseye.signal.buffers import shortest_run

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
-from catseye.records.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 
 KEPT = 7200.0  # s
 SILENT = 1800.0  # s after its last reading, when a station counts no more

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
-from catseye.records.beam import BeamTrain, Element, Laser
+from catseye.records.site.beam import BeamTrain, Element, Laser
 from catseye.signal.feedback import fringe_contrast
 
 Array = NDArray[np.float64]

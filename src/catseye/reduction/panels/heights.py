@@ -15,12 +15,12 @@ from scipy.special import ndtr
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.adjustment import NONCENTRALITY, Solution, adjust
-from catseye.estimation.reliability import checked, single_level, w_critical
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Solution, adjust
+from catseye.estimation.quality.reliability import checked, single_level, w_critical
 from catseye.geometry.panel_surface import axes
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelLayout
-from catseye.records.panel_readings import PanelReadings, PanelSurvey
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelLayout
+from catseye.records.panels.readings import PanelReadings, PanelSurvey
 from catseye.reduction.panels.maps import FittedMap
 from catseye.reduction.panels.model import PanelModel, corner_places, panel_model, used_layout
 

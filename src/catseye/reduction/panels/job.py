@@ -9,10 +9,10 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelLayout
-from catseye.records.panel_readings import digest_of_maps, read_maps, read_panel_readings, read_survey
-from catseye.records.reading import read_record
+from catseye.records.files.reading import read_record
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelLayout
+from catseye.records.panels.readings import digest_of_maps, read_maps, read_panel_readings, read_survey
 from catseye.reduction.panels.crew import SURE, Setting, setting
 from catseye.reduction.panels.heights import PanelHeights, conformity, reduce_panels
 from catseye.reduction.panels.maps import FittedMap, fitted_map

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.estimation.robustness import MAD_TO_SIGMA, huber
-from catseye.records.panel_readings import PanelMap
+from catseye.estimation.quality.robustness import MAD_TO_SIGMA, huber
+from catseye.records.panels.readings import PanelMap
 
 ROUNDS = 50
 SETTLED = 1e-9  # m: a nanometre

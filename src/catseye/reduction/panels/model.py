@@ -24,10 +24,10 @@ from catseye.errors import InputError
 from catseye.estimation.observations.kind import Kind
 from catseye.geometry.panel_surface import axes, cosine_of_slope, panels_under, warps
 from catseye.geometry.panel_tool import turned
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelLayout
-from catseye.records.panel_readings import PanelReadings, PanelSurvey
-from catseye.records.refusal import refusal
+from catseye.records.files.refusal import refusal
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelLayout
+from catseye.records.panels.readings import PanelReadings, PanelSurvey
 from catseye.reduction.panels.maps import FittedMap
 
 MICROMETRE = 1e-6

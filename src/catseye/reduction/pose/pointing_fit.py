@@ -12,7 +12,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
-from catseye.estimation.singular import LinearEstimate, best_linear_estimate
+from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.geometry.pointing_series import TERMS, PointingSeries, columns, design
 
 LIMIT = 4.0  # |w| of a star's coordinate beyond which `reject` leaves the star out

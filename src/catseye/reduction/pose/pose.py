@@ -17,12 +17,12 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.pose import Pose, fit_pose
-from catseye.estimation.rigid_body import turned_covariance
+from catseye.estimation.shapes.pose import Pose, fit_pose
+from catseye.estimation.shapes.rigid_body import turned_covariance
 from catseye.geometry.antenna import ground_from_alidade
 from catseye.geometry.frame import Transform
-from catseye.records.site_folder import SiteFolder
-from catseye.records.solved_points import SolvedPoints
+from catseye.records.network.solved_points import SolvedPoints
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.bodies import bodies_of
 from catseye.reduction.site.places import Place, nominal_frame, places_of

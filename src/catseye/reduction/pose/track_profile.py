@@ -17,10 +17,10 @@ import numpy as np
 
 from catseye.constants import ARCSECOND
 from catseye.errors import EstimationError, FrameError
-from catseye.estimation.singular import best_linear_estimate
+from catseye.estimation.least_squares.singular import best_linear_estimate
 from catseye.geometry.pointing_series import axis_terms
 from catseye.geometry.rotation import from_vector, rz
-from catseye.records.tilts import Tilts
+from catseye.records.laboratory.tilts import Tilts
 from catseye.reduction.pose.pose import GroupPose
 
 MOST_HARMONICS = 36

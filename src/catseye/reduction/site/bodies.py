@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 
 ABOVE_THE_DISH = 5.0  # m over the paraboloid: what is higher is on the arm
 

@@ -16,8 +16,8 @@ from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 from catseye.geometry.antenna import ground_from_alidade_at, ground_from_reflector_at
 from catseye.geometry.frame import Transforms
-from catseye.records.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
-from catseye.records.site_folder import SiteFolder
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.site.folder import SiteFolder
 
 Array = NDArray[np.float64]
 KEPT = 3600.0  # s of postures that are kept

@@ -9,7 +9,7 @@ from catseye.geometry.antenna import ground_from_alidade, ground_from_reflector
 from catseye.geometry.frame import Transform
 from catseye.geometry.mount import gamma, scan_point
 from catseye.optics import cats_eye, prism
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 

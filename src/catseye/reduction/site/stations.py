@@ -21,10 +21,10 @@ from catseye.geometry.imperfect import (
     imperfect_face_counts,
 )
 from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.monument import MonumentGeometry
-from catseye.records.site_folder import SiteFolder
-from catseye.records.target import FeedArmRanger
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
+from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.places import nominal_frame
 
 FARTHEST = 1e12  # m, beyond the Sun; farther is a slip

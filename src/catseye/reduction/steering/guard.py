@@ -38,8 +38,8 @@ from catseye.geometry.pointing import Station, ray
 from catseye.geometry.slew import Pace, Slew, straight, trapezoid
 from catseye.geometry.sun import SUN_RATE
 from catseye.geometry.time_tag import utc_text
-from catseye.records.keep_out import KeepOut
-from catseye.records.mirror import MirrorGeometry
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.mirror import MirrorGeometry
 from catseye.reduction.site.earth_rotation import Place, sun_at
 
 LOOK_AHEAD = 1.0  # days

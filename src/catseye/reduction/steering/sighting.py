@@ -10,10 +10,10 @@ from catseye.geometry.imperfect import imperfect_ray
 from catseye.geometry.pointing import Station, ray
 from catseye.geometry.slew import Pace
 from catseye.geometry.sun import altitude_azimuth
-from catseye.records.keep_out import KeepOut
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.monument import MonumentGeometry
-from catseye.records.solids import Solids
+from catseye.records.site.keep_out import KeepOut
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
+from catseye.records.site.solids import Solids
 from catseye.reduction.site.earth_rotation import Place, standard_pressure_hpa, sun_at
 from catseye.reduction.site.stations import imperfections_of
 from catseye.reduction.steering.guard import Verdict, guard_of

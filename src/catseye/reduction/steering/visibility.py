@@ -22,8 +22,8 @@ from catseye.geometry.antenna import (
 from catseye.geometry.frame import Transform
 from catseye.geometry.visibility import first_obstruction, incidence, ranges
 from catseye.optics.prism import clear_share
-from catseye.records.campaign import Campaign
-from catseye.records.solids import Solids
+from catseye.records.night.campaign import Campaign
+from catseye.records.site.solids import Solids
 from catseye.reduction.site.places import places_of
 
 Array = NDArray[np.float64]

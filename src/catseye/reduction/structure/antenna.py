@@ -27,7 +27,7 @@ from catseye.geometry.deformation import (
 )
 from catseye.geometry.frame import Transforms
 from catseye.geometry.subreflector import turned
-from catseye.records.structural_model import (
+from catseye.records.site.structural_model import (
     KEYS,
     ROOT,
     Basis,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.rigid_body import fit_transformation
+from catseye.estimation.shapes.rigid_body import fit_transformation
 from catseye.geometry.deformation import Posture
 from catseye.geometry.frame import Transforms
 from catseye.geometry.rotation import to_vector

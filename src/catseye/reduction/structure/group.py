@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.estimation.harmonic_series import Spread
+from catseye.estimation.harmonic.series import Spread
 from catseye.geometry.antenna import (
     ELEVATION_AXIS_HEIGHT,
     REFLECTOR_TO_ELEVATION,

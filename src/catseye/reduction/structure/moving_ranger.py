@@ -17,9 +17,9 @@ from catseye.geometry.deformation import Posture, carried_jacobian
 from catseye.geometry.frame import Transform, Transforms
 from catseye.geometry.pointing import Station, counts_jacobian
 from catseye.geometry.rotation import skew
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.structural_model import StructuralModel
-from catseye.records.target import FeedArmRanger
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.structural_model import StructuralModel
+from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import Antenna, SubreflectorPosition
 from catseye.reduction.structure.corrections import group_of

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
-from catseye.estimation.harmonic_body import rigid_design, rigid_part
-from catseye.estimation.harmonic_series import HarmonicFit, Spread, fit_harmonics
+from catseye.estimation.harmonic.body import rigid_design, rigid_part
+from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
 from catseye.geometry.deformation import Posture, Terms
 
 Array = NDArray[np.float64]

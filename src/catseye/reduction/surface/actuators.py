@@ -12,12 +12,12 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.paraboloid import cosine, design_rows
-from catseye.estimation.surface_field import Foretold, Roughness, find_roughness, foretell
+from catseye.estimation.shapes.paraboloid import cosine, design_rows
+from catseye.estimation.shapes.surface_field import Foretold, Roughness, find_roughness, foretell
 from catseye.optics.zernike import terms, zernike
-from catseye.records.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
-from catseye.records.refusal import shown
-from catseye.records.site_folder import SiteFolder
+from catseye.records.files.refusal import shown
+from catseye.records.panels.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.surface.shape import Aperture, Shape
 
 NEAR = 1e-9  # of a trend's columns: what is left of one beside the others

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.paraboloid import cosine
+from catseye.estimation.shapes.paraboloid import cosine
 from catseye.geometry.rotation import from_vector, skew, to_vector
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import zernike

@@ -6,11 +6,11 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.geometry.frame import Transform
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
-from catseye.records.site import Paraboloid
+from catseye.records.site.site import Paraboloid
 
 HELD = 1e-8  # smallest singular value of Zernike terms beside the paraboloid: below it nothing tells them apart
 

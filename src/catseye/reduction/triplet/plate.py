@@ -5,7 +5,7 @@ The paint lies between the top plate and the synthetic plane, so the bare surfac
 
 from dataclasses import dataclass
 
-from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 
 THINNEST, THICKEST = 0.05e-3, 0.15e-3  # m, the memo's estimate of the paint
 TOLERANCE = 0.15e-3  # m, of a point's place as made

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings
 from catseye.reduction.triplet.memo import MemoNumbers
 from catseye.reduction.triplet.plate import PlatePoints

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.atmosphere.air import air
-from catseye.records.triplet_measurement import TripletMeasurement
+from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings, triplet_lengths
 
 Array = NDArray[np.float64]

@@ -28,11 +28,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.adjustment import Solution, adjust
+from catseye.estimation.least_squares.adjustment import Solution, adjust
 from catseye.estimation.observations import Coordinates, Distances
 from catseye.geometry.frame import Transform
 from catseye.optics.prism import obliquity_correction, obliquity_slope
-from catseye.records.triplet import Triplet
+from catseye.records.site.triplet import Triplet
 
 Array = NDArray[np.float64]
 SQUARE = 1e-9  # of unit vectors: their dot product and their lengths

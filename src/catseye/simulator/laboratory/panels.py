@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.records.panel_instrument import PanelInstrument
-from catseye.records.panel_layout import PanelLayout
+from catseye.records.panels.instrument import PanelInstrument
+from catseye.records.panels.layout import PanelLayout
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, PPM, SECONDS_PER_DAY, TWO_PI
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.air import PRESSURE_LAPSE_HPA_PER_M, group_refractivity_ppm
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.twin.conditions import LivingConditions

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.geometry.rotation import from_vector
-from catseye.records.site import Paraboloid
+from catseye.records.site.site import Paraboloid
 
 Array = NDArray[np.float64]
 RINGS, SPOKES = 20, 50

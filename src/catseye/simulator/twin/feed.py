@@ -20,7 +20,7 @@ from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_SECOND
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import Listener, Network, Sockets
-from catseye.records.live import LiveWeather
+from catseye.records.night.live import LiveWeather
 from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.twin.faults import FaultBoard
 

@@ -16,7 +16,7 @@ from catseye.constants import TWO_PI
 from catseye.errors import InputError
 from catseye.ranger.head import Homing
 from catseye.ranger.motion_units import FRACTION, SAMPLE_TIME, acceleration_integer, velocity_integer
-from catseye.records.mirror import MirrorGeometry
+from catseye.records.site.mirror import MirrorGeometry
 from catseye.simulator.servo.axis import HOMING_TIME, ServoAxis
 from catseye.simulator.servo.kernel import AT_END, AT_INDEX, CompiledAxes
 from catseye.simulator.servo.motion_chip import MotionChip

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
-from catseye.records.site import Ranging
-from catseye.records.site_folder import REFERENCE
+from catseye.records.site.folder import REFERENCE
+from catseye.records.site.site import Ranging
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import REFERENCE_VOLT
 from catseye.simulator.twin.air import LivingAir

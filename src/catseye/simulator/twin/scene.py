@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.errors import InputError
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import USUAL_VOLT
 from catseye.simulator.twin.stations import Ray, Station, stations

@@ -21,7 +21,7 @@ from catseye.ranger.network import Network, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer
 from catseye.ranger.sun_watch import OwnSun, own_sun
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.faulty_network import FaultyNetwork, Gate
 

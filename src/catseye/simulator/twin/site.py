@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.errors import InputError
 from catseye.geometry.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.head import Sampling
-from catseye.records.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
-from catseye.records.site_folder import REFERENCE, SiteFolder
+from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
+from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import VOLT_PER_CODE
 from catseye.simulator.twin.air import LivingAir, station_places

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import InputError
-from catseye.records.mirror import Mirror
-from catseye.records.site_folder import SiteFolder
-from catseye.records.target import FeedArmRanger
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.mirror import Mirror
+from catseye.records.site.target import FeedArmRanger
 from catseye.simulator.night.faults import Planted
 from catseye.simulator.night.structure import unit
 from catseye.simulator.night.world import kelvin_from_ground

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.records.site_folder import SiteFolder
-from catseye.records.target import FrameName
-from catseye.records.target import Target as TargetRecord
-from catseye.records.triplet import Triplet, TripletPrism
+from catseye.records.site.folder import SiteFolder
+from catseye.records.site.target import FrameName
+from catseye.records.site.target import Target as TargetRecord
+from catseye.records.site.triplet import Triplet, TripletPrism
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import BENCHMARK_VOLT, USUAL_VOLT
 from catseye.simulator.night.structure import tilted, unit

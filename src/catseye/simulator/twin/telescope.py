@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.records.site_folder import SiteFolder
+from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.twin.air import LivingAir
 from catseye.simulator.twin.motion import Angles, Motion

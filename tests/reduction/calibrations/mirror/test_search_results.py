@@ -5,7 +5,7 @@ import pytest
 
 from catseye.errors import EstimationError, InputError
 from catseye.gateways.calibrations.certificate_record import calibration_toml
-from catseye.records.calibration import CalibrationRecord
+from catseye.records.laboratory.calibration import CalibrationRecord
 from catseye.reduction.calibrations.mirror.search_results import RECIPE
 from lab_scene import MIRROR, MONUMENT, field, searches, station_truth, table
 

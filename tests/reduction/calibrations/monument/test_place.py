@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.readings import read_readings
+from catseye.records.files.readings import read_readings
 from catseye.reduction.calibrations.monument.place import LAYOUT, RECIPE, measure_place, monument_place
 from monument_scene import HEIGHT, topocentric
 

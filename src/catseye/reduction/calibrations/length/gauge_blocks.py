@@ -12,8 +12,8 @@ from pydantic import Field, model_validator
 
 from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
-from catseye.records.readings import TEXT, Layout, Readings, Sheet, Words
-from catseye.records.record import Record, Uncertainty, Within, broken_rule
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet, Words
+from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes

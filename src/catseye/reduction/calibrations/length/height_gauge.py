@@ -20,9 +20,9 @@ from pydantic import Field, model_validator
 
 from catseye.constants import ARCSECOND, PPM
 from catseye.geometry.catenary import expanded
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Uncertainty, Within, broken_rule
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Uncertainty, Within, broken_rule
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter

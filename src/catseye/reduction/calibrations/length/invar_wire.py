@@ -11,8 +11,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.geometry.catenary import expanded, span, unstretched
-from catseye.records.readings import Layout, Readings, Sheet
-from catseye.records.record import Uncertainty, Within
+from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes

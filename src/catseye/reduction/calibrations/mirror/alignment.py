@@ -25,8 +25,8 @@ from catseye.geometry.encoder import HALF_TURN, azimuth_angle
 from catseye.geometry.imperfect import Imperfections, imperfect_counts, imperfect_ray
 from catseye.geometry.mount import gamma
 from catseye.geometry.pointing import Station, aim
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import Scatter

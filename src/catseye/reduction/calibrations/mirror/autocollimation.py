@@ -20,9 +20,9 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.autocollimator import face_normal, flat_reading, mirror_reading
 from catseye.geometry.encoder import azimuth_angle, elevation_angle
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import Scatter

@@ -16,9 +16,9 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.mirror_path import path_change
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Uncertainty, Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Uncertainty, Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter

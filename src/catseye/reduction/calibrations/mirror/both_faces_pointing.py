@@ -21,9 +21,9 @@ from catseye.geometry.imperfect import Imperfections, imperfect_counts
 from catseye.geometry.mount import gamma
 from catseye.geometry.pointing import Station
 from catseye.geometry.rotation import from_vector
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import Scatter

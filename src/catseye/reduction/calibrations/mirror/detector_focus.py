@@ -18,9 +18,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.readings import Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter

@@ -10,9 +10,9 @@ from typing import Annotated
 import numpy as np
 
 from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
 from catseye.reduction.calibrations.fit import Scatter

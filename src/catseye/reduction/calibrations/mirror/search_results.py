@@ -17,15 +17,15 @@ from pydantic import Field, field_serializer
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.reliability import global_test, single_level, w_critical
+from catseye.estimation.quality.reliability import global_test, single_level, w_critical
 from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN
 from catseye.geometry.imperfect import Imperfections, imperfect_counts
 from catseye.geometry.pointing import PARAMETERS, Station
-from catseye.records.mirror import MirrorGeometry
-from catseye.records.monument import MonumentGeometry
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import Scatter

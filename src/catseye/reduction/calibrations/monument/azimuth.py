@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
-from catseye.records.readings import Readings
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Readings
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

@@ -5,8 +5,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from catseye.records.readings import TEXT, Layout
-from catseye.records.record import Coordinate, Name, Record, Within, broken_rule
+from catseye.records.files.readings import TEXT, Layout
+from catseye.records.files.record import Coordinate, Name, Record, Within, broken_rule
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle
 
 KIND = "monument-azimuth"

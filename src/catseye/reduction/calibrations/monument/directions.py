@@ -19,8 +19,8 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.geometry.mount import gamma
 from catseye.geometry.plumb import astronomic, axis_lean_error, azimuth, plumb_from_ground, zenith_angle
 from catseye.geometry.star import POLARIS, Star, star_place
-from catseye.records.readings import TIME, Readings
-from catseye.records.refusal import refusal, shown
+from catseye.records.files.readings import TIME, Readings
+from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.monument.frame_sheet import frame_of
 
 BEFORE, FIELD, AFTER = "before", "field", "after"

@@ -4,8 +4,8 @@ from typing import Annotated, Any
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
-from catseye.records.readings import Sheet
-from catseye.records.record import Coordinate, Elevation, Latitude, Within
+from catseye.records.files.readings import Sheet
+from catseye.records.files.record import Coordinate, Elevation, Latitude, Within
 
 Deflection = Annotated[float, Within(-200, 200)]
 UAngle = Annotated[float, Within(0, 3600)]  # arcseconds

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import ValidityError
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Uncertainty, Within
-from catseye.records.refusal import refusal, shown
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Uncertainty, Within
+from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError, ValidityError
-from catseye.records.readings import Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

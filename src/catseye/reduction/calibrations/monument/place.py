@@ -14,9 +14,9 @@ from pydantic import Field
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.local_frame import LocalFrame, elevation_factor, grid
-from catseye.records.readings import TEXT, Layout, Readings
-from catseye.records.record import Elevation, Within
-from catseye.records.refusal import refusal, shown
+from catseye.records.files.readings import TEXT, Layout, Readings
+from catseye.records.files.record import Elevation, Within
+from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of

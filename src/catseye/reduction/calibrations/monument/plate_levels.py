@@ -18,8 +18,8 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.geometry.mount import gamma
 from catseye.geometry.plumb import lean, mount_angles, plumb_from_ground
-from catseye.records.readings import Layout, Readings
-from catseye.records.record import Within
+from catseye.records.files.readings import Layout, Readings
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

@@ -7,8 +7,8 @@ import numpy as np
 
 from catseye.atmosphere.air import air
 from catseye.constants import PPM, SPEED_OF_LIGHT
-from catseye.records.readings import Readings, Sheet
-from catseye.records.record import Within
+from catseye.records.files.readings import Readings, Sheet
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.fit import Effect
 
 WEATHER = {

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes

@@ -11,9 +11,9 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
-from catseye.records.readings import Layout, Readings, Sheet
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from catseye.records.readings import Readings
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Readings
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.fit import Effect
 from catseye.signal.leakage import phase_by_leakage
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
-from catseye.estimation.reliability import single_level
-from catseye.records.readings import Readings
+from catseye.estimation.quality.reliability import single_level
+from catseye.records.files.readings import Readings
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Effect, Fit, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

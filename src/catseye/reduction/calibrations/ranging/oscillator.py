@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.readings import Layout, Readings, Sheet
-from catseye.records.record import Within
+from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
 from catseye.reduction.calibrations.kind import Kind, provenance
 from catseye.signal.allan import allan_deviation

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.readings import Readings
-from catseye.records.record import Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import Readings
+from catseye.records.files.record import Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Quantity
 from catseye.reduction.calibrations.fit import Fit
 from catseye.reduction.calibrations.kind import quantities

@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.records.readings import TIME, Layout, Readings
-from catseye.records.record import Uncertainty, Within
-from catseye.records.refusal import refusal
+from catseye.records.files.readings import TIME, Layout, Readings
+from catseye.records.files.record import Uncertainty, Within
+from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.fit import Effect, Scatter
 from catseye.reduction.calibrations.ranging.air import (
     WEATHER,

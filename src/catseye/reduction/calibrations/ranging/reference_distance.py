@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.records.readings import Layout, Readings
-from catseye.records.record import Uncertainty, Within
+from catseye.records.files.readings import Layout, Readings
+from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

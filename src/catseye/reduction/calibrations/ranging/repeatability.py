@@ -5,10 +5,10 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.repeatability import Repeatability
-from catseye.estimation.repeatability import repeatability as analysed
-from catseye.records.readings import TEXT, Layout, Readings, Sheet
-from catseye.records.record import Within
+from catseye.estimation.quality.repeatability import Repeatability
+from catseye.estimation.quality.repeatability import repeatability as analysed
+from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities
 

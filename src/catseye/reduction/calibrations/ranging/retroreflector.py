@@ -10,9 +10,9 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
-from catseye.records.readings import TEXT, TIME, Layout, Readings, Sheet
-from catseye.records.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
-from catseye.records.refusal import refusal, shown
+from catseye.records.files.readings import TEXT, TIME, Layout, Readings, Sheet
+from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
+from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes

@@ -1,0 +1,1 @@
+"""Whole numbers from real estimates: search trees for whole cycles."""

@@ -1,0 +1,309 @@
+"""Where a point is that was ranged modulo a half wavelength, from a position known to decimetres only.
+
+Every set of whole cycles that the prior allows is tried: three integers by enumeration inside the prior's ellipsoid,
+the others by prediction, with the geometry as it is, not linearised. That is integer least squares ([TEUNISSEN95])
+without its decorrelation: in space three integers fix a point, so the search tree is bushy for three levels only.
+A station whose position is known to decimetres is the same problem with the targets in the stations' place.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from catseye.errors import InputError, ValidityError
+from catseye.estimation.ambiguity.tree import Candidates, Ranged, grown, trunk
+
+SURE = 5.7e-7  # doubt that is accepted while all ranges are good: five standard deviations of a normal variable
+SURE_OF_ALL = 1e-3  # doubt that is accepted in all, one wrong range considered
+
+
+class AmbiguityStatus(IntEnum):
+    """What came of the search; only FOUND is an answer to go on with."""
+
+    FOUND = 0
+    AMBIGUOUS = 1
+    TOO_FEW = 2
+    MISFIT = 3
+    TOO_MANY = 4
+    REFUSED = 5
+
+
+TEXTS = {
+    AmbiguityStatus.FOUND: "found",
+    AmbiguityStatus.AMBIGUOUS: "of {candidates} sets of whole cycles the second best, {apart:.3f} m away, is only "
+    "{sigmas:.1f} sigma worse; range it from more stations, or survey it better",
+    AmbiguityStatus.TOO_FEW: "ranged from {ranges} stations only: four are needed where the position is known this "
+    "badly; range it from more, or survey it better",
+    AmbiguityStatus.MISFIT: "no whole cycles fit its {ranges} ranges (chi-square {chi_square:.3g} at best); "
+    "one of them or the position's uncertainty is wrong",
+    AmbiguityStatus.TOO_MANY: "its position is known too badly: more sets of whole cycles than can be tried; survey it",
+    AmbiguityStatus.REFUSED: "a range, a station or an uncertainty of it is not a finite number, or not positive",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """The point and what speaks for it.
+
+    x, covariance     (3,) m and (3, 3) m^2 of the best candidate; nan without one
+    cycles            (r,) its whole half wavelengths
+    chi_square        of prior and ranges together; as many degrees of freedom as ranges took part
+    next_x            (3,) m, the second best candidate; nan where there is none
+    discrimination    by how much chi-square of the next candidate is larger, at least; infinite where there is none
+    probability       that the best one is right, all of the prior's region and one wrong range considered
+    candidates        sets of whole cycles that were tried
+    left_out          the range that did not take part, -1 if all did
+    status            `AmbiguityStatus`
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    cycles: np.ndarray
+    chi_square: float
+    next_x: np.ndarray
+    discrimination: float
+    probability: float
+    candidates: int
+    left_out: int
+    status: AmbiguityStatus
+
+    @property
+    def text(self) -> str:
+        """What happened and what to do, one line."""
+        apart = float(np.linalg.norm(self.next_x - self.x))
+        return TEXTS[self.status].format(
+            candidates=self.candidates,
+            ranges=len(self.cycles),
+            chi_square=self.chi_square,
+            apart=apart,
+            sigmas=max(self.discrimination, 0.0) ** 0.5,
+        )
+
+
+def locate(
+    start: np.ndarray,
+    prior_covariance: np.ndarray,
+    stations: np.ndarray,
+    lengths: np.ndarray,
+    *,
+    period: np.ndarray | float,
+    covariance: np.ndarray,
+    station_covariance: np.ndarray | None = None,
+    wrong: float = 0.0,
+    most: int = 2_000_000,
+) -> Located:
+    """The point and the whole cycles that fit a prior position and ranges modulo a half wavelength.
+
+    start                (3,) m, approximate position
+    prior_covariance     (3, 3) m^2 of it
+    stations             (r, 3) m, where the ranges were taken from; one station may stand there several times
+    lengths              (r,) m, a length of each range up to whole periods, all constants applied
+    period               (r,) or one, m: the half wavelength in the air of each path
+    covariance           (r, r) m^2 of the lengths, or (r,) variances: noise, constants, what stations have in common
+    station_covariance   (r, 3, 3) m^2 or (3r, 3r) jointly; None if known or already in `covariance`
+    wrong                probability that a range is wrong altogether, light from elsewhere: any length of a period is
+                         then as likely. 0 trusts them all; else any one may be left out
+    most                 candidates to try before giving up
+
+    FOUND means: it fits (chi-square passes at 5.7e-7), and all the others together are less probable than 5.7e-7, every
+    set of whole cycles being as likely beforehand as its position in the prior. With `wrong` those count too that fit
+    once one range is left out, which costs chi-square 2 ln((1 - wrong)/wrong period/(sqrt(2 pi) u)); the doubt in all
+    may then be 1e-3. A wrong range can make a wrong set fit: where ranges may be wrong, say so. Two wrong ranges are
+    not considered. Values are never an exception, see the status; InputError for arrays whose shapes do not belong
+    together, ValidityError for a `wrong` outside 0 to 0.5.
+
+    Source: [TEUNISSEN95] section 2.2 for the principle; the nonlinear search and the probabilities are ours.
+
+    >>> s = np.array([[60.0, 0, 0], [0, 60, 0], [-60, 0, 5], [0, -60, -5], [40, 40, 20]])
+    >>> l = np.mod(np.linalg.norm(s - [1.0, 2.0, 30.0], axis=1), 0.1)
+    >>> found = locate([1.2, 1.9, 30.2], 0.04 * np.eye(3), s, l, period=0.1, covariance=np.full(5, 1e-8))
+    >>> found.status.name, found.x.round(6).tolist(), found.cycles[:3].tolist()
+    ('FOUND', [1.0, 2.0, 30.0], [662, 653, 659])
+    """
+    ranged = _ranged(start, prior_covariance, stations, lengths, period, covariance, station_covariance)
+    if ranged is None:
+        return _nothing(len(np.atleast_1d(lengths)), AmbiguityStatus.REFUSED)
+    if not 0.0 <= wrong < 0.5:
+        raise ValidityError(f"wrong = {wrong}: a probability of 0 to 0.5 is expected")
+    explanations = _explanations(ranged, wrong, most)
+    if explanations is None:
+        return _nothing(len(ranged.lengths), AmbiguityStatus.TOO_MANY)
+    return _judged(ranged, explanations)
+
+
+def locate_all(
+    start: np.ndarray,
+    prior_covariance: np.ndarray,
+    stations: np.ndarray,
+    lengths: np.ndarray,
+    *,
+    period: np.ndarray | float,
+    covariance: np.ndarray,
+    seen: np.ndarray | None = None,
+    wrong: float = 0.0,
+    most: int = 2_000_000,
+) -> list[Located]:
+    """`locate` for many points that were ranged from the same stations.
+
+    start              (p, 3) m
+    prior_covariance   (p, 3, 3) m^2, or one (3, 3) for all
+    stations           (r, 3) m
+    lengths            (p, r) m
+    period             (p, r), (r,) or one, m
+    covariance         (p, r, r) or (r, r) m^2; or variances (p, r)
+    seen               (p, r) bool, which ranges there are; all if None
+    wrong, most        as for `locate`
+
+    A point's cycles are those of its own ranges, in the stations' order.
+
+    Source: as `locate`.
+    """
+    start, stations, lengths = (np.asarray(v, dtype=float) for v in (start, stations, lengths))
+    points, r = lengths.shape
+    prior = np.broadcast_to(np.asarray(prior_covariance, dtype=float), (points, 3, 3))
+    periods = np.broadcast_to(np.asarray(period, dtype=float), (points, r))
+    c = np.asarray(covariance, dtype=float)
+    variances = c.ndim == 2 and c.shape == (points, r) and not (points == r and np.allclose(c, c.T))
+    there = np.ones((points, r), dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
+    answers = []
+    for i, mine in enumerate(there):
+        own = c[i][mine] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(mine, mine)]
+        answers.append(
+            locate(
+                start[i],
+                prior[i],
+                stations[mine],
+                lengths[i, mine],
+                period=periods[i, mine],
+                covariance=own,
+                wrong=wrong,
+                most=most,
+            )
+        )
+    return answers
+
+
+def _ranged(
+    start: np.ndarray,
+    prior_covariance: np.ndarray,
+    stations: np.ndarray,
+    lengths: np.ndarray,
+    period: np.ndarray | float,
+    covariance: np.ndarray,
+    station_covariance: np.ndarray | None,
+) -> Ranged | None:
+    """The problem with one covariance of all ranges; None where a value makes no sense."""
+    start, prior, stations, lengths, c = (
+        np.asarray(v, dtype=float) for v in (start, prior_covariance, stations, lengths, covariance)
+    )
+    r = len(lengths) if lengths.ndim == 1 else -1
+    if start.shape != (3,) or prior.shape != (3, 3) or stations.shape != (r, 3) or c.shape not in ((r,), (r, r)):
+        raise InputError(
+            f"start {start.shape}, prior_covariance {prior.shape}, stations {stations.shape}, lengths {lengths.shape}, "
+            f"covariance {c.shape}: (3,), (3, 3), (r, 3), (r,) and (r,) or (r, r) with r >= 1 are expected"
+        )
+    periods = np.broadcast_to(np.asarray(period, dtype=float), (r,))
+    c = np.diag(c) if c.ndim == 1 else c
+    if station_covariance is not None:
+        c = c + _of_stations(start, stations, np.asarray(station_covariance, dtype=float))
+    if not all(np.isfinite(v).all() for v in (start, prior, stations, lengths, periods, c)) or np.any(periods <= 0.0):
+        return None
+    try:
+        return Ranged(start, np.linalg.cholesky(prior), stations, lengths, periods, np.linalg.cholesky(c))
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _of_stations(start: np.ndarray, stations: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """What the stations' covariance does to the ranges, (r, r); their directions hardly turn within the prior."""
+    r = len(stations)
+    towards = stations - start
+    e = towards / np.linalg.norm(towards, axis=1)[:, None]
+    if covariance.shape == (r, 3, 3):
+        return np.diag(np.einsum("ia,iab,ib->i", e, covariance, e))
+    if covariance.shape == (3 * r, 3 * r):
+        return np.einsum("ia,iajb,jb->ij", e, covariance.reshape(r, 3, r, 3), e)
+    raise InputError(f"station_covariance has shape {covariance.shape}: ({r}, 3, 3) or ({3 * r}, {3 * r}) is expected")
+
+
+def _nothing(ranges: int, status: AmbiguityStatus) -> Located:
+    nan = np.full(3, np.nan)
+    square = np.full((3, 3), np.nan)
+    none = np.zeros(ranges, dtype=np.int64)
+    return Located(nan, square, none, np.inf, nan, 0.0, 0.0, 0, -1, status)
+
+
+@dataclass(frozen=True, eq=False)
+class _Explanation:
+    """All candidates with one range left out, -1 for none, and what that costs in chi-square."""
+
+    left_out: int
+    penalty: float
+    found: Candidates
+
+
+def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation] | None:
+    """The searches with all ranges and, if they may be wrong, without each; None where one gave up."""
+    everything = np.arange(len(ranged.lengths))
+    base = trunk(ranged, everything, most)
+    found = None if base is None else grown(ranged, everything, base, most)
+    if base is None or found is None:
+        return None
+    explanations = [_Explanation(-1, 0.0, found)]
+    u = np.linalg.norm(ranged.root, axis=1)
+    for i in everything if wrong > 0.0 and len(everything) > 1 else ():
+        rows = np.delete(everything, i)
+        own = trunk(ranged, rows, most) if i in base.rows else base
+        found = None if own is None else grown(ranged, rows, own, most)
+        if found is None:
+            return None
+        odds = (1.0 - wrong) / wrong * ranged.periods[i] / (np.sqrt(2.0 * np.pi) * u[i])
+        explanations.append(_Explanation(int(i), float(2.0 * np.log(max(odds, 1.0))), found))
+    return explanations
+
+
+def _judged(ranged: Ranged, explanations: list[_Explanation]) -> Located:
+    """The best candidate of all explanations, and the doubt that the others leave.
+
+    A candidate of two explanations whose cycles differ at most in what either leaves out is the same answer.
+    """
+    from scipy.special import chdtri
+
+    lowest = [float(np.min(e.found.chi_square, initial=np.inf)) + e.penalty for e in explanations]
+    mine = explanations[int(np.argmin(lowest))]
+    if not np.isfinite(min(lowest)):
+        return _nothing(len(ranged.lengths), AmbiguityStatus.MISFIT)
+    best = int(np.argmin(mine.found.chi_square))
+    cycles, square = mine.found.cycles[best], float(mine.found.chi_square[best])
+    doubts, rivals, nowhere = [], [], np.full((1, 3), np.nan)
+    for e in explanations:
+        common = np.ones(len(cycles), dtype=bool)
+        common[[i for i in (e.left_out, mine.left_out) if i >= 0]] = False
+        other = np.any(e.found.cycles[:, common] != cycles[common], axis=1)
+        costs = np.append(e.found.chi_square[other], e.found.floor) + e.penalty - min(lowest)
+        doubts.append(float(np.sum(np.exp(-0.5 * np.clip(costs, -1400.0, 1400.0)))))
+        rivals.append((costs, np.concatenate([e.found.x[other], nowhere])))
+    costs, places = (np.concatenate(part) for part in zip(*rivals, strict=True))
+    nearest = int(np.argmin(costs))
+    listed = np.where(np.isfinite(places[:, 0]), costs, np.inf)
+    doubt = sum(doubts)
+    took_part = len(cycles) - (mine.left_out >= 0)
+    if square > float(chdtri(took_part, SURE)):
+        status = AmbiguityStatus.MISFIT
+    elif doubt / (1.0 + doubt) <= (SURE if len(explanations) == 1 else SURE_OF_ALL) and doubts[0] <= SURE * (1 + doubt):
+        status = AmbiguityStatus.FOUND
+    else:
+        status = AmbiguityStatus.TOO_FEW if took_part < 4 else AmbiguityStatus.AMBIGUOUS
+    return Located(
+        mine.found.x[best],
+        mine.found.covariance,
+        cycles,
+        square,
+        places[int(np.argmin(listed))] if np.isfinite(listed).any() else nowhere[0],
+        float(costs[nearest]),
+        1.0 / (1.0 + doubt),
+        sum(e.found.tried for e in explanations),
+        mine.left_out,
+        status,
+    )

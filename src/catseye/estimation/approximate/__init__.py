@@ -1,5 +1,0 @@
-"""Where an adjustment begins: approximate coordinates and orientations, found for what a network does not give."""
-
-from catseye.estimation.approximate.start import Approximation, approximate
-
-__all__ = ["Approximation", "approximate"]

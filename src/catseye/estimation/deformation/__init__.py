@@ -1,0 +1,1 @@
+"""What moved between epochs: congruence, comparison, motions of groups."""

@@ -1,0 +1,331 @@
+"""Congruence of the points common to two epochs: their differences without the datum, and the global test.
+
+The coordinates of an epoch stand in its own datum. What two datums may differ by is the reader's to say ("rigid" for
+ranges alone, "levelled" where heights and plumb lines hold two turns). Every test here weights only what no such motion
+explains, so that decisions do not depend on how either datum was held.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
+from catseye.estimation.network.datum import MOTIONS, to_datum
+from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
+
+DATUMS: dict[str, tuple[int, ...]] = {
+    "absolute": (),
+    "translation": (0, 1, 2),
+    "levelled": (0, 1, 2, 5),
+    "levelled similarity": (0, 1, 2, 5, 6),
+    "rigid": (0, 1, 2, 3, 4, 5),
+    "similarity": (0, 1, 2, 3, 4, 5, 6),
+}
+HELD = 1e-12  # of the epochs' variances: a difference with less variance is held, not measured
+HELD_APART = 1e-9  # m: held coordinates may differ by rounding, not more
+CURVED = 0.05  # of the smallest sigma: second-order effect of a turn that a linear datum motion may have
+ALIGNMENTS = 20
+UNSEEN = 1e-9  # of the largest singular value of the datum motions: beneath it a motion does not show
+
+
+@dataclass(frozen=True)
+class VarianceFactor:
+    """What the covariances are multiplied by: known (infinite degrees, chi-square tests) or estimated (F tests)."""
+
+    value: float = 1.0
+    degrees_of_freedom: float = np.inf
+
+    def p(self, pvv: float | np.ndarray, rank: float | np.ndarray) -> np.ndarray:
+        """Chance of a sum of squares at least as large as pvv, of `rank` degrees of freedom, if nothing moved."""
+        pvv, rank = np.asarray(pvv) / self.value, np.maximum(rank, 1)
+        if np.isinf(self.degrees_of_freedom):
+            return special.chdtrc(rank, np.maximum(pvv, 0.0))
+        return special.fdtrc(rank, self.degrees_of_freedom, np.maximum(pvv / rank, 0.0))
+
+    def noncentrality(self, rank: int, level: float, power: float) -> float:
+        """Squared size, in sigmas, of an effect that a test of this level finds with this power.
+
+        Source: [BAARDA68]; at rank 1, level 0.1 %, power 80 % the root is 4.13.
+        """
+        f = self.degrees_of_freedom
+        if np.isinf(f):
+            limit = special.chdtri(rank, level)
+            return _crossing(lambda nc: 1.0 - special.chndtr(limit, rank, nc) - power)
+        limit = special.fdtri(rank, f, 1.0 - level)
+        return _crossing(lambda nc: 1.0 - special.ncfdtr(rank, f, nc, limit) - power)
+
+
+KNOWN = VarianceFactor()
+
+
+def _crossing(rising: Callable[[float], float]) -> float:
+    """Where a rising function crosses zero, by bisection to double precision."""
+    low, high = 0.0, 1.0
+    while rising(high) < 0.0:
+        low, high = high, 2.0 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rising(middle) < 0.0 else (low, middle)
+    return high
+
+
+def pooled_variance_factor(first: tuple[float, float], second: tuple[float, float]) -> tuple[VarianceFactor, float]:
+    """Variance factor of two epochs together, and the p-value of their being equal (two-sided F test).
+
+    first, second   (variance factor, degrees of freedom) of each epoch's adjustment, as `Solution.variance_factor`
+
+    Source: [CASPARY87] (homogeneity of two epochs).
+
+    >>> pooled, p = pooled_variance_factor((1.2, 30.0), (0.8, 10.0))
+    >>> round(pooled.value, 3), pooled.degrees_of_freedom, round(p, 3)
+    (1.1, 40.0, 0.509)
+    """
+    (a, f), (b, g) = first, second
+    if not (a > 0.0 and b > 0.0 and f > 0.0 and g > 0.0):
+        raise EstimationError(f"variance factors {a}, {b} with {f}, {g} degrees of freedom: all must be positive")
+    p = 2.0 * min(special.fdtrc(f, g, a / b), special.fdtr(f, g, a / b))
+    return VarianceFactor((a * f + b * g) / (f + g), f + g), float(p)
+
+
+@dataclass(frozen=True, eq=False)
+class Epochs:
+    """The points common to two epochs.
+
+    names               n, unique
+    first, second       (n, 3) m, all finite
+    covariance_first    (3n, 3n) m^2, joint, may be singular
+    covariance_second   likewise
+    cross               (3n, 3n) m^2, covariance of the first epoch (rows) with the second (columns); None: independent
+    compared            (n, 3) bool: False for a coordinate that is not common, such as of a benchmark known by height
+                        alone; it takes no part, its value only says where the point is. None: all are compared
+    """
+
+    names: tuple[str, ...]
+    first: np.ndarray
+    second: np.ndarray
+    covariance_first: np.ndarray
+    covariance_second: np.ndarray
+    cross: np.ndarray | None = None
+    compared: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if len(set(self.names)) != n or n == 0:
+            raise EstimationError(f"{n} points with {len(set(self.names))} different names: names must be unique")
+        for what, array, shape in (
+            ("first epoch", self.first, (n, 3)),
+            ("second epoch", self.second, (n, 3)),
+            ("covariance of the first epoch", self.covariance_first, (3 * n, 3 * n)),
+            ("covariance of the second epoch", self.covariance_second, (3 * n, 3 * n)),
+            ("covariance between the epochs", self.cross, (3 * n, 3 * n)),
+        ):
+            if array is not None and (np.shape(array) != shape or not np.isfinite(array).all()):
+                raise EstimationError(f"the {what} has shape {np.shape(array)}, expected {shape}, all finite")
+
+
+@dataclass(frozen=True)
+class CongruenceTest:
+    """Global test that points did not move relative to each other.
+
+    pvv                 weighted sum of squares of the differences that no datum motion explains
+    degrees_of_freedom  compared coordinates less datum motions
+    p                   chance of such a pvv or a larger one if nothing moved
+    """
+
+    pvv: float
+    degrees_of_freedom: int
+    p: float
+
+
+def _combination(points: np.ndarray, datum: str, pivot: np.ndarray) -> np.ndarray:
+    """(7, g): motions of the datum, scaled to unit columns over the points, from those of `motion_columns`."""
+    if datum not in DATUMS:
+        raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
+    chosen = np.eye(7)[:, DATUMS[datum]]
+    length = np.linalg.norm(motion_columns(points, pivot) @ chosen, axis=0)
+    return chosen / np.where(length > 0.0, length, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """Second less first of common points, aligned on chosen points, and what is needed to weight it.
+
+    names         n
+    datum         what the two datums may differ by
+    d             (3n,) m
+    q             (3n, 3n) m^2, variance factor 1
+    used          (3n,) bool: compared and not held
+    held          (3n,) bool: compared, without variance
+    pivot         (3,) m
+    combination   (7, g): the datum motions that held coordinates leave free, about the pivot
+    motions       (3n, g): what they do to the points, m
+    called        g names of them
+    turned        (3, 3), and
+    shifted       (3,) m: the second epoch was aligned as turned @ second + shifted
+    """
+
+    names: tuple[str, ...]
+    datum: str
+    d: np.ndarray
+    q: np.ndarray
+    used: np.ndarray
+    held: np.ndarray
+    pivot: np.ndarray
+    combination: np.ndarray
+    motions: np.ndarray
+    called: tuple[str, ...]
+    turned: np.ndarray
+    shifted: np.ndarray
+
+    def fit(self, extra: np.ndarray | None = None, called: Sequence[str] = ()) -> LinearEstimate:
+        """The differences explained by datum motions, and by extra columns (3n, k), as well as they can be."""
+        rows = np.flatnonzero(self.used)
+        if not len(rows):
+            raise EstimationError("no coordinate is compared: every common one is held or excluded")
+        motions, names = self.motions[rows], self.called
+        if motions.shape[1]:  # what these rows cannot see, such as a turn about the line they stand on, is no matter
+            _, s, vt = np.linalg.svd(motions, full_matrices=False)
+            rank = int(np.sum(s > UNSEEN * s[0]))
+            if rank < motions.shape[1]:
+                motions, names = motions @ vt[:rank].T, tuple(f"datum motion {i + 1}" for i in range(rank))
+        return best_linear_estimate(
+            motions if extra is None else np.concatenate([motions, extra[rows]], axis=1),
+            self.d[rows],
+            self.q[np.ix_(rows, rows)],
+            parameters=[*names, *called],
+            rows=[f"{self.names[r // 3]} {'xyz'[r % 3]}" for r in rows],
+        )
+
+    def seen_from(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Plain differences (3n,) m and their covariance (3n, 3n) m^2 in the datum of stable points (n,) bool.
+
+        Held coordinates come first; what they leave free is held by inner constraints on the stable points, by
+        S-transformation. Raises EstimationError if these do not hold it. Source: [BAARDA73].
+        """
+        rows = np.repeat(stable, 3) & self.used
+        conditions = np.where(rows[:, None], self.motions, 0.0).T
+        if np.linalg.matrix_rank(conditions) < len(conditions):
+            raise EstimationError(
+                f"{int(stable.sum())} stable points do not hold a {self.datum} datum; more are needed"
+            )
+        moved, t = to_datum(self.d, np.zeros(len(rows)), self.motions, conditions)
+        s = np.eye(len(rows)) - t @ conditions
+        return self.d + moved, s @ self.q @ s.T
+
+
+def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
+    """The differences after the datum motion that fits the stable points best, unweighted, is taken out exactly.
+
+    epochs   see there
+    datum    what the two datums may differ by, a key of `DATUMS`
+    stable   (n,) bool
+
+    Raises EstimationError where held coordinates differ, or where a large turn meets coordinates that are not common.
+    """
+    x, y = (np.asarray(p, dtype=float) for p in (epochs.first, epochs.second))
+    n = len(x)
+    qx, qy = (np.asarray(q, dtype=float) for q in (epochs.covariance_first, epochs.covariance_second))
+    cross = np.zeros((3 * n, 3 * n)) if epochs.cross is None else np.asarray(epochs.cross, dtype=float)
+    compared = np.ones(3 * n, dtype=bool) if epochs.compared is None else np.ravel(epochs.compared).astype(bool)
+    variance = np.diag(qx) + np.diag(qy)
+    held = compared & (np.diag(qx + qy - cross - cross.T) <= HELD * variance)
+    _check_held(epochs.names, np.where(held, np.abs((y - x).ravel()), 0.0))
+    fully_held = held.reshape(n, 3).all(axis=1)
+    pivot = x[fully_held].mean(axis=0) if fully_held.any() else x[stable].mean(axis=0)
+    combination = _combination(x, datum, pivot)
+    base = motion_columns(x, pivot)
+    called = tuple(MOTIONS[i] for i in DATUMS[datum])
+    if held.any() and combination.shape[1]:  # only motions that leave held coordinates where they are
+        _, s, vt = np.linalg.svd(base[held] @ combination)
+        left = vt[int(np.sum(s > UNSEEN * s.max(initial=0.0))) :].T
+        combination, called = combination @ left, tuple(f"datum motion {i + 1}" for i in range(left.shape[1]))
+    partial = not (compared.all() and np.array_equal(held.reshape(n, 3).any(axis=1), fully_held))
+    on = np.repeat(stable, 3) & compared & ~held
+    turned = np.eye(3)
+    aligned = y
+    if combination.shape[1] and on.any():
+        smallest = float(np.sqrt(variance[on & (variance > 0.0)].min(initial=np.inf)))
+        aligned, turned = _aligned(x, y, on, pivot, combination=combination, limit=smallest if partial else np.inf)
+        cross = turned_covariance(cross, turned, columns=True)
+        qy = turned_covariance(turned_covariance(qy, turned, columns=True), turned, columns=False)
+    return Differences(
+        names=epochs.names,
+        datum=datum,
+        d=(aligned - x).ravel(),
+        q=qx + qy - cross - cross.T,
+        used=compared & ~held,
+        held=held,
+        pivot=pivot,
+        combination=combination,
+        motions=base @ combination,
+        called=called,
+        turned=turned,
+        shifted=aligned[0] - turned @ y[0],
+    )
+
+
+def _check_held(names: Sequence[str], apart: np.ndarray) -> None:
+    worst = int(np.argmax(apart))
+    if apart[worst] > HELD_APART:
+        raise EstimationError(
+            f"{names[worst // 3]} is held: the difference of its {'xyz'[worst % 3]} has no variance, but is "
+            f"{apart[worst]:.3g} m; give it its covariance, or the same coordinate in both epochs"
+        )
+
+
+def _aligned(
+    x: np.ndarray, y: np.ndarray, on: np.ndarray, pivot: np.ndarray, *, combination: np.ndarray, limit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """y moved onto x by datum motions, exactly, and the matrix that did it; coordinates `on` are made to agree.
+
+    A finite `limit`, m, the smallest sigma, forbids turns: y stays, if the second order of the turn is nothing to it.
+    """
+    from scipy.spatial.transform import Rotation
+
+    turned = np.eye(3)
+    base = motion_columns(x, pivot)
+    size = float(np.abs(base[:, 3:]).max())
+    for _ in range(ALIGNMENTS):
+        seen = (base @ combination)[on]
+        motion = combination @ np.linalg.lstsq(seen, (y - x).ravel()[on], rcond=None)[0]
+        curved = float(motion[3:6] @ motion[3:6] + motion[6] ** 2) * size
+        if np.isfinite(limit):
+            if curved > CURVED * limit:
+                raise EstimationError(
+                    f"the epochs' axes differ by {np.linalg.norm(motion[3:6]):.2g} rad, too much for points known or "
+                    "held in some coordinates only; bring both epochs to the same axes first"
+                )
+            return y, turned
+        back = Rotation.from_rotvec(-motion[3:6]).as_matrix() / (1.0 + motion[6])
+        y = pivot + (y - motion[:3] - pivot) @ back.T
+        turned = back @ turned
+        if curved < 1e-15 * (size + 1.0):
+            break
+    return y, turned
+
+
+def congruence_test(epochs: Epochs, *, datum: str = "rigid", variance_factor: VarianceFactor = KNOWN) -> CongruenceTest:
+    """Global test that no common point moved relative to the others.
+
+    epochs            see there
+    datum             what the two datums may differ by, a key of `DATUMS`
+    variance_factor   known (chi-square test) or estimated (F test), see `pooled_variance_factor`
+
+    The quadratic form of the differences d with the pseudo-inverse of their covariance, after both are brought to one
+    datum; here d' P d with P as in `best_linear_estimate`, which is the same for every datum. Raises EstimationError
+    where no redundancy is left, or where the covariance is singular beyond the datum.
+
+    Source: [PELZER71]; [CASPARY87].
+    """
+    fit = differences(epochs, datum, np.ones(len(epochs.names), dtype=bool)).fit()
+    return global_test(fit.pvv, fit.degrees_of_freedom, variance_factor)
+
+
+def global_test(pvv: float, degrees: int, variance_factor: VarianceFactor) -> CongruenceTest:
+    """The test of a sum of squares of so many degrees of freedom; EstimationError if there are none."""
+    if degrees <= 0:
+        raise EstimationError("nothing to test: the compared coordinates only just hold the datum; compare more points")
+    return CongruenceTest(pvv, degrees, float(variance_factor.p(pvv, degrees)))

@@ -1,0 +1,354 @@
+"""Movements of points from changes of ranges, with stations and points known only approximately; also constrained.
+
+A change of range is the exact difference of two distances, so no linearisation enters: with P the point's and S the
+station's approximate place, change = |P + dx - S| - |P - S|. What the approximation costs: an error e of a place turns
+the change's prediction by (u' - u).e, u and u' the unit vectors before and after, about |dx across| |e| / distance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from catseye.errors import EstimationError
+from catseye.estimation.shapes.rigid_body import motion_columns
+
+DETERMINED = "determined"
+UNDETERMINED = "undetermined: {rank} of {wanted} directions seen by {channels} channels"
+NOT_CONVERGED = "not converged: the change is too large for a movement near the approximate place"
+ITERATIONS = 30
+STEP = 1e-12  # of the mean distance: below it rounding rules
+RANK = 1e-10  # of the largest eigenvalue of the scaled normal matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Movements:
+    """Movements of one group of n points that share q free parameters, for any batch of epochs (...).
+
+    displacement            (..., n, 3) m; nan where undetermined
+    covariance              (..., 3n, 3n) m^2, all below together
+    noise                   (..., 3n, 3n) m^2, from the range changes
+    approximation           (..., 3n, 3n) m^2, from the approximate coordinates, common to all epochs
+    violation               (..., 3n, 3n) m^2, from movement in directions that the constraint excludes
+    parameters              (..., q), coefficients of the columns of `basis`
+    parameters_covariance   (..., q, q), from the range changes
+    basis                   (3n, q)
+    sensitivity_points      (..., 3n, 3n) d displacement / d approximate points
+    sensitivity_stations    (..., 3n, 3s) d displacement / d approximate stations
+    resolution              (..., 3n, 3n) H: what would be reported of a small true movement; H - 1 of a movement that
+                            violates the constraint is its bias
+    residual                (..., n, s) m, observed minus predicted change; nan for missing channels
+    pvv                     (...) weighted sum of squares
+    degrees_of_freedom      (...) channels less parameters
+    rank                    (...) of q
+    status                  (...) text: "determined", or what is missing
+    """
+
+    displacement: np.ndarray
+    covariance: np.ndarray
+    noise: np.ndarray
+    approximation: np.ndarray
+    violation: np.ndarray
+    parameters: np.ndarray
+    parameters_covariance: np.ndarray
+    basis: np.ndarray
+    sensitivity_points: np.ndarray
+    sensitivity_stations: np.ndarray
+    resolution: np.ndarray
+    residual: np.ndarray
+    pvv: np.ndarray
+    degrees_of_freedom: np.ndarray
+    rank: np.ndarray
+    status: np.ndarray
+
+    def bias(self, movement: np.ndarray) -> np.ndarray:
+        """Error (..., n, 3) m of the answer where the true movement has this part (n, 3) m outside the constraint."""
+        movement = np.asarray(movement, dtype=float)
+        reported = (self.resolution @ movement.ravel()).reshape(*self.resolution.shape[:-2], -1, 3)
+        return reported - movement
+
+
+def change_of_range(stations: np.ndarray, points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """Exact change (..., s) m of the distances from stations to points that move.
+
+    stations       (s, 3) m
+    points         (..., 3) m, before
+    displacement   (..., 3) m
+
+    (2 a + dx).dx / (|a| + |a + dx|), a from the station to the point: no digit is lost to cancellation.
+
+    >>> change_of_range(np.zeros((1, 3)), np.array([3.0, 0.0, 0.0]), np.array([0.0, 4.0, 0.0]))
+    array([2.])
+    """
+    arm = np.asarray(points, dtype=float)[..., None, :] - stations
+    step = np.asarray(displacement, dtype=float)[..., None, :]
+    total = np.linalg.norm(arm, axis=-1) + np.linalg.norm(arm + step, axis=-1)
+    return np.sum((2.0 * arm + step) * step, axis=-1) / total
+
+
+def displacements(
+    approximate_stations: np.ndarray,
+    approximate_points: np.ndarray,
+    range_changes: np.ndarray,
+    sigma: np.ndarray | float,
+    *,
+    u_stations: np.ndarray | float = 0.0,
+    u_points: np.ndarray | float = 0.0,
+) -> Movements:
+    """Movement of each point by itself from changes of its ranges; arrays come as of groups of one point (..., 1, 3).
+
+    approximate_stations   (s, 3) m
+    approximate_points     (..., 3) m, before the movement
+    range_changes          (..., s) m, after less before; nan where missing
+    sigma                  (..., s) or less, m: standard uncertainty of a change; inf or nan leaves it out
+    u_stations             m, standard uncertainty of a station's coordinates: one value, (s,) or (s, 3)
+    u_points               m, likewise of the point: one value or (3,)
+
+    Points, changes and sigma broadcast against each other. Three channels not in one plane determine a point. The
+    uncertainty from the approximate coordinates is first order in them, and grows with the movement; it is the same
+    error in every epoch: propagate it between epochs with the sensitivities. Weights are those of the noise alone.
+
+    Source: [PARKER04] 3.2.4; exact differences and error budget ours.
+
+    >>> stations = np.array([[50.0, 0, 0], [0, 50, 0], [0, 0, 50], [-30, -30, -30]])
+    >>> truth = np.array([0.001, -0.002, 0.003])
+    >>> changes = change_of_range(stations, np.zeros(3), truth)
+    >>> displacements(stations, np.zeros(3), changes, 1e-5).displacement[0].round(12)
+    array([ 0.001, -0.002,  0.003])
+    """
+    points = np.asarray(approximate_points, dtype=float)
+    return constrained(
+        approximate_stations,
+        points[..., None, :],
+        np.asarray(range_changes, dtype=float)[..., None, :],
+        np.asarray(sigma, dtype=float) if np.ndim(sigma) < 2 else np.asarray(sigma, dtype=float)[..., None, :],
+        basis=np.eye(3),
+        u_stations=u_stations,
+        u_points=u_points,
+    )
+
+
+def allowed_directions(
+    points: int, *, allowed: np.ndarray | None = None, forbidden: np.ndarray | None = None
+) -> np.ndarray:
+    """Basis (3n, q) of movements of n points, each along `allowed` directions, or across `forbidden` ones.
+
+    points      n
+    allowed     (k, 3) directions, the same for all points, or
+    forbidden   (k, 3) directions in which no point moves, such as the vertical of a bearing weldment
+
+    >>> allowed_directions(1, forbidden=np.array([[0.0, 0.0, 1.0]])).shape  # moves in the plane
+    (3, 2)
+    """
+    if (allowed is None) == (forbidden is None):
+        raise EstimationError("give either the allowed or the forbidden directions")
+    rows = np.atleast_2d(np.asarray(forbidden if allowed is None else allowed, dtype=float))
+    if rows.shape[-1] != 3 or not np.isfinite(rows).all() or not rows.any():
+        raise EstimationError(f"directions have shape {rows.shape}, expected (k, 3), finite and not zero")
+    _, s, vt = np.linalg.svd(rows)
+    rank = int(np.sum(s > 1e-9 * s[0]))
+    one = vt[rank:] if allowed is None else vt[:rank]
+    return np.kron(np.eye(points), one.T)
+
+
+def rigid_group(points: np.ndarray, motions: Sequence[int] = range(6), pivot: np.ndarray | None = None) -> np.ndarray:
+    """Basis (3n, q) of movements of points (n, 3) m as one body: translation and rotation (rad), or some of those six.
+
+    Small turns: second order, arm rotation^2 / 2, is left out. The pivot (3,) m is the centroid unless given.
+    """
+    points = np.asarray(points, dtype=float)
+    centre = points.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
+    return motion_columns(points, centre)[:, list(motions)]
+
+
+def constrained(
+    approximate_stations: np.ndarray,
+    approximate_points: np.ndarray,
+    range_changes: np.ndarray,
+    sigma: np.ndarray | float,
+    *,
+    basis: np.ndarray,
+    u_stations: np.ndarray | float = 0.0,
+    u_points: np.ndarray | float = 0.0,
+    u_violation: float = 0.0,
+) -> Movements:
+    """Movements of a group of points that are restricted to a linear subspace.
+
+    approximate_stations   (s, 3) m
+    approximate_points     (..., n, 3) m, before the movement
+    range_changes          (..., n, s) m, after less before; nan where missing
+    sigma                  broadcasts to (..., n, s), m; inf or nan leaves a channel out
+    basis                  (3n, q), from `allowed_directions`, `rigid_group` or any
+    u_stations, u_points   m, standard uncertainty of approximate coordinates: one value, (s,) and (n,), or with 3
+    u_violation            m, standard uncertainty of movement in each excluded direction: enters the budget as a bias
+                           that is not known, not the weights
+
+    What the constraint wins is seen in the covariance beside that of `displacements`; what it costs where it does not
+    hold, in `bias`; if it holds, in `constraint_test`. Raises EstimationError for wrong shapes, a basis whose columns
+    depend on each other, or a point that stands on a station.
+
+    Source: [PARKER04] 3.2.5; [FOERSTNER16] chapter 4 (Gauss-Markov model with constraints, here by elimination).
+    """
+    stations, points, changes, weight, basis = _checked(
+        approximate_stations, approximate_points, range_changes, sigma, basis
+    )
+    batch, (n, s), q = changes.shape[:-2], changes.shape[-2:], basis.shape[1]
+    shaped = basis.reshape(n, 3, q)
+    seen = weight > 0.0
+    theta, size = np.zeros((*batch, q)), np.full(batch, np.inf)
+    limit = STEP * float(np.linalg.norm(points[..., None, :] - stations, axis=-1).mean())
+    for _ in range(ITERATIONS):
+        moved = (theta @ basis.T).reshape(*batch, n, 3)
+        residual = np.where(seen, changes - change_of_range(stations, points, moved), 0.0)
+        unit, turned = _directions(stations, points, moved)
+        design = np.einsum("...nsi,niq->...nsq", unit, shaped).reshape(*batch, n * s, q)
+        inverse, rank = _inverse(np.swapaxes(design, -1, -2) @ (weight.reshape(*batch, n * s, 1) * design))
+        gain = inverse @ np.swapaxes(design * weight.reshape(*batch, n * s, 1), -1, -2)
+        step = (gain @ residual.reshape(*batch, n * s, 1))[..., 0]
+        size = np.abs(step @ basis.T).max(axis=-1, initial=0.0)
+        if np.all((size < limit) | (rank < q)):
+            break
+        theta = theta + np.where((rank == q)[..., None], step, 0.0)
+    carried = basis @ gain  # changes -> displacement
+    approximation, by_points, by_stations = _from_places(carried, turned, u_stations, u_points)
+    resolution = _onto_points(carried, unit)
+    outside = (resolution - np.eye(3 * n)) @ _complement(basis)
+    noise = basis @ inverse @ basis.T
+    violation = u_violation**2 * outside @ np.swapaxes(outside, -1, -2)
+    good = (rank == q) & (size < limit)
+    channels = seen.sum(axis=(-1, -2))
+    status = np.full(batch, DETERMINED, dtype=object)
+    for i in np.argwhere(~good):
+        short = UNDETERMINED.format(rank=rank[tuple(i)], wanted=q, channels=channels[tuple(i)])
+        status[tuple(i)] = short if rank[tuple(i)] < q else NOT_CONVERGED
+    known = [np.where(good[..., None, None], a, np.nan) for a in (
+        moved, noise + approximation + violation, noise, approximation, violation, inverse, by_points, by_stations,
+        resolution, np.where(seen, residual, np.nan),
+    )]  # fmt: skip
+    return Movements(
+        displacement=known[0],
+        covariance=known[1],
+        noise=known[2],
+        approximation=known[3],
+        violation=known[4],
+        parameters=np.where(good[..., None], theta, np.nan),
+        parameters_covariance=known[5],
+        basis=basis,
+        sensitivity_points=known[6],
+        sensitivity_stations=known[7],
+        resolution=known[8],
+        residual=known[9],
+        pvv=np.where(good, np.sum(weight * residual**2, axis=(-1, -2)), np.nan),
+        degrees_of_freedom=np.where(good, channels - q, 0),
+        rank=rank,
+        status=status,
+    )
+
+
+def constraint_test(restricted: Movements, free: Movements) -> tuple[np.ndarray, np.ndarray]:
+    """Chi-square statistic (...) and p-value (...) of the constraint that leads from `free` to `restricted`.
+
+    restricted, free   movements of the same changes; the basis of the first lies within that of the second
+
+    Raises EstimationError where it does not. Source: [FOERSTNER16] chapter 4 (test of linear hypotheses).
+    """
+    a, b = restricted.basis, free.basis
+    if a.shape[0] != b.shape[0] or a.shape[1] >= b.shape[1]:
+        raise EstimationError(f"bases of shapes {a.shape} and {b.shape}: the first must be a part of the second")
+    if not np.allclose(b @ np.linalg.lstsq(b, a, rcond=None)[0], a, rtol=0.0, atol=1e-9 * np.abs(a).max()):
+        raise EstimationError("the restricted movements are not among the free ones: the bases do not nest")
+    statistic = np.maximum(restricted.pvv - free.pvv, 0.0)
+    return statistic, special.chdtrc(b.shape[1] - a.shape[1], statistic)
+
+
+def _checked(
+    stations: np.ndarray, points: np.ndarray, changes: np.ndarray, sigma: np.ndarray | float, basis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Everything as floats and broadcast; weights are zero where a change or its sigma is missing."""
+    stations, points, changes, basis = (np.asarray(a, dtype=float) for a in (stations, points, changes, basis))
+    s, n = len(stations), points.shape[-2] if points.ndim > 1 else 0
+    if stations.shape != (s, 3) or points.shape[-1:] != (3,) or changes.shape[-2:] != (n, s):
+        raise EstimationError(
+            f"stations {stations.shape}, points {points.shape}, changes {changes.shape}: "
+            "expected (s, 3), (..., n, 3) and (..., n, s)"
+        )
+    if not (np.isfinite(stations).all() and np.isfinite(points).all()):
+        raise EstimationError("an approximate coordinate is not a number")
+    if basis.ndim != 2 or basis.shape[0] != 3 * n or not np.isfinite(basis).all():
+        raise EstimationError(f"the basis has shape {basis.shape}, expected ({3 * n}, q), finite")
+    length = np.linalg.norm(basis, axis=0)
+    if not length.all() or np.linalg.matrix_rank(basis / length) < basis.shape[1]:
+        raise EstimationError(f"the {basis.shape[1]} columns of the basis depend on each other, or one is zero")
+    sigma = np.asarray(sigma, dtype=float)
+    if np.any(sigma <= 0.0):
+        raise EstimationError(f"a range change has standard uncertainty {np.nanmin(sigma):.3g} m: it must be positive")
+    batch = np.broadcast_shapes(points.shape[:-2], changes.shape[:-2], np.broadcast_shapes(sigma.shape, (n, s))[:-2])
+    changes = np.broadcast_to(changes, (*batch, n, s))
+    sigma = np.broadcast_to(sigma, (*batch, n, s))
+    if np.min(np.linalg.norm(points[..., None, :] - stations, axis=-1)) == 0.0:
+        raise EstimationError("a point stands on a station: its range has no direction")
+    there = np.isfinite(changes) & np.isfinite(sigma)
+    weight = np.where(there, 1.0 / np.where(there, sigma, 1.0) ** 2, 0.0)
+    return stations, np.broadcast_to(points, (*batch, n, 3)), np.where(there, changes, 0.0), weight, basis
+
+
+def _directions(stations: np.ndarray, points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (..., n, s, 3) after the movement, and how much they turned, without cancellation."""
+    before = points[..., None, :] - stations
+    after = before + moved[..., None, :]
+    old, new = (np.linalg.norm(a, axis=-1)[..., None] for a in (before, after))
+    unit = after / new
+    change = change_of_range(stations, points, moved)[..., None]
+    return unit, (moved[..., None, :] - unit * change) / old
+
+
+def _inverse(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse of each normal matrix, and its rank; of a singular one the inverse on what is seen."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 1e-300))
+    values, vectors = np.linalg.eigh(normal * scale[..., :, None] * scale[..., None, :])
+    seen = values > RANK * np.maximum(values[..., -1:], 1e-300)
+    seen &= values > 1e-12
+    root = vectors * np.sqrt(np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0))[..., None, :] * scale[..., :, None]
+    return root @ np.swapaxes(root, -1, -2), seen.sum(axis=-1)
+
+
+def _onto_points(carried: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Answers by the points' coordinates (..., 3n, 3n): carried times the derivatives of each point's channels."""
+    *batch, n, s, _ = vectors.shape
+    gain = carried.reshape(*batch, 3 * n, n, s)
+    return np.einsum("...ins,...nsj->...inj", gain, vectors).reshape(*batch, 3 * n, 3 * n)
+
+
+def _from_places(
+    carried: np.ndarray, turned: np.ndarray, u_stations: np.ndarray | float, u_points: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Covariance from the approximate coordinates, and d displacement / d points, / d stations.
+
+    A prediction at the true places is (u' - u).(e_point - e_station) more than at the approximate ones, so the answer
+    errs by the gain times that; d / d approximate place, whose error is minus e, has the opposite sign.
+    """
+    *batch, n, s, _ = turned.shape
+    gain = carried.reshape(*batch, 3 * n, n, s)
+    to_points = -_onto_points(carried, turned)
+    to_stations = np.einsum("...ins,...nsj->...isj", gain, turned).reshape(*batch, 3 * n, 3 * s)
+    q = sum(
+        (slope * _variances(u, count, name)) @ np.swapaxes(slope, -1, -2)
+        for slope, u, count, name in ((to_points, u_points, n, "u_points"), (to_stations, u_stations, s, "u_stations"))
+    )
+    return np.asarray(q), to_points, to_stations
+
+
+def _variances(u: np.ndarray | float, count: int, name: str) -> np.ndarray:
+    u = np.asarray(u, dtype=float)
+    if u.shape not in ((), (count,), (count, 3)) and not (count == 1 and u.shape == (3,)):
+        raise EstimationError(f"{name} has shape {u.shape}, expected (), ({count},) or ({count}, 3)")
+    if not (np.isfinite(u).all() and np.all(u >= 0.0)):
+        raise EstimationError(f"{name} must be finite and not negative")
+    return np.broadcast_to(u[:, None] if u.shape == (count,) else u, (count, 3)).ravel() ** 2
+
+
+def _complement(basis: np.ndarray) -> np.ndarray:
+    """Orthonormal base of what the columns leave out."""
+    u, _, _ = np.linalg.svd(basis)
+    return u[:, basis.shape[1] :]

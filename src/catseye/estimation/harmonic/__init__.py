@@ -1,0 +1,1 @@
+"""Series of harmonics with elevation or azimuth, of many points at once."""

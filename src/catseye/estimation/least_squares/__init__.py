@@ -1,0 +1,1 @@
+"""Rows, normal equations, robust weights, conflicts: the solver itself."""

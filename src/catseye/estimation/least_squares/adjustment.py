@@ -1,0 +1,259 @@
+"""Least squares: Gauss-Newton over groups of (correlated) observations, with the statistics that make it checkable.
+
+Systematic effects are parameters with priors, and a prior is an observation like any other ([FOERSTNER16] chapter 4).
+The solver is scale-free: it converges on the size of a step in its own standard deviations, and judges rank on
+columns scaled to unit length. Small systems are solved dense, large ones sparse; the answer is the same.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.covariance import Covariance, Dense
+from catseye.estimation.least_squares.normal import NormalEquations
+from catseye.estimation.least_squares.rows import Rows, variances
+from catseye.estimation.observations import Observations
+
+CONVERGED = "converged"
+NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
+check the starting coordinates"
+RANK_DEFICIENT = "rank deficient: {names} not held by any observation; add one, or give a prior"
+UNDEFINED = "undefined at the present values: {names} has no finite value or derivative there; \
+two points may coincide, or an observation is not a number"
+
+NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
+STEP_IN_SIGMAS = 1e-3  # of all parameters together: the step after one below this moves no answer
+ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not count as uphill
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How one group of observations fits; arrays over its m observations.
+
+    name              the group's
+    active            took part in the solution
+    residual          observed minus predicted
+    sigma             standard uncertainty of the observed value, as claimed before
+    redundancy        share of an error in the observation that shows in its own residual; 0 to 1 if uncorrelated
+    standardised      the residual's test statistic, N(0, 1) if the claim holds: Baarda's w with correlations; of an
+                      inactive observation that of its prediction by the others
+    estimated_error   the error in the observation that would explain it best
+    detectable_error  the smallest error that the test finds with power 80 % at the level 0.1 %
+    pvv               v' C^-1 v of the active ones
+    """
+
+    name: str
+    active: np.ndarray
+    residual: np.ndarray
+    sigma: np.ndarray
+    redundancy: np.ndarray
+    standardised: np.ndarray
+    estimated_error: np.ndarray
+    detectable_error: np.ndarray
+    pvv: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The answer of an adjustment.
+
+    x            (n,) parameters
+    q            their covariance; rows and columns of held parameters are zero, all nan where there is no answer
+    status       "converged", or one line that says what to do
+    iterations   Gauss-Newton steps taken
+    fits         one a group, in the order given
+    floating     (f, n) orthonormal directions that no observation holds, in parameters scaled to unit columns; f = 0
+                 unless the rank is deficient
+    """
+
+    x: np.ndarray
+    q: Covariance
+    status: str
+    iterations: int
+    fits: tuple[Fit, ...]
+    floating: np.ndarray
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(n, n), whole; EstimationError for a system too large for that."""
+        return self.q.matrix()
+
+    def require_converged(self) -> "Solution":
+        """This solution, or EstimationError with its status."""
+        if self.status != CONVERGED:
+            raise EstimationError(self.status)
+        return self
+
+    @property
+    def solved(self) -> bool:
+        """There is an answer, converged or on the way: every parameter is held."""
+        return not len(self.floating) and not self.status.startswith(UNDEFINED[:9])
+
+    def variance_factor(self, names: Sequence[str] | None = None) -> tuple[float, float]:
+        """[pvv] / degrees of freedom, expectation 1, and the degrees of freedom, over the groups named (all if None).
+
+        Over all groups the degrees of freedom are observations minus free parameters; over some they are the sum of
+        their redundancy numbers.
+
+        Source: [FOERSTNER16] chapter 4, estimated variance factor and redundancy numbers.
+        """
+        chosen = [f for f in self.fits if names is None or f.name in names]
+        degrees = float(sum(np.sum(f.redundancy[f.active]) for f in chosen))
+        return (sum(f.pvv for f in chosen) / degrees if degrees > 1e-9 else float("nan")), degrees
+
+
+def adjust(
+    x0: np.ndarray,
+    groups: Sequence[Observations],
+    *,
+    free: np.ndarray | None = None,
+    active: Sequence[np.ndarray] | None = None,
+    extra_variance: Sequence[np.ndarray] | None = None,
+    inflation: Sequence[np.ndarray] | None = None,
+    names: Sequence[str] | None = None,
+    iterations: int = 50,
+    tests: bool = True,
+    sparse: bool | None = None,
+) -> Solution:
+    """The parameters that fit groups of observations best, with full covariance and a fit per observation.
+
+    x0              (n,) start values
+    groups          observations; groups are independent of each other, inside one they may be correlated
+    free            (n,) bool: False holds a parameter at its start value (default: all free)
+    active          one (m,) bool array a group: False leaves an observation out, but still predicts it
+    extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
+    inflation       one (m,) array a group, a factor on its standard uncertainties; correlations stay
+    names           (n,) what the parameters are called, for the status
+    iterations      cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
+    tests           False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
+    sparse          solve sparse or dense; chosen by size if None
+
+    Returns a Solution whose status says what happened; raises EstimationError only for a covariance that is none.
+
+    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model), [BAARDA68] (w test, detectable errors; here correlated).
+    """
+    x = np.array(x0, dtype=float)
+    n = len(x)
+    moving = np.arange(n) if free is None else np.flatnonzero(free)
+    given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
+    rows = [Rows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
+    normal = NormalEquations.of(rows, moving, n, sparse)
+    q: Covariance = Dense(np.zeros((n, n))) if not normal.sparse else _Nothing(n)
+    floating = np.zeros((0, n))
+    status, taken, size = NOT_CONVERGED, 0, np.inf
+    while taken < iterations:
+        taken += 1
+        step, size, cost = normal.step(x)
+        if not np.isfinite(cost):
+            q = _Nothing(n, np.nan, moving)
+            status = UNDEFINED.format(names=", ".join(_undefined(rows, x)))
+            break
+        floating = normal.floating()
+        if len(floating):
+            part = np.sum(floating**2, axis=0)
+            worst = [int(i) for i in np.argsort(-part) if part[i] > 1e-3 * part.max()]
+            called = [names[i] if names is not None else f"parameter {i}" for i in worst[:4]]
+            q = _Nothing(n, np.nan, moving)  # zero would claim to know what nothing holds
+            status = RANK_DEFICIENT.format(names=", ".join(called) + (" ..." if len(worst) > 4 else ""))
+            break
+        if tests and (size < STEP_IN_SIGMAS or taken == iterations):
+            q = normal.covariance()
+        x, moved = _lower(rows, x, step, cost)
+        if size < STEP_IN_SIGMAS:
+            status = CONVERGED
+            break
+        if not moved:
+            break
+    if status == NOT_CONVERGED:
+        status = NOT_CONVERGED.format(step=size, iterations=taken)
+    fits = tuple(_fit(r, x, q, tests) for r in rows)
+    return Solution(x, q, status, taken, fits, floating)
+
+
+def _lower(rows: Sequence[Rows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
+    """The first of x + step, x + step/2, ... that does not raise the cost; x itself where none does."""
+    for halving in range(11):
+        trial = x + step * 0.5**halving
+        if sum(r.cost(trial) for r in rows) <= cost * ROUNDING:
+            return trial, True
+    return x, False
+
+
+@dataclass(frozen=True, eq=False)
+class _Nothing:
+    """No covariance: zero for what was not asked for, nan where there is no answer."""
+
+    size: int
+    value: float = 0.0
+    moving: np.ndarray | None = None
+
+    def matrix(self) -> np.ndarray:
+        full = np.zeros((self.size, self.size))
+        if self.moving is not None:
+            full[np.ix_(self.moving, self.moving)] = self.value
+        return full
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        return np.full((self.size, len(columns)), self.value)
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        return np.full(columns.shape, self.value)
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        return np.full((len(columns), len(columns)), self.value)
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        return np.full((len(first), 3, 3), self.value)
+
+    def diagonal(self) -> np.ndarray:
+        return np.full(self.size, self.value)
+
+
+def _undefined(rows: Sequence[Rows], x: np.ndarray) -> list[str]:
+    """Names of the groups that have no finite value or derivative, each once."""
+    bad = [r.group.name for r in rows for v in r.group.predict(x) if not np.isfinite(v[r.active]).all()]
+    bad += [r.group.name for r in rows if not np.isfinite(r.group.observed[r.active]).all()]
+    return list(dict.fromkeys(bad)) or ["the sum of squares"]
+
+
+def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
+    """Residuals and tests of one group, exact with correlations inside the group.
+
+    With P = C^-1 and P_v = P - P A Q A' P over the active rows: w = (P v) / sqrt(diag P_v), estimated error
+    (P v) / diag P_v, redundancy diag(P_v C). An inactive row is predicted from the parameters and from the residuals
+    of the rows that it is correlated with.
+    """
+    group, on = rows.group, rows.active
+    m = len(group.observed)
+    values, jacobian = group.predict(x)
+    residual = group.observed - values
+    variance = variances(group)
+    v = np.where(on, residual, 0.0)
+    redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
+    pvv = float(np.sum(rows.whiten(v) ** 2))
+    fit = Fit(group.name, on, residual, np.sqrt(variance), redundancy, standardised, error, detectable, pvv)
+    if not tests:
+        return fit
+    wide = rows.spread(jacobian)
+    seen = np.where(on[:, None], wide, 0.0)
+    weighted, pv, own = rows.weigh(seen), rows.weigh(v), rows.own_weight()
+    spread = rows.products(q, weighted)
+    visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
+    redundancy[:] = 1.0 - np.sum(spread * seen, axis=1)
+    standardised[:] = pv / np.sqrt(visible)
+    error[:] = pv / visible
+    detectable[:] = NONCENTRALITY / np.sqrt(visible)
+    out = np.flatnonzero(~on)
+    if len(out):
+        gain, expected = rows.prediction(out)
+        rest = wide[out] - gain @ seen if gain is not None else wide[out]
+        surprise = residual[out] - gain @ v if gain is not None else residual[out]
+        expected = expected + np.sum(rows.products(q, rest, out) * rest, axis=1)
+        redundancy[out] = 1.0
+        standardised[out] = surprise / np.sqrt(expected)
+        error[out] = surprise
+        detectable[out] = NONCENTRALITY * np.sqrt(expected)
+    return fit

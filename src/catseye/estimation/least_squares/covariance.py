@@ -1,0 +1,193 @@
+"""Covariances of all parameters, dense or sparse, behind one face: only what is asked for is computed."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from catseye.errors import EstimationError
+
+LARGEST_MATRIX = 12_000  # parameters: a full matrix of more takes over a gigabyte
+
+
+class Covariance(Protocol):
+    """Covariance of n parameters; rows and columns of held ones are zero."""
+
+    def matrix(self) -> np.ndarray:
+        """All of it, (n, n); EstimationError where that is too large."""
+        ...
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        """(n, k) of all parameters with some."""
+        ...
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """(m, w) sum over j of Q_ij a_j for each row of columns, a (m, w), which meet in one observation."""
+        ...
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        """(k, k) of some parameters."""
+        ...
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) of the triples of parameters that begin at `first` (k,)."""
+        ...
+
+    def diagonal(self) -> np.ndarray:
+        """(n,) variances."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Dense:
+    """A covariance held whole."""
+
+    full: np.ndarray
+
+    def matrix(self) -> np.ndarray:
+        return self.full
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        return self.full[:, columns]
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        return self.full[np.ix_(columns, columns)]
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        at, a = np.maximum(columns, 0), np.where(columns < 0, 0.0, a)
+        result = np.empty(at.shape)
+        step = max(1, 2_000_000 // max(1, at.shape[1] ** 2))
+        for low in range(0, len(at), step):
+            part = slice(low, low + step)
+            inside = self.full[at[part, :, None], at[part, None, :]]
+            result[part] = (inside @ a[part, :, None])[:, :, 0]
+        return result
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        at = first[:, None] + np.arange(3)
+        return self.full[at[:, :, None], at[:, None, :]]
+
+    def diagonal(self) -> np.ndarray:
+        return np.diag(self.full)
+
+
+@dataclass(frozen=True, eq=False)
+class Sparse:
+    """The inverse of a sparse normal matrix, held on the pattern of its factor; the rest is solved for when asked.
+
+    size          n, all parameters
+    place         (n,) where each stands in the factor, -1 where held
+    scale         (k,) of the scaled matrix, in the factor's order
+    lp, li, lx, d the factor, see `sparse_kernel`
+    """
+
+    size: int
+    place: np.ndarray
+    scale: np.ndarray
+    lp: np.ndarray
+    li: np.ndarray
+    lx: np.ndarray
+    d: np.ndarray
+
+    @cached_property
+    def _selected(self) -> tuple[np.ndarray, np.ndarray]:
+        from catseye.estimation.least_squares.sparse_kernel import selected_inverse
+
+        return selected_inverse(self.lp, self.li, self.lx, self.d)
+
+    def matrix(self) -> np.ndarray:
+        if self.size > LARGEST_MATRIX:
+            raise EstimationError(
+                f"the full covariance of {self.size} parameters takes {8e-9 * self.size**2:.0f} GB "
+                f"(limit {LARGEST_MATRIX} parameters); ask for the blocks of single points"
+            )
+        return self.across(np.arange(self.size))
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Covariance (of all parameters) times b, (n, k)."""
+        from catseye.estimation.least_squares.sparse_kernel import solve
+
+        inside = np.zeros((len(self.scale), b.shape[1]))
+        moving = self.place >= 0
+        at = self.place[moving]
+        inside[at] = b[moving] * self.scale[at][:, None]
+        solve(self.lp, self.li, self.lx, self.d, inside)
+        result = np.zeros_like(b)
+        result[moving] = inside[at] * self.scale[at][:, None]
+        return result
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        unit = np.zeros((self.size, len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        return self.solve(unit)
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        return self.across(columns)[columns]
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        from catseye.estimation.least_squares.sparse_kernel import products
+
+        z, diagonal = self._selected
+        at = np.where(columns < 0, -1, self.place[columns])
+        scale = np.where(at < 0, 0.0, self.scale[at])
+        return scale * products(self.lp, self.li, z, diagonal, at, a * scale)
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        at = first[:, None] + np.arange(3)
+        units = [np.tile(row, (len(at), 1)) for row in np.eye(3)]
+        return np.stack([self.products(at, unit) for unit in units], axis=2)
+
+    def diagonal(self) -> np.ndarray:
+        result = np.zeros(self.size)
+        moving = self.place >= 0
+        at = self.place[moving]
+        result[moving] = self._selected[1][at] * self.scale[at] ** 2
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Transformed:
+    """A covariance carried to another datum: S Q S' with S = 1 - T G, an S-transformation ([BAARDA73]).
+
+    inner   Q, of any datum that holds what floats
+    t       (n, d) = H (G H)^-1, with H the motions that float
+    b       (n, d) = Q G'
+    c       (d, d) = G Q G'
+    """
+
+    inner: Covariance
+    t: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+
+    def matrix(self) -> np.ndarray:
+        cross = self.t @ self.b.T
+        return self.inner.matrix() - cross - cross.T + self.t @ self.c @ self.t.T
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        t, b = self.t[columns], self.b[columns]
+        return self.inner.across(columns) - self.t @ b.T - self.b @ t.T + self.t @ (self.c @ t.T)
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        t, b = self.t[columns], self.b[columns]
+        cross = t @ b.T
+        return self.inner.within(columns) - cross - cross.T + t @ self.c @ t.T
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        a = np.where(columns < 0, 0.0, a)
+        t, b = self.t[columns], self.b[columns]
+        at, ab = (np.einsum("mw,mwd->md", a, part) for part in (t, b))
+        low_rank = np.einsum("mwd,md->mw", t, ab - at @ self.c) + np.einsum("mwd,md->mw", b, at)
+        return self.inner.products(columns, a) - low_rank
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        at = first[:, None] + np.arange(3)
+        t, b = self.t[at], self.b[at]
+        cross = np.einsum("kid,kjd->kij", t, b)
+        inside = np.einsum("kid,de,kje->kij", t, self.c, t)
+        return self.inner.blocks(first) - cross - cross.transpose(0, 2, 1) + inside
+
+    def diagonal(self) -> np.ndarray:
+        low_rank = 2.0 * np.sum(self.t * self.b, axis=1) - np.einsum("nd,de,ne->n", self.t, self.c, self.t)
+        return self.inner.diagonal() - low_rank

@@ -1,0 +1,242 @@
+"""Normal equations of groups of observations, dense or sparse: one step, what floats, and the covariance.
+
+Rank is judged on the Jacobian with its columns scaled to unit length, not on the normal matrix alone: a direction v
+floats when |A v|^2 < FLOATS |v|^2. Units and sizes of sigmas cancel there, and the square is taken after the product,
+so that rounding (1e-16 |A|)^2 stays far below the limit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_solve, lapack
+from scipy.sparse import csc_array, csr_array
+
+from catseye.estimation.least_squares.covariance import Covariance, Dense, Sparse
+from catseye.estimation.least_squares.rows import Rows
+
+FLOATS = 1e-15  # |A v|^2 / |v|^2: correlation of one parameter with all others within 5e-16 of 1
+DOUBTFUL = 1e-10  # reciprocal condition of the scaled normal matrix from which directions are examined one by one
+LARGEST_DENSE = 2000  # parameters; beyond it the sparse form is faster and smaller
+LOOKED_FOR = 8  # directions that the sparse form looks for at once when something floats
+
+
+@dataclass(eq=False)
+class NormalEquations:
+    """N = A' P A of the active rows, over the moving parameters.
+
+    rows     the groups
+    moving   (k,) indices of the parameters that are not held
+    size     n of all parameters
+    sparse   form
+    """
+
+    rows: Sequence[Rows]
+    moving: np.ndarray
+    size: int
+    sparse: bool
+    _jacobians: list[np.ndarray] = field(default_factory=list)
+    _factor: tuple[Any, ...] = ()
+    _scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    _order: tuple[np.ndarray, ...] = ()
+    _pattern: csc_array | None = None
+
+    @classmethod
+    def of(cls, rows: Sequence[Rows], moving: np.ndarray, size: int, sparse: bool | None) -> "NormalEquations":
+        """Sparse when asked, or when large and no group ties most parameters together."""
+        if sparse is None:
+            sparse = len(moving) > LARGEST_DENSE and all(r.columns.shape[-1] < len(moving) / 3 for r in rows)
+        return cls(rows, moving, size, sparse)
+
+    def step(self, x: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """The Gauss-Newton step (n,) from x, its size in standard deviations, and the cost at x (nan: undefined)."""
+        linear = [r.linear(x) for r in self.rows]
+        residuals, self._jacobians = [v for v, _ in linear], [j for _, j in linear]
+        cost = float(sum(v @ v for v in residuals))
+        if not (np.isfinite(cost) and all(np.isfinite(j).all() for j in self._jacobians)):
+            return np.zeros(self.size), np.nan, np.nan
+        right = np.zeros(self.size)
+        for r, j, v in zip(self.rows, self._jacobians, residuals, strict=True):
+            if r.columns.ndim == 1:
+                right[r.columns] += j.T @ v
+            else:
+                at, pull = r.row_columns(), j * v[:, None]
+                right += np.bincount(np.maximum(at, 0).ravel(), np.where(at < 0, 0.0, pull).ravel(), self.size)
+        step = np.zeros(self.size)
+        self._floating = np.zeros((0, self.size))
+        if self.sparse:
+            self._factorise_sparse()
+        else:
+            self._factorise_dense()
+        if not len(self._floating):
+            step[self.moving] = self._solve(right[self.moving])
+        return step, max(float(right @ step), 0.0) ** 0.5, cost
+
+    def floating(self) -> np.ndarray:
+        """(f, n) directions that nothing holds at the x of the last step, over columns scaled to unit length."""
+        return self._floating
+
+    def covariance(self) -> Covariance:
+        """Inverse of N at the x of the last step."""
+        if self.sparse:
+            order, place, *_ = self._order
+            return Sparse(self.size, place, self._scale[order], *self._factor)
+        full = np.zeros((self.size, self.size))
+        if len(self.moving):
+            inverse = np.tril(lapack.dpotri(self._factor[0], lower=1)[0])
+            inverse = (inverse + np.tril(inverse, -1).T) * self._scale[:, None] * self._scale
+            full[np.ix_(self.moving, self.moving)] = inverse
+        return Dense(full)
+
+    def _solve(self, right: np.ndarray) -> np.ndarray:
+        if not len(right):
+            return right
+        if not self.sparse:
+            return self._scale * cho_solve((self._factor[0], True), self._scale * right, check_finite=False)
+        from catseye.estimation.least_squares.sparse_kernel import solve
+
+        order = self._order[0]
+        inside = (self._scale * right)[order][:, None].copy()
+        lp, li, lx, d = self._factor
+        solve(lp, li, lx, d, inside)
+        result = np.empty_like(right)
+        result[order] = inside[:, 0]
+        return result * self._scale
+
+    def _energy(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of scaled directions (k, d): combinations (d, d), least held first, and their |A v|^2."""
+        scaled = np.zeros((self.size, directions.shape[1]))
+        scaled[self.moving] = directions * self._scale[:, None]
+        triangles = []
+        for r, j in zip(self.rows, self._jacobians, strict=True):
+            if r.columns.ndim == 1:
+                image = j @ scaled[r.columns]
+            else:
+                at = r.row_columns()
+                image = np.einsum("mw,mwd->md", np.where(at < 0, 0.0, j), scaled[at])
+            triangles.append(np.linalg.qr(image, mode="r") if len(image) > directions.shape[1] else image)
+        _, singular, turned = np.linalg.svd(np.concatenate(triangles), full_matrices=True)
+        squares = np.zeros(directions.shape[1])
+        squares[: len(singular)] = singular**2
+        return turned[::-1].T, squares[::-1]
+
+    def _factorise_dense(self) -> None:
+        normal = np.zeros((self.size, self.size))
+        for r, j in zip(self.rows, self._jacobians, strict=True):
+            if r.columns.ndim == 1:
+                normal[np.ix_(r.columns, r.columns)] += j.T @ j
+            else:
+                normal += _gram(r, j, self.size).toarray()
+        normal = normal[np.ix_(self.moving, self.moving)]
+        diagonal = np.diag(normal)
+        unheld = diagonal <= 0.0
+        self._scale = 1.0 / np.sqrt(np.where(unheld, 1.0, diagonal))
+        if unheld.any():
+            self._set_floating(np.eye(len(normal))[:, unheld])
+            return
+        scaled = normal * self._scale[:, None] * self._scale
+        if not len(scaled):
+            return
+        factor, failed = lapack.dpotrf(scaled, lower=1)
+        self._factor = (factor,)
+        condition = 0.0 if failed else lapack.dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
+        if condition < DOUBTFUL:
+            values, vectors = np.linalg.eigh(scaled)
+            weak = vectors[:, values < max(1e-9, 10.0 * values[0])]
+            turned, squares = self._energy(weak)
+            none = squares < FLOATS
+            if none.any() or failed:
+                self._set_floating(weak @ turned[:, none if none.any() else slice(1)])
+
+    def _factorise_sparse(self) -> None:
+        from catseye.estimation.least_squares.sparse_kernel import numeric, solve, symbolic
+
+        normal = self._on_pattern()[:, self.moving][self.moving]
+        diagonal = normal.diagonal()
+        unheld = diagonal <= 0.0
+        self._scale = 1.0 / np.sqrt(np.where(unheld, 1.0, diagonal))
+        if unheld.any():
+            unit = np.zeros((len(diagonal), min(int(unheld.sum()), LOOKED_FOR)))
+            unit[np.flatnonzero(unheld)[: unit.shape[1]], np.arange(unit.shape[1])] = 1.0
+            self._set_floating(unit)
+            return
+        if not self._order:
+            self._order = _ordering(normal, self.moving, self.size)
+        order = self._order[0]
+        coo = normal.tocoo()
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        i, j, values = place[coo.row], place[coo.col], coo.data * self._scale[coo.row] * self._scale[coo.col]
+        upper = i <= j
+        triangle = csc_array((values[upper], (i[upper], j[upper])), shape=normal.shape)
+        ap, ai = triangle.indptr.astype(np.int64), triangle.indices.astype(np.int64)
+        k = len(order)
+        if len(self._order) == 2:
+            self._order = (*self._order, *symbolic(k, ap, ai))
+        parent, lp = self._order[2:]
+        li, lx, d, raised = numeric(k, ap, ai, triangle.data, parent, lp)
+        self._factor = (lp, li, lx, d)
+        probe = np.random.default_rng(0).standard_normal((k, LOOKED_FOR))  # a seed: the same question every time
+        for _ in range(4 if raised else 2):
+            probe, _r = np.linalg.qr(probe)
+            solve(lp, li, lx, d, probe)
+        if raised or 1.0 / np.linalg.norm(probe, axis=0).max() < DOUBTFUL:
+            directions = np.empty_like(probe)
+            directions[order] = np.linalg.qr(probe)[0]
+            turned, squares = self._energy(directions)
+            none = squares < FLOATS
+            if none.any():
+                self._set_floating(directions @ turned[:, none])
+
+    def _on_pattern(self) -> csc_array:
+        """N (n, n) with an entry for each two parameters that meet in a row, also where their products cancel to zero.
+
+        Sums of sparse matrices leave zeros out; a covariance is wanted of such pairs as of others.
+        """
+        if self._pattern is None:
+            ones = [_gram(r, np.ones_like(j), self.size) for r, j in zip(self.rows, self._jacobians, strict=True)]
+            self._pattern = csc_array(sum(ones, csc_array((self.size, self.size))))
+            self._pattern.sort_indices()
+        found = csc_array((self.size, self.size))
+        for r, j in zip(self.rows, self._jacobians, strict=True):
+            found = csc_array(found + _gram(r, j, self.size))
+        found.sort_indices()
+        data = np.zeros(self._pattern.nnz)
+        data[np.searchsorted(_places(self._pattern), _places(found))] = found.data
+        return csc_array((data, self._pattern.indices, self._pattern.indptr), shape=found.shape)
+
+    def _set_floating(self, directions: np.ndarray) -> None:
+        self._floating = np.zeros((directions.shape[1], self.size))
+        self._floating[:, self.moving] = directions.T
+
+
+def _places(matrix: csc_array) -> np.ndarray:
+    """Column times rows plus row of each entry, rising where indices are sorted."""
+    rows, columns = matrix.shape
+    return np.repeat(np.arange(columns, dtype=np.int64), np.diff(matrix.indptr)) * rows + matrix.indices
+
+
+def _gram(r: Rows, j: np.ndarray, size: int) -> csr_array:
+    """A' A (n, n), sparse, of rows with columns of their own."""
+    at = r.row_columns()
+    m = len(at)
+    used = (at >= 0).ravel()
+    pointers = np.concatenate([[0], np.cumsum(np.sum(at >= 0, axis=1))])
+    a = csr_array((j.ravel()[used], at.ravel()[used], pointers), shape=(m, size))
+    return a.T @ a
+
+
+def _ordering(normal: csc_array, moving: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Minimum degree order of the moving parameters, and the place (n,) of every parameter in it (-1: held)."""
+    from scipy.sparse.linalg import splu
+
+    pattern = csc_array(normal, copy=True)  # splu sorts indices in place
+    pattern.data = np.where(pattern.indices == np.repeat(np.arange(len(moving)), np.diff(pattern.indptr)), 1.0, 1e-6)
+    order = np.argsort(
+        splu(pattern, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
+    )
+    place = np.full(size, -1)
+    place[moving[order]] = np.arange(len(moving))
+    return order, place

@@ -1,0 +1,191 @@
+"""Which observations are wrong: a robust start, the smallest conflict of each point, then removal by test."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.least_squares.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
+from catseye.estimation.observations import Observations
+
+UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
+UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"
+DECISIVE = 9.0  # difference of sums of squares between two explanations, below which neither is believed
+GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
+UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
+CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
+MOST_RETURNS = 2  # of one observation; so the rounds end
+
+
+def adjust_robustly(
+    x0: np.ndarray,
+    groups: Sequence[Observations],
+    removable: Sequence[np.ndarray],
+    *,
+    points: Sequence[np.ndarray] = (),
+    advice: Sequence[Observations] = (),
+    free: np.ndarray | None = None,
+    active: Sequence[np.ndarray] | None = None,
+    names: Sequence[str] | None = None,
+    critical: float = 3.5,
+    rounds: int = 100,
+) -> Solution:
+    """An adjustment without the observations that do not belong to it; the fits say which (`active`).
+
+    x0          (n,) start values
+    groups      observations, as for `adjust`
+    removable   one (m,) bool array a group: True for observations that may be wrong and may be left out
+    points      columns of each point, (3,) an array: where a few observations meet, the smallest conflict is sought
+    advice      what is known of single points besides; it helps to tell which observation is wrong, and takes no
+                part in the answer
+    free        (n,) bool, as for `adjust`
+    active      one (m,) bool array a group: start from this selection instead of searching for one
+    names       (n,) what the parameters are called
+    critical    |w| above which an observation is left out, below which it comes back; 3.5 leaves out one good
+                observation in 2000
+    rounds      cap of removal rounds; if they do not end, the status says so
+
+    Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
+    sigmas from dragging others along. Where few observations meet in a point such a fit can share the blame between
+    innocent ones; so every point in conflict is searched for the smallest set whose absence makes the rest agree.
+    At last Baarda's test with correlations, over everything: out with the worst, one by one, and back in with those
+    that pass.
+
+    Source: [BAARDA68] (data snooping); [FOERSTNER16] chapter 4 (robust estimation and outlier detection); [HUBER09]
+    (reweighting). The search for the smallest conflict is ours.
+    """
+    careful = None  # what to try instead, should a selection leave too little to hold every parameter
+    if active is None:
+        careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
+        solution = _reweighted(x0, groups, removable, free, names)
+        large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
+        active = [~may | (np.abs(f.residual) < 10.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
+    else:
+        solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), tests=False)
+        large = [may & ~a for may, a in zip(removable, active, strict=True)] if advice else []
+    active = _searched(solution, groups, removable, points, advice, large, active)
+    x = solution.x
+    returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
+    for _ in range(rounds):
+        solution = adjust(x, groups, free=free, active=active, names=names)
+        if not solution.solved:
+            if careful is None:
+                return solution
+            active, careful = careful, None
+            continue
+        x, careful = solution.x, None
+        tests = [
+            np.where(may & _checked(f), np.abs(f.standardised), 0.0)
+            for f, may in zip(solution.fits, removable, strict=True)
+        ]
+        worst, group = max(
+            (float(t[a].max(initial=0.0)), i) for i, (t, a) in enumerate(zip(tests, active, strict=True))
+        )
+        if worst > critical:  # one at a time: neighbours at a point with few checks look wrong together
+            active = [a.copy() for a in active]
+            active[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
+            continue
+        back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
+        if not any(b.any() for b in back):
+            return _without_undecided(solution, groups, removable, points, advice, free, names)
+        active = [a | b for a, b in zip(active, back, strict=True)]
+        returns = [n + b for n, b in zip(returns, back, strict=True)]
+    return replace(solution, status=UNDECIDED.format(rounds=rounds))
+
+
+def _checked(fit: Fit) -> np.ndarray:
+    """Which observations the others check: an error of some sigmas would be found; of the inactive, all.
+
+    Without correlations this is redundancy > UNCHECKED. With them a redundancy number may be zero or negative although
+    a neighbour that shares its errors checks the observation well.
+    """
+    return ~fit.active | (fit.detectable_error < CHECKED * fit.sigma)
+
+
+def _without_undecided(
+    solution: Solution,
+    groups: Sequence[Observations],
+    removable: Sequence[np.ndarray],
+    points: Sequence[np.ndarray],
+    advice: Sequence[Observations],
+    free: np.ndarray | None,
+    names: Sequence[str] | None,
+) -> Solution:
+    """The solution without observations that might be the wrong ones just as well as those rejected.
+
+    Of two that contradict each other alone at a point, the test cannot say which is wrong: both go. Nothing comes back
+    here, because what comes back is not tested again. If the rest does not hold every parameter, the status says so.
+    """
+    active = [f.active.copy() for f in solution.fits]
+    checked = [_checked(f) for f in solution.fits]
+    jacobians = [g.predict(solution.x)[1] for g in groups]
+    rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
+    for columns in touched(points, groups, jacobians, rejected):
+        local = at_point(columns, groups, jacobians, removable, solution, advice, slack=1.0)
+        out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
+        grave = [
+            index
+            for index in out
+            if abs(solution.fits[local.rows[index][0]].standardised[local.rows[index][1]]) > GRAVE
+        ]
+        if not grave or len(local.rows) > LARGEST_SEARCH:
+            continue
+        if len(grave) > MOST_AT_ONE_POINT:  # too many to search: trust what is checked
+            for i, k in local.rows:
+                active[i][k] &= checked[i][k]
+            continue
+        # The slight ones count here: which of them is out hardly matters, and without them nothing would be checked.
+        costs = {choice: local.cost(choice) for choice in combinations(range(len(local.rows)), len(grave))}
+        limit = min(costs.values()) + DECISIVE
+        doubtful = {index for choice, cost in costs.items() if cost < limit for index in choice}
+        for index, (i, k) in enumerate(local.rows):
+            active[i][k] &= index not in doubtful
+    if all(np.array_equal(a, f.active) for a, f in zip(active, solution.fits, strict=True)):
+        return solution
+    final = adjust(solution.x, groups, free=free, active=active, names=names)
+    if not final.solved:
+        return replace(final, status=UNHELD.format(status=final.status))
+    return final
+
+
+def _reweighted(
+    x0: np.ndarray,
+    groups: Sequence[Observations],
+    removable: Sequence[np.ndarray],
+    free: np.ndarray | None,
+    names: Sequence[str] | None,
+) -> Solution:
+    """A fit in which every observation that may be wrong weighs by its own residual."""
+    extra = [np.zeros(len(g.observed)) for g in groups]
+    solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
+    for _ in range(8):
+        if not solution.solved:
+            break
+        for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
+            extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
+        solution = adjust(solution.x, groups, free=free, extra_variance=extra, names=names, iterations=1, tests=False)
+    return solution
+
+
+def _searched(
+    solution: Solution,
+    groups: Sequence[Observations],
+    removable: Sequence[np.ndarray],
+    points: Sequence[np.ndarray],
+    advice: Sequence[Observations],
+    suspects: Sequence[np.ndarray],
+    active: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """The selection, with the smallest conflict left out at each point that a suspect depends on."""
+    active = [a.copy() for a in active]
+    if not solution.solved:
+        return [np.ones(len(g.observed), dtype=bool) for g in groups]
+    jacobians = [g.predict(solution.x)[1] for g in groups]
+    for columns in touched(points, groups, jacobians, suspects) if suspects else ():
+        local, wrong = search(columns, groups, jacobians, removable, solution, advice)
+        if wrong is not None:
+            for index, (i, k) in enumerate(local.rows):
+                active[i][k] = index not in wrong
+    return active

@@ -1,0 +1,1 @@
+"""Networks of points: datum, approximate coordinates, adjustment, plan, ranging networks."""

@@ -1,0 +1,328 @@
+"""A network adjusted: starts found, datum chosen, solved, and what went wrong said in one line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import CONVERGED, Solution, adjust
+from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.least_squares.rows import Rows, variances
+from catseye.estimation.network.datum import (
+    Floating,
+    datum_conditions,
+    floating_motions,
+    minimal_coordinates,
+    to_datum,
+    transformed,
+)
+from catseye.estimation.network.diagnosis import diagnosed, floating_text, unconnected
+from catseye.estimation.network.model import Network, NetworkSolution
+from catseye.estimation.observations import Linear, Observations
+
+FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
+DATUMS = ("free", "fixed")
+PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
+SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order,
+UNDONE = 1e-6  # nor does one that leaves less than this share of the usual standard uncertainty undone
+
+NO_DATUM = "rank deficient: the network floats ({motions}) and nothing holds it; hold coordinates, mark datum points, \
+or adjust it free (--datum free)"
+WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network against {motions}; mark more of them"
+NOT_SETTLED = "not converged: the network does not come to rest in its datum after {passes} passes; \
+check the starting coordinates"
+NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
+
+
+def with_datum(network: Network, datum: str | None) -> Network:
+    """The network with its datum as asked.
+
+    datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
+            constraints on the points marked fixed or datum; where none is, on all with given coordinates; where
+            nothing is given, on all
+    """
+    if datum is None:
+        return network
+    if datum not in DATUMS:
+        raise EstimationError(f"datum {datum!r} is not known (expected one of {', '.join(DATUMS)})")
+    points = network.points
+    marked = points.fixed | points.datum
+    nothing = np.zeros_like(marked)
+    if datum == "fixed":
+        if not marked.any():
+            raise EstimationError("datum 'fixed': no point of the network is marked fixed or datum; mark some")
+        return replace(network, points=replace(points, fixed=marked, datum=nothing))
+    chosen = marked if marked.any() else np.isfinite(points.xyz)
+    if not chosen.any():
+        chosen = np.ones_like(marked)
+    return replace(network, points=replace(points, fixed=nothing, datum=chosen))
+
+
+def adjust_network(
+    network: Network,
+    *,
+    datum: str | None = None,
+    active: Sequence[np.ndarray] | None = None,
+    inflation: Sequence[np.ndarray] | None = None,
+    alone: bool = False,
+    start: NetworkSolution | None = None,
+    iterations: int = 50,
+    tests: bool = True,
+    diagnose: bool = True,
+    engine: str | None = None,
+) -> NetworkSolution:
+    """The coordinates of a network with their covariance, and a fit per observation.
+
+    network     points, parameters, observations
+    datum       None as marked, or "free" or "fixed", see `with_datum`
+    active      one (m,) bool a group: False leaves an observation out, but still predicts it
+    inflation   one (m,) a group, a factor on its standard uncertainties (robust estimation); infinite leaves out
+    alone       inflation of a correlated observation adds to its own variance and dilutes its correlations; else they
+                stay, as when a whole group is scaled
+    start       an earlier solution of the same network to begin from
+    iterations  cap of Gauss-Newton steps of each pass
+    tests       False leaves out covariance and test statistics
+    diagnose    False leaves the status at "converged" or "not converged", without looking for the cause
+    engine      "dense", "sparse" or "ranging" (pure ranging networks only); the fastest that serves if None
+
+    Returns a NetworkSolution whose status says what happened, and where.
+
+    Source: [FOERSTNER16] chapter 4; datum by S-transformation, [BAARDA73].
+    """
+    network = _with_reference(with_datum(network, datum))
+    if inflation is not None:
+        kept = [np.isfinite(f) for f in inflation]
+        active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
+    if engine in (None, "ranging"):
+        from catseye.estimation.network.ranging_engine import adjusted_as_ranges
+
+        solution = adjusted_as_ranges(
+            network,
+            active=active,
+            inflation=inflation,
+            start=start,
+            iterations=iterations,
+            tests=tests,
+            forced=engine is not None,
+        )
+        if solution is not None:
+            return replace(solution, status=diagnosed(solution, _factor_alone)) if tests and diagnose else solution
+    problem = _Problem.of(network, start)
+    if problem.missing:
+        return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
+    sparse = None if engine is None else engine == "sparse"
+    solution = problem.solve(active, (inflation, alone), iterations, tests, sparse)
+    if tests and diagnose and np.isfinite(solution.covariance).all():
+        return replace(solution, status=diagnosed(solution, _factor_alone))
+    return solution
+
+
+def _with_reference(network: Network) -> Network:
+    """The network, with the places found for its points as their coordinates where not one is given.
+
+    The inner constraints then refer to these; where the network lies is a convention in any case.
+    """
+    points = network.points
+    if np.isfinite(points.xyz).any() or not points.datum.any():
+        return network
+    from catseye.estimation.network.approximate import approximate
+
+    return replace(network, points=replace(points, xyz=approximate(network).xyz))
+
+
+def _factor_alone(network: Network) -> NetworkSolution:
+    """A quick trial: coordinates and variance factor, no tests."""
+    large = len(network.points.names) >= FEWEST_POINTS
+    try:
+        trial = adjust_network(network, iterations=15, tests=False, engine="ranging" if large else None)
+    except EstimationError:  # large, and of another kind: it would take too long to try
+        return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
+    degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
+    cost = sum(f.pvv for f in trial.fits)
+    return replace(trial, variance_factor=cost / max(1.0, degrees))
+
+
+def _listed(reasons: dict[str, str], most: int = 4) -> str:
+    text = ", ".join(f"{name} ({why})" for name, why in list(reasons.items())[:most])
+    return text + (f" and {len(reasons) - most} more" if len(reasons) > most else "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """The network as one vector of parameters."""
+
+    network: Network
+    x0: np.ndarray
+    free: np.ndarray
+    groups: list[Observations]
+    found: tuple[str, ...]
+    missing: dict[str, str]
+    assumed: tuple[str, ...]
+    replaced: tuple[str, ...]
+
+    @classmethod
+    def of(cls, network: Network, start: NetworkSolution | None) -> "_Problem":
+        points, parameters = network.points, network.parameters
+        values = np.array([p.start for p in parameters])
+        found: tuple[str, ...] = ()
+        missing: dict[str, str] = {}
+        assumed: tuple[str, ...] = ()
+        replaced: tuple[str, ...] = ()
+        if start is not None:
+            xyz, values = np.where(points.fixed, points.xyz, start.x), start.parameters
+            found, assumed, replaced = start.approximate, start.assumed, start.replaced
+        else:
+            from catseye.estimation.network.approximate import approximate
+
+            begin = approximate(network)
+            xyz, values, found = begin.xyz, begin.parameters, begin.found
+            missing, assumed, replaced = begin.missing, begin.assumed, begin.replaced
+        sigma = np.array([p.sigma for p in parameters])
+        offset = 3 * len(points.names)
+        known = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
+        groups = list(network.groups)
+        if len(known):
+            observed = np.array([parameters[k].start for k in known])
+            groups.append(Linear("priors", observed, sigma[known] ** 2, offset + known, np.eye(len(known))))
+        free = np.concatenate([~points.fixed.ravel(), sigma > 0.0])
+        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
+
+    @property
+    def names(self) -> list[str]:
+        """What each parameter is called."""
+        axes = self.network.axis_names
+        return [f"{axis} of {p}" for p in self.network.points.names for axis in axes] + [
+            p.name for p in self.network.parameters
+        ]
+
+    def solve(
+        self,
+        active: Sequence[np.ndarray] | None,
+        inflation: tuple[Sequence[np.ndarray] | None, bool],
+        iterations: int,
+        tests: bool,
+        sparse: bool | None,
+    ) -> NetworkSolution:
+        points = self.network.points
+        n = 3 * len(points.names)
+        chosen = _padded(active, self.groups, True)
+        larger, added = _padded(inflation[0], self.groups, 1.0), None
+        if larger is not None and inflation[1]:
+            finite = [np.where(np.isfinite(f), f, 1.0) for f in larger]
+            larger, added = None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
+        rows = [Rows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
+        x, taken = self.x0, 0
+        datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
+        solution: Solution | None = None
+        settled = False
+        for _ in range(PASSES):
+            try:
+                floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
+            except np.linalg.LinAlgError:
+                floating = Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+            conditions, loose = datum_conditions(floating, datum, points.xyz)
+            if loose.shape[1]:
+                apart = unconnected(self.network)
+                text = WEAK_DATUM if datum.any() else NO_DATUM
+                status = apart or text.format(motions=floating.words(loose))
+                return self.unanswered(status, x)
+            held = self.free.copy()
+            held[minimal_coordinates(conditions)] = False
+            solution = adjust(
+                x,
+                self.groups,
+                free=held,
+                active=chosen,
+                inflation=larger,
+                extra_variance=added,
+                names=self.names,
+                iterations=iterations,
+                tests=tests,
+                sparse=sparse,
+            )
+            taken += solution.iterations
+            x = solution.x
+            settled = not len(conditions)
+            if not solution.solved or settled:
+                break
+            floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
+            if floating.motions.shape[1] != len(conditions):  # told wrongly from a poor start: once more from here
+                continue
+            conditions, _ = datum_conditions(floating, datum, points.xyz)
+            moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
+            x = x + moved
+            size = float(np.ptp(x[:n].reshape(-1, 3), axis=0).max())
+            limit = SETTLED * size
+            if tests:  # what a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties
+                u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0))
+                limit = max(limit, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
+            settled = bool(np.abs(moved[:n]).max() <= limit)
+            if settled:
+                if tests:
+                    solution = replace(solution, q=transformed(solution.q, t, conditions))
+                break
+        assert solution is not None
+        solution = replace(solution, x=x, iterations=taken)
+        if not settled and solution.status == CONVERGED:
+            solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
+        if len(solution.floating):
+            status = unconnected(self.network) or floating_text(self.network, solution)
+            return self.unanswered(status, solution.x)
+        answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
+        degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
+        factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
+        return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
+
+    def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
+        points = self.network.points
+        held = int(np.sum(points.fixed))
+        words = [f"{held} coordinates held"] if held else []
+        if floating.motions.shape[1]:
+            on = int(datum.any(axis=1).sum())
+            words.append(f"inner constraints on {on} points against {floating.words()}")
+        return "; ".join(words) or "held by observations and priors"
+
+    def answer(self, solution: Solution, q: Covariance, datum: str) -> NetworkSolution:
+        count = len(self.network.points.names)
+        own = solution.fits[: len(self.network.groups)]
+        factor, degrees = solution.variance_factor()
+        return NetworkSolution(
+            network=self.network,
+            x=solution.x[: 3 * count].reshape(-1, 3),
+            covariance=q.blocks(3 * np.arange(count)) if count else np.zeros((0, 3, 3)),
+            parameters=solution.x[3 * count :],
+            u_parameters=np.sqrt(np.maximum(q.diagonal()[3 * count :], 0.0)),
+            status=solution.status,
+            iterations=solution.iterations,
+            fits=own,
+            variance_factor=factor,
+            degrees_of_freedom=degrees,
+            datum=datum,
+            approximate=self.found,
+            assumed=self.assumed,
+            replaced=self.replaced,
+            q=q,
+        )
+
+    def unanswered(self, status: str, x: np.ndarray | None = None) -> NetworkSolution:
+        """No answer: the start, or where it stopped, with residuals and no covariance."""
+        at = self.x0 if x is None else x
+        nothing = np.zeros(len(at), dtype=bool)
+        solution = adjust(at, self.groups, free=nothing, tests=False, iterations=1)
+        count = len(self.network.points.names)
+        answer = self.answer(replace(solution, status=status), solution.q, "none")
+        return replace(
+            answer,
+            covariance=np.full((count, 3, 3), np.nan),
+            u_parameters=np.full(len(answer.u_parameters), np.nan),
+            variance_factor=float("nan"),
+            degrees_of_freedom=float("nan"),
+        )
+
+
+def _padded(given: Sequence[np.ndarray] | None, groups: Sequence[Observations], rest: float) -> list[np.ndarray] | None:
+    """One array a group: those given, then for the priors' group all the same."""
+    if given is None:
+        return None
+    return [*given, *(np.full(len(g.observed), rest) for g in groups[len(given) :])]

@@ -1,0 +1,231 @@
+"""Local figures where no point can be placed by itself: level networks about a station, figures from ranges alone."""
+
+from collections import Counter, defaultdict
+
+import numpy as np
+
+from catseye.estimation.network.approximate.bodies import rigid_motion
+from catseye.estimation.network.approximate.search import LENIENT, STRICT, Search
+from catseye.estimation.network.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
+from catseye.estimation.network.approximate.ties import FLOOR
+from catseye.estimation.network.unfolding import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, classical_scaling, unfold
+from catseye.estimation.shapes.rigid_body import closed_form
+
+
+def place_all(search: Search) -> None:
+    """Places what can be placed: from placed points, by local figures, and last where one of two fits better."""
+    search.spread()
+    while len(search.unplaced) and (_attach_level(search) or _attach_ranges(search)):
+        search.spread()
+    while search.sweep(LENIENT, 1.5):
+        search.spread()
+
+
+def _attach_level(search: Search) -> bool:
+    """Places points by local networks about a station, level and turned anyhow; whether any was placed.
+
+    The directions of the station's set with all else give local coordinates; two placed points among them (or one, and
+    an azimuth) say where it belongs. If the network gives no two points, the largest is laid down as it is.
+    """
+    r = search.rows
+    local_rows = np.ones(len(r), dtype=bool)
+    local_rows[(r.code == COORDINATE) | ((r.code == DIFFERENCE) & (r.which < 2))] = False
+    local_rows[(r.code == BEARING) & np.isin(r.which, list(search.given))] = False
+    rows = r.only(local_rows)
+    turned = rows.only(rows.code == BEARING)
+    sets = Counter(zip(turned.which.tolist(), turned.origin.tolist(), strict=True))
+    unplaced, covered = set(search.unplaced.tolist()), set[int]()
+    frames = []
+    for which, station in (key for key, _ in sets.most_common()):
+        seen = {station, *turned.target[turned.which == which].tolist()}
+        if not (seen & unplaced) - covered:
+            continue
+        frame = Search(rows, np.full(search.xyz.shape, np.nan), {which: 0.0}, search.bodies)
+        frame.xyz[station] = 0.0
+        frame.spread()
+        covered |= seen & set(np.flatnonzero(np.isfinite(frame.xyz[:, :2]).all(axis=1)).tolist())
+        if np.isfinite(frame.xyz[:, :2]).all(axis=1).sum() > 1:
+            frames.append(frame)
+    frames.sort(key=lambda f: -int(np.isfinite(f.xyz).sum()))
+    return any(_helmert(search, frame) for frame in frames)
+
+
+def _helmert(search: Search, frame: Search) -> bool:
+    """Lays a level local network on the placed points, turned about the vertical; whether it placed any coordinate."""
+    level = np.isfinite(frame.xyz[:, :2]).all(axis=1)
+    placed = np.isfinite(search.xyz[:, :2]).all(axis=1)
+    both = np.flatnonzero(level & placed)
+    ours, theirs = (xyz[both, 0] + 1j * xyz[both, 1] for xyz in (search.xyz, frame.xyz))
+    turn = level_turn(theirs, ours) if len(both) >= 2 else None
+    turn = _turn_of_azimuths(search, frame, level) if turn is None else turn
+    if turn is None and (placed.sum() > len(both) or len(both) > 1):
+        return False
+    if not len(both) and placed.any():
+        return False
+    spot = (frame.xyz[:, 0] + 1j * frame.xyz[:, 1]) * np.exp(1j * (turn or 0.0))
+    spot = spot + (ours.mean() - spot[both].mean() if len(both) else 0.0)
+    rise = search.xyz[:, 2] - frame.xyz[:, 2]
+    tied, free = np.isfinite(rise), not np.isfinite(search.xyz[:, 2]).any()
+    up = frame.xyz[:, 2] + (np.median(rise[tied]) if tied.any() else 0.0 if free else np.nan)
+    waiting = set(search.unplaced.tolist())
+    filled = search.fill(np.stack([spot.real, spot.imag, up], axis=1))
+    if filled and (turn is None or not len(both) or free):
+        search.conventional |= waiting
+    return filled
+
+
+def level_turn(theirs: np.ndarray, ours: np.ndarray) -> float | None:
+    """Angle, counter-clockwise, that turns points x + i y (k,) best onto others; None where they all coincide."""
+    if not np.ptp(np.abs(theirs - theirs[0])) > 0.0:
+        return None
+    return float(np.angle(np.sum((ours - ours.mean()) * np.conj(theirs - theirs.mean()))))
+
+
+def _turn_of_azimuths(search: Search, frame: Search, level: np.ndarray) -> float | None:
+    """The same from oriented directions between points of a frame (n,) bool; None without any."""
+    r = search.rows
+    r = r.only((r.code == BEARING) & np.isin(r.which, list(search.given)) & level[r.origin] & level[r.target])
+    if not len(r):
+        return None
+    along = frame.xyz[r.target] - frame.xyz[r.origin] + r.shift
+    azimuth = r.observed + [search.orientations[w] for w in r.which.tolist()]
+    return -float(np.angle(np.mean(np.exp(1j * (azimuth - np.arctan2(along[:, 0], along[:, 1]))))))
+
+
+def _attach_ranges(search: Search) -> bool:
+    """Places points by figures unfolded from ranges alone; whether any was placed.
+
+    Points that range each other all give a figure by classical scaling, stations and targets by unfolding; what the
+    other ranges tie to it follows. Three placed points off a line say where it belongs, and of its mirror images the
+    one that fits a fourth off their plane, or zenith angles and height differences. If the network gives fewer points,
+    the figure is laid down as it is, on those that it gives.
+    """
+    r = search.rows
+    rows = r.only((r.code == RANGE) & ~r.shift.any(axis=1))
+    if not len(rows):
+        return False
+    placed = np.isfinite(search.xyz).all(axis=1)
+    part = _parts_tied(rows, len(placed))
+    for which in dict.fromkeys(part[~placed].tolist()):
+        group = np.flatnonzero(part == which)
+        frame = Search(rows, np.full(search.xyz.shape, np.nan), {}, [])
+        why = _figure(frame, group) or _laid_down(search, frame)
+        if not why:
+            return True
+        if len(group) > 1 and not (placed[group].any() and why.startswith(TOO_FEW.split("{")[0])):
+            search.unfolding |= dict.fromkeys(group.tolist(), f"; {why}")
+    return False
+
+
+def _parts_tied(rows: Sightings, n: int) -> np.ndarray:
+    """For each of n points the number of the part of the network, tied together by ranges, that it belongs to."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    table = coo_array((np.ones(len(rows)), (rows.origin, rows.target)), shape=(n, n))
+    return connected_components(table, directed=False)[1]
+
+
+def _figure(frame: Search, group: np.ndarray) -> str:
+    """Fills a frame from the ranges between a group of points alone; why not, or nothing."""
+    rows = frame.rows.only(np.isin(frame.rows.origin, group))
+    if not len(rows):
+        return "no range holds it"
+    distance = dict(zip(zip(rows.origin.tolist(), rows.target.tolist(), strict=True), rows.observed, strict=True))
+    distance |= {(b, a): d for (a, b), d in distance.items()}
+    clique = _clique(distance)
+    if len(clique) >= 4:
+        table = np.array([[distance.get((a, b), 0.0) for b in clique] for a in clique])
+        xyz, values = classical_scaling(table)
+        if values[2] > STRICT * values[0]:
+            frame.xyz[clique] = xyz
+            frame.spread()
+            return ""
+    stations = np.unique(rows.origin)
+    targets = np.setdiff1d(group, stations)
+    ranges = np.array([[distance.get((a, b), np.nan) for b in targets.tolist()] for a in stations.tolist()])
+    found = _unfolded(ranges, float(np.median(rows.sigma)))
+    if found.status != UNFOLDED:
+        return found.status
+    frame.xyz[stations], frame.xyz[targets] = found.stations, found.targets
+    frame.sides |= set(np.concatenate([stations, targets])[found.side_assumed].tolist())
+    frame.spread()
+    return ""
+
+
+def _unfolded(ranges: np.ndarray, sigma: float) -> Unfolding:
+    """The figure; ranger zeros and scales still unknown may make ranges up to 100 times worse than their sigma."""
+    found = unfold(ranges, sigma)
+    for factor in (10.0, 100.0):
+        if not found.status.startswith(NO_FIT.split("{")[0]):
+            break
+        found = unfold(ranges, factor * sigma)
+    return found
+
+
+def _clique(distance: dict[tuple[int, int], float]) -> list[int]:
+    """Points that have distances to each other all, grown from the one with the most."""
+    ties = defaultdict(set)
+    for a, b in distance:
+        ties[a].add(b)
+    order = sorted(ties, key=lambda p: -len(ties[p]))
+    best: list[int] = []
+    for first in order[:20]:
+        clique, open_ = [first], set(ties[first])
+        while open_:
+            clique.append(max(open_, key=lambda p: len(ties[p] & open_)))
+            open_ &= ties[clique[-1]]
+        best = max(best, clique, key=len)
+    return best
+
+
+def _laid_down(search: Search, frame: Search) -> str:
+    """Lays a figure that may be turned and mirrored on the placed points; why not, or nothing."""
+    placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
+    both = placed & here
+    tries = []
+    for mirror in (1.0, -1.0):
+        local = frame.xyz * (1.0, 1.0, mirror)
+        motion = rigid_motion(local[both], search.xyz[both])
+        if motion is None:
+            return _by_convention(search, frame)
+        xyz = motion[1] + local @ motion[0].T
+        apart = float(np.sqrt(np.mean((xyz - search.xyz)[both] ** 2)))
+        tries.append((apart, _misfit_of_heights(search.rows, xyz), xyz))
+    for by in (0, 1):
+        first, second = sorted(tries, key=lambda t: t[by])
+        if second[by] > 3 * first[by] + 10 * FLOOR:
+            return _taken(search, frame, first[2])
+    return "a mirror image fits as well; give one more point off the plane of the others, or a zenith angle"
+
+
+def _by_convention(search: Search, frame: Search) -> str:
+    """Lays a figure down as it is, on the one or two placed points or those in line, where they are all."""
+    placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
+    both, r = placed & here, search.rows
+    turned = (r.code != RANGE) & here[r.origin] & here[r.target]
+    if placed.sum() > both.sum() or turned.any():
+        return f"of {int(here.sum())} points that ranges tie together {int(both.sum())} are placed, 3 are needed"
+    turn = closed_form(frame.xyz[both], search.xyz[both])[0] if both.sum() > 1 else np.eye(3)
+    shift = search.xyz[both].mean(axis=0) - turn @ frame.xyz[both].mean(axis=0) if both.any() else np.zeros(3)
+    waiting = set(search.unplaced.tolist())
+    why = _taken(search, frame, frame.xyz @ turn.T + shift)
+    search.conventional |= set() if why else waiting
+    return why
+
+
+def _taken(search: Search, frame: Search, xyz: np.ndarray) -> str:
+    """Takes a figure that is laid down at xyz; why not, or nothing."""
+    search.sides |= frame.sides & set(search.unplaced.tolist())
+    return "" if search.fill(xyz) else "nothing new"
+
+
+def _misfit_of_heights(r: Sightings, xyz: np.ndarray) -> float:
+    """Median misfit, m, of what tells up from down: zenith angles and height differences; 0 without any."""
+    up = (r.code == ZENITH) | ((r.code == DIFFERENCE) & (r.which == 2))
+    r = r.only(up & np.isfinite(xyz[r.origin]).all(axis=1) & np.isfinite(xyz[r.target]).all(axis=1))
+    if not len(r):
+        return 0.0
+    along = xyz[r.target] - xyz[r.origin] + r.shift
+    rise = np.where(r.code == ZENITH, np.linalg.norm(along, axis=1) * np.cos(r.observed), r.observed)
+    return float(np.median(np.abs(rise - along[:, 2])))

@@ -1,0 +1,132 @@
+"""A network of points and observations, whatever file it came from, and its adjusted answer.
+
+Axes here are x east, y north, z up, right-handed; azimuths and directions run clockwise from north (from +y to +x).
+A file with other axes is turned into these by its reader, and `axes` turns the answer back.
+The parameters of the whole network are one vector: point i at 3 i, 3 i + 1, 3 i + 2, then the others in their order.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import Fit
+from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.observations import Observations
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of a network.
+
+    names   unique
+    xyz     (n, 3) m, where the file puts them; nan where unknown: an approximation is then searched for
+    fixed   (n, 3) bool: coordinates held at xyz
+    datum   (n, 3) bool: coordinates that take part in the inner constraints, relative to xyz
+
+    A stochastic point is a free one with an observation of its coordinates, of kind `Coordinates`.
+    """
+
+    names: tuple[str, ...]
+    xyz: np.ndarray
+    fixed: np.ndarray
+    datum: np.ndarray
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An unknown beside the points.
+
+    name    for reports: "zero ZY101", "scale ZY101", "orientation 4901 set 1", "refractivity morning", "x of FRAME"
+    start   where the iteration begins
+    sigma   0 holds it at `start`; infinite leaves it free; else its prior is `start` with this standard uncertainty
+    unit    "m", "rad" or "1" (a ratio)
+    """
+
+    name: str
+    start: float = 0.0
+    sigma: float = np.inf
+    unit: str = "1"
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Points, other parameters and groups of observations.
+
+    points       see there
+    parameters   beside the points, in the order of the parameter vector after 3 n coordinates
+    groups       of observations, over columns of the parameter vector; see `catseye.estimation.observations`
+    places       one tuple a group with where each of its rows stands in the file ("line 12"), or () where unknown
+    axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
+    axis_names   what the file calls its axes, in its order
+    source       the file's name, for reports
+    description  the file's own words
+    """
+
+    points: Points
+    parameters: tuple[Parameter, ...]
+    groups: tuple[Observations, ...]
+    places: tuple[tuple[str, ...], ...] = ()
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
+    axis_names: tuple[str, str, str] = ("x", "y", "z")
+    source: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkSolution:
+    """The adjusted network, in the axes of this package (`network.axes` turns it into the file's).
+
+    network              what was adjusted
+    x                    (n, 3) m
+    covariance           (n, 3, 3) m^2 of each point, a priori (variance factor 1); zero where held; nan without answer
+    parameters           (p,) values of network.parameters
+    u_parameters         (p,) their standard uncertainties
+    status               "converged", or one line that says what is wrong, where, and what to do
+    iterations           steps taken
+    fits                 one a group of the network, in its order
+    variance_factor      [pvv] / degrees of freedom, expectation 1; nan without redundancy
+    degrees_of_freedom   observations less parameters plus the datum's conditions
+    datum                in words, how the free directions are held
+    approximate          names of the points whose approximate coordinates were found, not given
+    assumed              names of those placed on a side that nothing decides
+    replaced             names of those whose given coordinates the observations contradict grossly: the iteration began
+                         where they put them instead
+    q                    covariance of the whole parameter vector, for what is not above
+    """
+
+    network: Network
+    x: np.ndarray
+    covariance: np.ndarray
+    parameters: np.ndarray
+    u_parameters: np.ndarray
+    status: str
+    iterations: int
+    fits: tuple[Fit, ...]
+    variance_factor: float
+    degrees_of_freedom: float
+    datum: str
+    approximate: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
+    replaced: tuple[str, ...] = ()
+    q: Covariance = field(kw_only=True)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Row of each point by its name."""
+        return {name: i for i, name in enumerate(self.network.points.names)}
+
+    def block(self, names: Sequence[str]) -> np.ndarray:
+        """Joint covariance (3k, 3k) of some points, m^2, in the order given; raises EstimationError for a stranger."""
+        strange = [name for name in names if name not in self.index]
+        if strange:
+            raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+        first = 3 * np.array([self.index[name] for name in names], dtype=int)
+        return self.q.within((first[:, None] + np.arange(3)).ravel())
+
+
+def points_of(group: Observations) -> tuple[np.ndarray, ...]:
+    """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
+    return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))

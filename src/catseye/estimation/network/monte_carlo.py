@@ -1,0 +1,146 @@
+"""A network measured many times on paper: noise, air and blunders drawn, each time adjusted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.rows import variances
+from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.observations import Distances, ZenithAngles
+
+XY = np.arange(2)
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What goes wrong beside the claimed noise.
+
+    common_ppm    standard deviation of a scale error of all ranges together: the index of air, wrong all over
+    station_ppm   the same of each ranger for itself: its own thermometer
+    refraction    standard deviation of the coefficient k of vertical refraction, which bends all zenith angles
+    blunders      share of observations with a gross error
+    size          standard deviations of such an error, either sign
+    """
+
+    common_ppm: float = 0.0
+    station_ppm: float = 0.0
+    refraction: float = 0.0
+    blunders: float = 0.0
+    size: float = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What came of the runs.
+
+    runs          that converged, of those asked for
+    asked         runs asked for
+    rms           (n, 3) m, root mean square departure of each coordinate from the truth
+    predicted     (n, 3) m, claimed standard uncertainties
+    ratio         root mean square of departure over claim, all free coordinates: 1 when the claim holds
+    found         share of the blunders that were left out, nan without any
+    false         share of the good observations that were left out
+    """
+
+    runs: int
+    asked: int
+    rms: np.ndarray
+    predicted: np.ndarray
+    ratio: float
+    found: float
+    false: float
+
+
+def measured(
+    network: Network, truth: np.ndarray, generator: np.random.Generator, disturbance: Disturbance
+) -> tuple[Network, list[np.ndarray]]:
+    """The network with observations drawn about a truth, and which of them (m,) bool a group are blunders.
+
+    truth   parameter vector: coordinates and other parameters
+    """
+    groups, wrong = [], []
+    common = generator.standard_normal() * disturbance.common_ppm * PPM
+    own = generator.standard_normal(len(network.points.names)) * disturbance.station_ppm * PPM
+    bend = generator.standard_normal() * disturbance.refraction
+    for group in network.groups:
+        values = group.predict(truth)[0]
+        m = len(values)
+        sigma = np.sqrt(variances(group))
+        noise = generator.standard_normal(m)
+        if group.covariance.ndim == 1:
+            noise = noise * sigma
+        else:
+            b, r = (1, m) if group.covariance.ndim == 2 else group.covariance.shape[:2]
+            factor = np.linalg.cholesky(group.covariance.reshape(b, r, r))
+            noise = np.einsum("bij,bj->bi", factor, noise.reshape(b, r)).ravel()
+        if isinstance(group, Distances):
+            noise = noise + values * (common + own[points_of(group)[0]])
+        if isinstance(group, ZenithAngles):
+            along = truth[group.target[:, None] + XY] - truth[group.origin[:, None] + XY]
+            noise = noise - bend * np.hypot(*along.T) / (2.0 * group.radius)
+        bad = generator.random(m) < disturbance.blunders
+        noise = noise + bad * disturbance.size * sigma * generator.choice([-1.0, 1.0], m)
+        groups.append(replace(group, observed=values + noise))  # type: ignore[type-var]
+        wrong.append(bad)
+    return replace(network, groups=tuple(groups)), wrong
+
+
+def scatter(
+    network: Network,
+    solve: Callable[[Network], NetworkSolution],
+    *,
+    runs: int,
+    seed: int,
+    disturbance: Disturbance | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Scatter:
+    """How well the claimed uncertainties hold when the network is measured `runs` times.
+
+    network      its coordinates and parameters are the truth of every run
+    solve        how a network is adjusted, rejection and all
+    runs, seed   how many, and of which generator
+    disturbance  beside the claimed noise; none if None
+
+    Parameters with priors are drawn from them in each run; so the claim must hold with them, too.
+    Raises EstimationError when no run converges.
+    """
+    generator = np.random.default_rng(seed)
+    given = disturbance or Disturbance()
+    starts = np.array([p.start for p in network.parameters])
+    sigma = np.array([p.sigma if np.isfinite(p.sigma) else 0.0 for p in network.parameters])
+    squares, normalised, claims, done = 0.0, 0.0, 0.0, 0
+    hit, blunders, lost, good = 0, 0, 0, 0
+    status = ""
+    for run in range(runs):
+        if progress is not None:
+            progress("measuring on paper", run, runs)
+        values = starts + sigma * generator.standard_normal(len(starts))
+        drawn, wrong = measured(network, np.concatenate([network.points.xyz.ravel(), values]), generator, given)
+        solution = solve(drawn)
+        if not solution.status.startswith(CONVERGED):
+            status = solution.status
+            continue
+        done += 1
+        departure = solution.x - network.points.xyz
+        claim = np.einsum("nii->ni", solution.covariance)
+        squares, claims = squares + departure**2, claims + claim
+        held = claim <= 0.0
+        normalised += float(np.mean((departure**2 / np.where(held, 1.0, claim))[~held]))
+        for fit, bad in zip(solution.fits, wrong, strict=True):
+            hit, blunders = hit + int(np.sum(bad & ~fit.active)), blunders + int(bad.sum())
+            lost, good = lost + int(np.sum(~bad & ~fit.active)), good + int(np.sum(~bad))
+    if not done:
+        raise EstimationError(f"none of {runs} runs on paper converged: {status}")
+    return Scatter(
+        runs=done,
+        asked=runs,
+        rms=np.sqrt(squares / done),
+        predicted=np.sqrt(claims / done),
+        ratio=(normalised / done) ** 0.5,
+        found=hit / blunders if blunders else float("nan"),
+        false=lost / good if good else 0.0,
+    )

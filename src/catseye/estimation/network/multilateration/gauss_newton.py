@@ -1,0 +1,383 @@
+"""Ranging networks: stations that measure distances to targets, all coordinates unknown, solved by block elimination.
+
+observed = (1 + scale) |target - station| + zero + error, zero and scale of the station held, free or with a prior.
+Every target is eliminated into a dense system of the stations' parameters, so thousands of targets cost milliseconds:
+in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises, with the
+normal matrix of a large network kept once a step is a thousandth of the one before (covariances to 1e-6 of their own).
+It is scale-free: rank is judged by directions and by the share of a diagonal that survives the elimination, so metres,
+nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `datum`.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.linalg import lapack
+
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, ROUNDING, STEP_IN_SIGMAS, UNDEFINED
+from catseye.estimation.network.multilateration import status as status_of
+from catseye.estimation.network.multilateration.blocks import NumpyBlocks, Reduced, State, Statistics
+from catseye.estimation.network.multilateration.datum import Conditions, displacements, generators
+from catseye.estimation.network.multilateration.network import RangingNetwork, Setup, set_up
+from catseye.estimation.network.multilateration.solution import Gauge, RangingSolution
+
+COMPILED_FROM = 200_000  # ranges: below, importing the compiled kernels costs more than they save
+WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): directions within 1 microradian of a plane show nothing off it
+WORST_NETWORK = 1e-13  # of the reduced matrix, scaled by its diagonal before elimination: below it is roundoff
+KEEP_BELOW = 1e-3  # of the step before: the normal matrix changes less than that by far, and may be kept
+KEEP_FROM = 20_000  # ranges: below, building it anew costs too little to give up its last digits
+EPS = float(np.finfo(float).eps)
+
+
+class Blocks(Protocol):
+    """Either engine: `NumpyBlocks`, `KernelBlocks`."""
+
+    def reduce(self, state: State) -> Reduced: ...
+    def follow(self, state: State, old: Reduced) -> Reduced: ...
+    def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray: ...
+    def felt(self, at: State, own: np.ndarray) -> np.ndarray: ...
+    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics: ...
+
+
+def adjust_ranges(
+    network: RangingNetwork,
+    *,
+    tests: bool = True,
+    iterations: int = 50,
+    inflation: np.ndarray | None = None,
+    engine: str | None = None,
+) -> RangingSolution:
+    """The coordinates, zeros and scales that fit a ranging network best, with covariances and tests of every range.
+
+    network      see there
+    tests        False leaves covariances and tests at nan
+    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
+    inflation    (m,) factor on each range's sigma, infinite leaves it out but still tests it against its prediction
+    engine       "numpy", "numba", or None: compiled from 200 000 ranges on
+
+    Returns a RangingSolution whose status says what happened; raises InputError for a network that is none.
+
+    Source: [FOERSTNER16] chapters 4 and 15 (Gauss-Markov model, elimination, gauge), [BAARDA68] (tests).
+
+    >>> corners = np.array([[x, y, z] for x in (0.0, 9.0) for y in (0.0, 8.0) for z in (0.0, 3.0)])
+    >>> balls = np.array([[2.0, 1.0, 1.0], [5.0, 6.0, 2.0], [8.0, 3.0, 0.5], [1.0, 7.0, 2.5], [4.0, 2.0, 2.9]])
+    >>> (i, j), datum = np.divmod(np.arange(40), 5), np.ones((8, 3), dtype=bool)
+    >>> seen = np.linalg.norm(balls[j] - corners[i], axis=1)
+    >>> room = RangingNetwork(corners + 0.01, balls, i, j, seen, np.full(40, 1e-5), datum_stations=datum)
+    >>> answer = adjust_ranges(room)
+    >>> answer.status, answer.degrees_of_freedom, bool(np.abs(answer.targets - 0.01 - balls).max() < 1e-9)
+    ('converged', 7, True)
+    """
+    setup = set_up(network, inflation)
+    blocks = _engine(setup, engine)
+    return _Iteration(setup, blocks).run(network, iterations, tests)
+
+
+def _engine(setup: Setup, engine: str | None) -> Blocks:
+    if engine not in (None, "numpy", "numba"):
+        raise InputError(f'engine is "numpy", "numba" or None, not {engine!r}')
+    if engine == "numpy" or (engine is None and len(setup.problem.distance) < COMPILED_FROM):
+        return NumpyBlocks(setup.problem)
+    from catseye.estimation.network.multilateration.kernel import KernelBlocks
+
+    return KernelBlocks(setup.problem)
+
+
+@dataclass(frozen=True, eq=False)
+class _Factor:
+    """Cholesky factor of the reduced matrix over the free parameters, made regular along the free motions.
+
+    index   (k,) the free parameters
+    scale   (k,) what they were multiplied with
+    lower   (k, k)
+    basis   (k, f) orthonormal, scaled: the free motions
+    """
+
+    index: np.ndarray
+    scale: np.ndarray
+    lower: np.ndarray
+    basis: np.ndarray
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """The shortest (scaled) solution (n,) for a right side (n,)."""
+        step = np.zeros(len(right))
+        if len(self.index):
+            step[self.index] = self.scale * lapack.dpotrs(self.lower, self.scale * right[self.index], lower=1)[0]
+        return step
+
+    def inverse(self, n: int) -> np.ndarray:
+        """The pseudoinverse (n, n) in scaled parameters, zero where held."""
+        out = np.zeros((n, n))
+        if len(self.index):
+            half = np.tril(lapack.dpotri(self.lower, lower=1)[0])
+            full = half + np.tril(half, -1).T - self.basis @ self.basis.T
+            out[np.ix_(self.index, self.index)] = full * self.scale[:, None] * self.scale
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A Gauss-Newton step: of the stations' parameters (n,) and targets (T, 3), and how it was found.
+
+    size     in standard deviations of all parameters together, the motion to the datum included
+    gain     by how much it lowers the cost, to first order
+    noise    what roundoff makes of `size`
+    """
+
+    stations: np.ndarray
+    targets: np.ndarray
+    size: float
+    gain: float
+    noise: float
+    factor: _Factor
+    motions: np.ndarray
+
+
+class _Iteration:
+    """Gauss-Newton on one network."""
+
+    def __init__(self, setup: Setup, blocks: Blocks):
+        self.setup, self.blocks, self.problem = setup, blocks, setup.problem
+        self.state = self.at = setup.start
+        self.factor: _Factor | None = None
+        self.thrifty = len(self.problem.distance) >= KEEP_FROM
+        self.free = np.flatnonzero(self.problem.free_stations.ravel())
+        self.taken, self.cost, self.moment = 0, np.nan, 0.0
+
+    def run(self, network: RangingNetwork, iterations: int, tests: bool) -> RangingSolution:
+        """Iterate to an answer, then its statistics."""
+        status, answer = NOT_CONVERGED.format(step=np.inf, iterations=0), None
+        reduced, before = self._reduce(self.state), 0.0
+        while self.taken < iterations:
+            self.taken += 1
+            step = self._solve(reduced)
+            if isinstance(step, str):
+                status = step
+                break
+            if step.size < STEP_IN_SIGMAS + step.noise:
+                status, answer = CONVERGED, step
+                break
+            status = NOT_CONVERGED.format(step=step.size, iterations=self.taken)
+            descent = self._descend(step, reduced, keep=self.thrifty and step.size < KEEP_BELOW * before)
+            if descent is None:
+                break
+            reduced, before = descent, step.size
+        return self._solution(network, status, reduced, answer, tests)
+
+    def _reduce(self, state: State) -> Reduced:
+        """Normal equations at a state, whose factor is then to be found."""
+        reduced = self.blocks.reduce(state)
+        cost, moment = self.setup.terms.add(state, reduced.normal, reduced.before, reduced.right, self.problem.width)
+        self.cost, self.moment, self.at, self.factor = reduced.cost + cost, reduced.moment + moment, state, None
+        return reduced
+
+    def _follow(self, state: State, old: Reduced) -> Reduced:
+        """The right side at a state close to where the normal matrix was built, which is kept with its factor."""
+        reduced = self.blocks.follow(state, old)
+        aside = np.zeros_like(old.normal), np.zeros_like(old.before)
+        cost, moment = self.setup.terms.add(state, *aside, reduced.right, self.problem.width)
+        self.cost, self.moment = reduced.cost + cost, reduced.moment + moment
+        return reduced
+
+    def _moved(self, step: _Step, fraction: float) -> State:
+        by_station = fraction * step.stations.reshape(self.problem.free_stations.shape)
+        old = self.state
+        zero, scale = (
+            (old.zero + by_station[:, 3], old.scale + by_station[:, 4])
+            if self.problem.width > 3
+            else (old.zero, old.scale)
+        )
+        return State(old.stations + by_station[:, :3], old.targets + fraction * step.targets, zero, scale)
+
+    def _descend(self, step: _Step, old: Reduced, *, keep: bool) -> Reduced | None:
+        """Take the step, halved while the cost rises, or None; keep: the normal matrix, if the whole step descends."""
+        before = self.cost
+        noise = 8.0 * EPS * (before * self.moment) ** 0.5 + EPS**2 * self.moment  # of the cost, from roundoff of D
+        for halving in range(11):
+            trial = self._moved(step, 0.5**halving)
+            reduced = self._follow(trial, old) if keep and not halving else self._reduce(trial)
+            if self.cost <= before * ROUNDING + noise:
+                self.state = trial
+                return reduced
+        self.cost = before
+        return None
+
+    def _solve(self, reduced: Reduced) -> _Step | str:
+        """The next step; or why there is none."""
+        if not np.isfinite(self.cost):
+            return self._undefined()
+        refusal = self._floating(reduced)
+        if refusal is not None:
+            return refusal
+        motions = self.setup.motions(self.state)
+        null = self._null(motions, self.state)
+        factor = self.factor or self._factorise(reduced, null)
+        if isinstance(factor, str):
+            return factor
+        self.factor = factor
+        first = factor.solve(reduced.right)
+        second = self.blocks.back(self.state, reduced, first)
+        gain = max(reduced.gain + float(reduced.right @ first), 0.0)
+        size = gain
+        if motions.shape[1]:
+            conditions = self._conditions(motions, self.state)
+            if isinstance(conditions, str):
+                return conditions
+            shift = conditions.restore(first.reshape(len(self.state.stations), -1)[:, :3], second)
+            turned = null @ shift
+            first = first + turned
+            second = second + displacements(self.state.targets, motions @ shift) * self.problem.free_targets
+            size += float(reduced.before @ turned**2)
+        return _Step(first, second, size**0.5, gain, 4.0 * EPS * self.moment**0.5, factor, motions)
+
+    def _undefined(self) -> str:
+        problem, names = self.problem, self.setup.names
+        along = self.state.targets[problem.target] - self.state.stations[problem.station]
+        same = np.flatnonzero(~np.any(along != 0.0, axis=1) & (problem.root > 0.0))
+        called = [f"the range {names.station(problem.station[i])} to {names.target(problem.target[i])}" for i in same]
+        return UNDEFINED.format(names=status_of.listed(called) if called else "a range between stations")
+
+    def _floating(self, reduced: Reduced) -> str | None:
+        """Why some target has no place relative to its stations, or None."""
+        fine = reduced.condition >= WORST_TARGET
+        if fine.all():
+            return None
+        needed = np.any(self.problem.free_targets, axis=1)
+        if self.setup.terms.targets is not None:
+            needed[self.setup.terms.targets.index] = False  # positive definite already
+        bad = np.flatnonzero(~fine & needed)
+        if not len(bad):
+            return None
+        return status_of.floating_targets(self.problem, self.state, self.setup.names, bad)
+
+    def _null(self, motions: np.ndarray, state: State) -> np.ndarray:
+        """What the free motions do to the stations' parameters: (n, f)."""
+        null = np.zeros((*self.problem.free_stations.shape, motions.shape[1]))
+        null[:, :3] = generators(state.stations) @ motions
+        if self.problem.width > 3:
+            null[:, 4] = -(1.0 + state.scale)[:, None] * motions[6]
+        return (null * self.problem.free_stations[:, :, None]).reshape(
+            self.problem.free_stations.size, motions.shape[1]
+        )
+
+    def _factorise(self, reduced: Reduced, null: np.ndarray) -> _Factor | str:
+        free = self.free
+        before = reduced.before[free]
+        empty = np.zeros((0, 0))
+        if not len(free):
+            return _Factor(free, before, empty, empty)
+        if np.any(before <= 0.0):
+            return self._network_floats(np.where(before <= 0.0, 1.0, 0.0))
+        scale = 1.0 / np.sqrt(before)
+        scaled = reduced.normal[free[:, None], free] * scale[:, None] * scale
+        basis = np.zeros((len(free), 0))
+        if null.shape[1]:
+            left, values, _ = np.linalg.svd(null[free] / scale[:, None], full_matrices=False)
+            basis = left[:, values > 1e-9 * values[0]]
+            scaled += basis @ basis.T
+        lower, failed = lapack.dpotrf(scaled, lower=1)
+        good = 0.0 if failed else lapack.dpocon(lower, np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
+        if not good > WORST_NETWORK:
+            values, vectors = np.linalg.eigh(scaled)
+            floating = values < max(values[-1] * WORST_NETWORK * 10, 10 * values[0])
+            return self._network_floats(np.sum(vectors[:, floating] ** 2, axis=1))
+        return _Factor(free, scale, lower, basis)
+
+    def _network_floats(self, part: np.ndarray) -> str:
+        full = np.zeros(self.problem.free_stations.size)
+        full[self.free] = part
+        between = self.setup.terms.between
+        joined = (between.first, between.second) if between is not None else (self.free[:0], self.free[:0])
+        return status_of.floating_network(self.problem, self.setup.names, joined, full)
+
+    def _conditions(self, motions: np.ndarray, state: State) -> Conditions | str:
+        """Inner constraints at a state, or why they do not hold the free motions."""
+        datum = self.setup.datum
+        count = motions.shape[1]
+        if datum.empty:
+            words = status_of.described(motions, self.setup.size)
+            return status_of.MOTIONS.format(motions=words, count=count)
+        free = self.problem.free_stations[:, :3], self.problem.free_targets
+        conditions = datum.conditions(state, motions, free)
+        _, values, vectors = np.linalg.svd(conditions.response)
+        loose = values <= 1e-10 * max(values[0], 1.0)
+        if loose.any():
+            return status_of.DATUM.format(motions=status_of.described(motions @ vectors[loose].T, self.setup.size))
+        return conditions
+
+    def _solution(
+        self, network: RangingNetwork, status: str, reduced: Reduced, answer: _Step | None, tests: bool
+    ) -> RangingSolution:
+        problem, at, n = self.problem, self.at, self.problem.free_stations.size
+        state, pvv = self.state, self.cost
+        covariance, gauge, statistics = np.full((n, n), np.nan), None, None
+        if answer is not None:  # the last step; the statistics hold where the normal matrix was built, all consistently
+            state, pvv = self._moved(answer, 1.0), max(self.cost - answer.gain, 0.0)
+        conditions = answer.motions.shape[1] if answer is not None else 0
+        if answer is not None and tests:
+            covariance, gauge = self._covariance(answer, reduced)
+            statistics = self.blocks.statistics(at, state, reduced.inverse, covariance)
+            if len(gauge.points):
+                x = at.targets[gauge.points]
+                moved = (generators(x) @ gauge.motions) * problem.free_targets[gauge.points][:, :, None]
+                joined = moved @ gauge.drift.transpose(0, 2, 1)
+                statistics.covariance[gauge.points] -= joined + joined.transpose(0, 2, 1)
+        known = statistics
+        statistics = statistics or Statistics.unknown(len(state.targets), len(problem.distance))
+        free = int(np.sum(problem.free_stations)) + int(np.sum(problem.free_targets))
+        count = problem.used + self.setup.terms.count()
+        degrees = count - free + conditions
+        if status == CONVERGED and degrees > 0 and pvv > status_of.BELIEVABLE**2 * degrees:
+            status = status_of.contradiction(problem, state, self.setup.names, known) or status
+        return RangingSolution(
+            network,
+            state.stations + self.setup.origin,
+            state.targets + self.setup.origin,
+            state.zero,
+            state.scale,
+            status,
+            self.taken,
+            pvv,
+            degrees,
+            problem.width,
+            covariance,
+            statistics.covariance,
+            statistics.redundancy,
+            statistics.standardised,
+            statistics.detectable,
+            self.setup,
+            at,
+            state,
+            reduced.inverse,
+            gauge,
+        )
+
+    def _covariance(self, answer: _Step, reduced: Reduced) -> tuple[np.ndarray, Gauge]:
+        """Covariance (n, n) of the stations' parameters in the datum, by an S-transformation; and the datum's part.
+
+        With h the conditions' derivative by the stations, the targets following them, and R the inverse of their
+        response: T = 1 - N R h', Q = T Q0 T' + N R (sum over datum targets of H' V^-1 H) R' N'.
+        """
+        n, motions = self.problem.free_stations.size, answer.motions
+        q, null = answer.factor.inverse(n), self._null(motions, self.at)
+        f = motions.shape[1]
+        gauge = Gauge(motions, null, np.zeros(0, dtype=np.int64), np.zeros((0, 3, f)))
+        if not f:
+            return q, gauge
+        conditions = self._conditions(motions, self.at)
+        if isinstance(conditions, str):  # it held them one step before
+            raise EstimationError(conditions)
+        by_station = np.zeros((*self.problem.free_stations.shape, f))
+        by_station[:, :3] = conditions.at_stations
+        h, back, spread = by_station.reshape(n, f), np.linalg.inv(conditions.response), np.zeros((f, f))
+        if len(conditions.points):
+            own = reduced.inverse[conditions.points] @ conditions.at_targets
+            spread = np.einsum("kif,kig->fg", conditions.at_targets, own)
+            everywhere = np.zeros((len(self.at.targets), 3, f))
+            everywhere[conditions.points] = own
+            h = h + self.blocks.felt(self.at, everywhere)
+            gauge = Gauge(motions, null, conditions.points, own @ back.T)
+        carried, seen = null @ back, h.T @ q
+        moved = carried @ seen
+        return q - moved - moved.T + carried @ (seen @ h + spread) @ carried.T, gauge

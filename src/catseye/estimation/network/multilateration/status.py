@@ -1,0 +1,139 @@
+"""What to tell when a ranging network has no answer, or one not to be believed: what floats, where, what to do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, RANK_DEFICIENT, UNDEFINED
+from catseye.estimation.network.multilateration.blocks import UNCHECKED, Problem, State, Statistics, linearise
+
+__all__ = ["CONVERGED", "NOT_CONVERGED", "RANK_DEFICIENT", "UNDEFINED", "Names", "contradiction"]
+
+TARGET = "rank deficient: {name} {why}{others}; add ranges from other directions, hold it or give it a prior"
+MOTIONS = "rank deficient: the whole network floats ({motions}); hold {count} more coordinates, or mark datum points"
+DATUM = "rank deficient: the datum does not hold {motions}; mark more coordinates as datum, or hold them"
+PIECES = "rank deficient: the network is in {count} pieces that nothing joins or holds: {pieces}; \
+add ranges between them, or hold each one"
+CONTRADICTORY = "contradictory: half of the residuals exceed {median:.0f} standard uncertainties, worst at {worst}; \
+a range may be grossly wrong, two points exchanged, or the starting coordinates too far off"
+
+LISTED = 4  # names in one line
+BELIEVABLE = 30.0  # median |residual| / sigma: beyond it no sigma is merely optimistic, the model is wrong
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Names:
+    """What stations and targets are called."""
+
+    stations: Sequence[str]
+    targets: Sequence[str]
+
+    def station(self, i: int) -> str:
+        """The name of station i, or its index."""
+        return self.stations[i] if len(self.stations) else f"station[{i}]"
+
+    def target(self, i: int) -> str:
+        """The name of target i, or its index."""
+        return self.targets[i] if len(self.targets) else f"target[{i}]"
+
+    def parameter(self, i: int, width: int) -> str:
+        """The name of parameter i of the stations."""
+        s, k = divmod(i, width)
+        return f"{AXES[k]} of {self.station(s)}" if k < 3 else f"{('zero', 'scale')[k - 3]} of {self.station(s)}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Some names in one line.
+
+    >>> listed(["S1", "S2", "S3", "S4", "S5", "S6"])
+    'S1, S2, S3, S4 and 2 more'
+    """
+    more = len(names) - LISTED
+    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def floating_targets(problem: Problem, state: State, names: Names, floating: np.ndarray) -> str:
+    """Why the targets `floating` (indices, worst first) cannot be placed by their stations."""
+    worst = int(floating[0])
+    rows = np.flatnonzero((problem.target == worst) & (problem.root > 0.0))
+    stations = len(np.unique(problem.station[rows]))
+    needed = int(problem.free_targets[worst].sum())
+    if len(rows) < needed:
+        why = f"is seen by {len(rows)} range{'s' * (len(rows) != 1)} and has {needed} free coordinates"
+    elif stations < needed:
+        why = f"is seen from {stations} station{'s' * (stations != 1)} only and has {needed} free coordinates"
+    else:
+        a = linearise(problem, state, rows, problem.root[rows]).a[:, problem.free_targets[worst]]
+        values = np.linalg.svd(a, compute_uv=False)
+        line = len(values) > 1 and values[1] < 1e-6 * values[0]
+        why = f"lies on one {'line' if line else 'plane'} with all {stations} stations that see it"
+    others = [names.target(int(i)) for i in floating[1:]]
+    return TARGET.format(name=names.target(worst), why=why, others=f" (so do {listed(others)})" if others else "")
+
+
+def described(motions: np.ndarray, size: float) -> str:
+    """Free motions (7, f) in words.
+
+    >>> described(np.eye(7)[:, :6], 1.0)
+    '3 shifts and 3 turns'
+    """
+    if motions.shape[1] >= 6:
+        return "3 shifts and 3 turns" if motions.shape[1] == 6 else "3 shifts, 3 turns and the scale"
+    words = []
+    for motion in motions.T:
+        scaled = motion * np.array([1.0, 1.0, 1.0] + [size] * 4)
+        turn, shift = np.linalg.norm(scaled[3:6]), np.linalg.norm(scaled[:3])
+        if abs(scaled[6]) > max(turn, shift):
+            words.append("a change of scale")
+            continue
+        kind, vector = ("turn about", scaled[3:6] / turn) if turn > 0.1 * shift else ("shift along", scaled[:3] / shift)
+        words.append(f"a {kind} ({', '.join(f'{c + 0.0:.2f}' for c in vector)})")
+    return listed(words)
+
+
+def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]) -> list[str]:
+    """The members of each part of the network that ranges (and `joined` pairs of stations) hold together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    s, t = len(problem.free_stations), len(problem.free_targets)
+    used = problem.root > 0.0
+    first = np.concatenate([problem.station[used], joined[0]])
+    second = np.concatenate([s + problem.target[used], joined[1]])
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(s + t, s + t))
+    count, label = connected_components(graph, directed=False)
+    members: list[list[str]] = [[] for _ in range(count)]
+    for i in range(s + t):
+        members[label[i]].append(names.station(i) if i < s else names.target(i - s))
+    return [f"[{listed(m)}]" for m in sorted(members, key=len)]
+
+
+def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], part: np.ndarray) -> str:
+    """Why the reduced system is singular, `part` (n,) the share of each station parameter in what floats."""
+    found = pieces(problem, names, joined)
+    if len(found) > 1:
+        return PIECES.format(count=len(found), pieces=" and ".join(found[:3]))
+    worst = np.argsort(-np.round(part / part.max(), 6), kind="stable")  # roundoff must not change the order
+    called = [names.parameter(int(i), problem.width) for i in worst if part[i] > 1e-3 * part.max()]
+    return RANK_DEFICIENT.format(names=listed(called))
+
+
+def contradiction(problem: Problem, state: State, names: Names, statistics: Statistics | None) -> str | None:
+    """The status of a network whose residuals are beyond belief as a whole, or None; without statistics less exact."""
+    rows = np.flatnonzero(problem.root > 0.0)
+    misclosure = np.abs(linearise(problem, state, rows, problem.root[rows]).misclosure)
+    median = float(np.median(misclosure))
+    if median < BELIEVABLE:
+        return None
+    s = len(problem.free_stations)
+    seen = np.maximum(np.bincount(problem.station[rows], minlength=s), 1)
+    by_station = np.bincount(problem.station[rows], misclosure**2, s) / seen
+    where = names.station(int(np.argmax(by_station)))
+    if statistics is not None:
+        i = rows[np.argmax(np.abs(statistics.standardised[rows]))]
+        off = statistics.residual[i] / max(statistics.redundancy[i], UNCHECKED)
+        ends = f"{names.station(int(problem.station[i]))} to {names.target(int(problem.target[i]))}"
+        where += f" and at the range {ends} (about {off:.2g} m off)"
+    return CONTRADICTORY.format(median=median, worst=where)

@@ -1,0 +1,178 @@
+"""What a ranging network knows beside its ranges: priors of points, zeros and scales, and ranges between stations.
+
+These touch the stations' parameters alone (or one target's), so they join the normal equations after the elimination.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+from catseye.estimation.network.multilateration.blocks import UNCHECKED, State
+
+
+@dataclass(frozen=True, eq=False)
+class PointPriors:
+    """Points whose coordinates were measured before (stochastic points), independent of each other.
+
+    index        (k,) of the station or target, each once
+    observed     (k, 3) m
+    covariance   (k, 3, 3) m^2, positive definite
+    """
+
+    index: np.ndarray
+    observed: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class StationRanges:
+    """Distances between two stations, free of zero and scale: first, second (k,) stations; distance, sigma (k,) m."""
+
+    first: np.ndarray
+    second: np.ndarray
+    distance: np.ndarray
+    sigma: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Gauges:
+    """Priors of one parameter a ranger, its zero or its scale.
+
+    name     of the group, for reports
+    column   3 for zero, 4 for scale, among the parameters of a station
+    index    (k,) stations
+    start    (k,) the prior's value
+    sigma    (k,) its standard uncertainty
+    """
+
+    name: str
+    column: int
+    index: np.ndarray
+    start: np.ndarray
+    sigma: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """All of them; None where there are none."""
+
+    stations: PointPriors | None
+    targets: PointPriors | None
+    between: StationRanges | None
+    gauges: tuple[Gauges, ...]
+
+    @cached_property
+    def _station_root(self) -> np.ndarray:
+        return _whitening(self.stations)
+
+    @cached_property
+    def _target_root(self) -> np.ndarray:
+        return _whitening(self.targets)
+
+    def count(self) -> int:
+        """Number of observations."""
+        points = sum(3 * len(p.index) for p in (self.stations, self.targets) if p is not None)
+        between = len(self.between.distance) if self.between is not None else 0
+        return points + between + sum(len(g.index) for g in self.gauges)
+
+    def add(
+        self, state: State, normal: np.ndarray, before: np.ndarray, right: np.ndarray, width: int
+    ) -> tuple[float, float]:
+        """Add to the reduced normal equations, see `Reduced`; returns cost and moment, of target priors too."""
+        cost = moment = 0.0
+        if self.targets is not None:
+            off = self.targets.observed - state.targets[self.targets.index]
+            cost += float(np.sum(np.einsum("kij,kj->ki", self._target_root, off) ** 2))
+        for columns, jacobian, misclosure in self._dense(state, width):
+            share = np.einsum("kri,krj->kij", jacobian, jacobian)
+            np.add.at(normal, (columns[:, :, None], columns[:, None, :]), share)
+            np.add.at(before, columns, np.einsum("kii->ki", share))
+            np.add.at(right, columns, np.einsum("kri,kr->ki", jacobian, misclosure))
+            cost += float(np.sum(misclosure**2))
+        if self.between is not None:
+            moment = float(np.sum((self.between.distance / self.between.sigma) ** 2))
+        return cost, moment
+
+    def _dense(self, state: State, width: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Columns (k, w), whitened Jacobian (k, r, w) and misclosure (k, r) of each group on stations."""
+        if self.stations is not None:
+            root = self._station_root
+            off = self.stations.observed - state.stations[self.stations.index]
+            yield self.stations.index[:, None] * width + np.arange(3), root, np.einsum("kij,kj->ki", root, off)
+        if self.between is not None:
+            columns, jacobian, off = _between(self.between, state, width)
+            root = 1.0 / self.between.sigma[:, None]
+            yield columns, (jacobian * root)[:, None, :], off[:, None] * root
+        for gauge in self.gauges:
+            root = 1.0 / gauge.sigma[:, None]
+            yield gauge.index[:, None] * width + gauge.column, root[:, :, None], self._off(gauge, state)[:, None] * root
+
+    @staticmethod
+    def _off(gauge: Gauges, state: State) -> np.ndarray:
+        return gauge.start - (state.zero if gauge.column == 3 else state.scale)[gauge.index]
+
+    def fits(self, state: State, q: np.ndarray, target_covariance: np.ndarray, width: int) -> tuple[Fit, ...]:
+        """A fit a group, from the covariances of the stations' parameters q (n, n) and of the targets (T, 3, 3)."""
+        fits = []
+        if self.between is not None:
+            columns, jacobian, off = _between(self.between, state, width)
+            q_own = np.einsum("ki,kij,kj->k", jacobian, q[columns[:, :, None], columns[:, None, :]], jacobian)
+            fits.append(
+                _fit("between stations", off[:, None], self.between.sigma[:, None, None] ** 2, q_own[:, None, None])
+            )
+        if self.stations is not None:
+            columns = self.stations.index[:, None] * width + np.arange(3)
+            q_own = q[columns[:, :, None], columns[:, None, :]]
+            off = self.stations.observed - state.stations[self.stations.index]
+            fits.append(_fit("station priors", off, self.stations.covariance, q_own))
+        if self.targets is not None:
+            off = self.targets.observed - state.targets[self.targets.index]
+            fits.append(_fit("target priors", off, self.targets.covariance, target_covariance[self.targets.index]))
+        for gauge in self.gauges:
+            at = gauge.index * width + gauge.column
+            off = self._off(gauge, state)
+            fits.append(_fit(gauge.name, off[:, None], gauge.sigma[:, None, None] ** 2, q[at, at][:, None, None]))
+        return tuple(fits)
+
+
+def _whitening(priors: PointPriors | None) -> np.ndarray:
+    """(k, 3, 3) inverse Cholesky factors of the priors' covariances."""
+    return np.zeros((0, 3, 3)) if priors is None else np.linalg.inv(np.linalg.cholesky(priors.covariance))
+
+
+def _between(between: StationRanges, state: State, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns (k, 6), Jacobian (k, 6) and residual (k,) of ranges between stations."""
+    along = state.stations[between.second] - state.stations[between.first]
+    length = np.linalg.norm(along, axis=1)
+    with np.errstate(invalid="ignore"):  # stations that coincide have no direction: nan, which the solver reports
+        u = along / length[:, None]
+    xyz = np.arange(3)
+    columns = np.concatenate([between.first[:, None] * width + xyz, between.second[:, None] * width + xyz], axis=1)
+    return columns, np.concatenate([-u, u], axis=1), between.distance - length
+
+
+def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> Fit:
+    """Fit of k direct observations of r values each, correlated inside; q (k, r, r) covariance of the adjusted ones.
+
+    With P = C^-1 and P_v = P - P Q P: w = (P v) / sqrt(diag P_v), redundancy diag(P_v C).
+    """
+    weight = np.linalg.inv(covariance)
+    own = np.einsum("kii->ki", weight)
+    pv = np.einsum("kij,kj->ki", weight, off)
+    seen = weight @ q
+    visible = np.maximum(own - np.einsum("kij,kji->ki", seen, weight), UNCHECKED * own).ravel()
+    redundancy = 1.0 - np.einsum("kii->ki", seen)
+    return Fit(
+        name,
+        np.ones(off.size, dtype=bool),
+        off.ravel(),
+        np.sqrt(np.einsum("kii->ki", covariance)).ravel(),
+        redundancy.ravel(),
+        pv.ravel() / np.sqrt(visible),
+        pv.ravel() / visible,
+        NONCENTRALITY / np.sqrt(visible),
+        float(np.sum(off * pv)),
+    )

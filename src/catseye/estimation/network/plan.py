@@ -1,0 +1,294 @@
+"""A network before it is measured: what it will be worth, where it is weak, and what to measure next.
+
+Everything here follows from geometry and claimed standard uncertainties; no observed value enters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
+from catseye.estimation.least_squares.rows import variances
+from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.observations import Distances
+
+BATCH = 200  # ranges whose effect is computed at once
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The predicted worth of a network.
+
+    solution      the network solved with its predicted observations: covariance, redundancy, detectable errors
+    interest      (n,) bool: points whose mean variance the values below are about
+    mean_u        m, root of the mean variance of a coordinate of those points
+    weakest       (n,) m, largest semi-axis of each point's standard ellipsoid
+    direction     (n, 3) unit vector along it, upwards
+    worth         one (m,) array a group: growth of mean_u were the observation left out, m; infinite where the network
+                  would fall apart
+    candidates    ranges that could be measured besides, best first
+    """
+
+    solution: NetworkSolution
+    interest: np.ndarray
+    mean_u: float
+    weakest: np.ndarray
+    direction: np.ndarray
+    worth: tuple[np.ndarray, ...]
+    candidates: tuple["Candidate", ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A further range between two points.
+
+    from_, to   names
+    u           m, standard uncertainty it would have
+    mean_u      m, of the points of interest with it; for a schedule, with it and all before it
+    gain        m, how much smaller that is
+    at_s        s, when the ranger is done with it; nan outside a schedule
+    """
+
+    from_: str
+    to: str
+    u: float
+    mean_u: float
+    gain: float
+    at_s: float = float("nan")
+
+
+def predicted(network: Network) -> Network:
+    """The network with every observation replaced by what its points and parameters predict.
+
+    Raises EstimationError where a point has no coordinates: a plan needs a place for everything.
+    """
+    points = network.points
+    lost = [name for name, xyz in zip(points.names, points.xyz, strict=True) if not np.isfinite(xyz).all()]
+    if lost:
+        more = f" and {len(lost) - 4} more" if len(lost) > 4 else ""
+        raise EstimationError(
+            f"{', '.join(lost[:4])}{more}: no coordinates (expected approximate ones of every point, to plan with)"
+        )
+    x = np.concatenate([points.xyz.ravel(), [p.start for p in network.parameters]])
+    groups = []
+    for group in network.groups:
+        values = group.predict(x)[0]
+        if not np.isfinite(values).all():
+            raise EstimationError(f"{group.name}: not defined at the planned coordinates; two points may coincide")
+        groups.append(replace(group, observed=values))  # type: ignore[type-var]
+    return replace(network, groups=tuple(groups))
+
+
+def plan(network: Network, *, datum: str | None = None, interest: Sequence[str] | None = None, most: int = 20) -> Plan:
+    """What a network will be worth, and which further ranges would help it most.
+
+    network    coordinates of all points; observed values are not looked at
+    datum      as for `adjust_network`
+    interest   names of the points that matter; all that are not held if None
+    most       candidates to list
+
+    Raises EstimationError where a point has no coordinates, or the network as planned does not hold together: its
+    text is the status that says what floats.
+    """
+    problem = predicted(with_datum(network, datum))
+    solution = adjust_network(problem)
+    if not np.isfinite(solution.covariance).all():
+        raise EstimationError(solution.status)
+    chosen = _interest(solution, interest)
+    values, vectors = np.linalg.eigh(solution.covariance)
+    direction = vectors[:, :, 2] * np.where(vectors[:, 2:, 2] < 0.0, -1.0, 1.0)
+    full = _full(solution)
+    coordinates = np.flatnonzero(np.repeat(chosen, 3))
+    total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
+    return Plan(
+        solution=solution,
+        interest=chosen,
+        mean_u=(total / len(coordinates)) ** 0.5,
+        weakest=np.sqrt(np.maximum(values[:, 2], 0.0)),
+        direction=direction,
+        worth=_worth(solution, full, coordinates, total),
+        candidates=_best(solution, full, coordinates, total, most),
+    )
+
+
+def schedule(
+    chosen: Plan, *, budget_s: float, shot_s: float, most: int = 1000, repeats: bool = True
+) -> tuple[Candidate, ...]:
+    """The ranges to add, in order, while every ranger has time left: each the best after those before it.
+
+    budget_s   s, of every ranger; rangers work side by side
+    shot_s     s, of one range with slewing
+    most       cap of ranges
+    repeats    whether a pair that is measured already, or chosen already, may be measured again
+
+    Greedy: each range is the one that lowers the mean variance most, given those before ([FEDOROV72] calls such
+    steps sequential design). Source: rank-one update of the inverse, Sherman and Morrison 1950.
+    """
+    if not (budget_s > 0.0 and shot_s > 0.0):
+        raise EstimationError(f"budget {budget_s:g} s, shot {shot_s:g} s (expected both above zero)")
+    solution, names = chosen.solution, chosen.solution.network.points.names
+    full = _full(solution).copy()
+    coordinates = np.flatnonzero(np.repeat(chosen.interest, 3))
+    total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
+    pairs, sigma = _pairs(solution, repeats)
+    spent, inside = np.zeros(len(names)), np.repeat(chosen.interest, 3)
+    shown, own = _effects(solution.x, full, coordinates, pairs)
+    unit = _unit(solution.x, pairs) if len(pairs) else np.zeros((0, 3))
+    open_ = np.full(len(pairs), shot_s <= budget_s)
+    picked: list[Candidate] = []
+    while len(picked) < most and open_.any():
+        gains = np.where(open_, shown / (sigma**2 + own), -1.0)
+        best = int(np.argmax(gains))
+        if gains[best] <= 1e-9 * total:
+            break
+        i, j = pairs[best]
+        q, left = _across(solution.x, full, pairs[best : best + 1])[0], sigma[best] ** 2 + own[best]
+        # Q becomes Q - q q' / left; what every other pair sees of it follows from two numbers a pair
+        felt, common = _seen(q, pairs, unit) / left, _seen(full[:, inside] @ q[inside], pairs, unit)
+        shown = np.maximum(shown - 2.0 * felt * common + felt**2 * float(q[inside] @ q[inside]), 0.0)
+        own = np.maximum(own - felt**2 * left, 0.0)
+        full -= np.outer(q, q / left)
+        before, total = total, total - float(gains[best])
+        spent[i] += shot_s
+        count = len(coordinates)
+        after = (max(total, 0.0) / count) ** 0.5
+        gain = (before / count) ** 0.5 - after
+        picked.append(Candidate(names[i], names[j], float(sigma[best]), after, gain, float(spent[i])))
+        open_ &= spent[pairs[:, 0]] + shot_s <= budget_s * (1.0 + 1e-12)
+        open_[best] &= repeats
+    return tuple(picked)
+
+
+def _interest(solution: NetworkSolution, names: Sequence[str] | None) -> np.ndarray:
+    points = solution.network.points
+    if names is None:
+        return np.asarray(~points.fixed.all(axis=1))
+    strange = [name for name in names if name not in solution.index]
+    if strange:
+        raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+    chosen = np.zeros(len(points.names), dtype=bool)
+    chosen[[solution.index[name] for name in names]] = True
+    return chosen
+
+
+def _full(solution: NetworkSolution) -> np.ndarray:
+    """Covariance of all coordinates, whole."""
+    count = 3 * len(solution.network.points.names)
+    if count > LARGEST_MATRIX:
+        raise EstimationError(
+            f"{count // 3} points are too many to weigh every further range (limit {LARGEST_MATRIX // 3}); "
+            "plan with the points of interest and the stations alone"
+        )
+    return solution.q.within(np.arange(count))
+
+
+def _pairs(solution: NetworkSolution, repeats: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (k, 2) of points that could be ranged, and the standard uncertainty (k,) each would have.
+
+    Who ranges now may range to whatever is ranged to now. The uncertainty follows sigma^2 = a^2 + (b D)^2, fitted to
+    the claims of the ranges there are.
+    """
+    network = solution.network
+    ranges = [g for g in network.groups if isinstance(g, Distances)]
+    if not ranges:
+        return np.zeros((0, 2), dtype=int), np.zeros(0)
+    origin, target = (np.concatenate([points_of(g)[k] for g in ranges]) for k in (0, 1))
+    variance = np.concatenate([variances(g) for g in ranges])
+    square = np.sum((solution.x[target] - solution.x[origin]) ** 2, axis=1)
+    from scipy.optimize import nnls
+
+    weight = 1.0 / variance
+    model, _ = nnls(np.stack([weight, square * weight], axis=1), np.ones(len(weight)))
+    pairs = np.stack(np.meshgrid(np.unique(origin), np.unique(target), indexing="ij"), axis=-1).reshape(-1, 2)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    if not repeats:
+        count = len(network.points.names)
+        pairs = pairs[~np.isin(pairs @ (count, 1), np.stack([origin, target], axis=1) @ (count, 1))]
+    far = np.sum((solution.x[pairs[:, 1]] - solution.x[pairs[:, 0]]) ** 2, axis=1)
+    return pairs, np.sqrt(model[0] + model[1] * far)
+
+
+def _unit(x: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    along = x[pairs[:, 1]] - x[pairs[:, 0]]
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def _across(x: np.ndarray, full: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Q a (k, n) of ranges between pairs."""
+    unit = _unit(x, pairs)
+    result = np.zeros((len(pairs), len(full)))
+    for axis in range(3):
+        result += (full[3 * pairs[:, 1] + axis] - full[3 * pairs[:, 0] + axis]) * unit[:, axis, None]
+    return result
+
+
+def _seen(vector: np.ndarray, pairs: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """a'v (k,) of ranges between pairs, v over all coordinates."""
+    v = vector.reshape(-1, 3)
+    return np.sum(unit * (v[pairs[:, 1]] - v[pairs[:, 0]]), axis=1)
+
+
+def _effects(
+    x: np.ndarray, full: np.ndarray, coordinates: np.ndarray, pairs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """|(Q a)_I|^2 over some coordinates, and a'Qa, of each range between pairs.
+
+    Their quotient shown / (sigma^2 + own) is the fall of the sum of variances of these coordinates by that range.
+    """
+    shown, own = np.empty(len(pairs)), np.empty(len(pairs))
+    inside = np.zeros(len(full), dtype=bool)
+    inside[coordinates] = True
+    for low in range(0, len(pairs), BATCH):
+        part = slice(low, low + BATCH)
+        across, unit = _across(x, full, pairs[part]), _unit(x, pairs[part])
+        moved, k = across.reshape(len(across), -1, 3), np.arange(len(across))
+        own[part] = np.sum(unit * (moved[k, pairs[part, 1]] - moved[k, pairs[part, 0]]), axis=1)
+        shown[part] = np.sum(across[:, inside] ** 2, axis=1)
+    return shown, own
+
+
+def _best(
+    solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float, most: int
+) -> tuple[Candidate, ...]:
+    pairs, sigma = _pairs(solution, repeats=True)
+    shown, own = _effects(solution.x, full, coordinates, pairs)
+    gains = shown / (sigma**2 + own)
+    names, count = solution.network.points.names, len(coordinates)
+    now = (total / count) ** 0.5
+    after = np.sqrt(np.maximum(total - gains, 0.0) / count)
+    return tuple(
+        Candidate(names[i], names[j], float(sigma[k]), float(after[k]), float(now - after[k]))
+        for k in np.argsort(-gains, kind="stable")[:most]
+        for i, j in [pairs[k]]
+    )
+
+
+def _worth(
+    solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float
+) -> tuple[np.ndarray, ...]:
+    """Growth of the mean standard uncertainty were one observation left out, m: |(Q a)_I|^2 / (s^2 r)."""
+    x = np.concatenate([solution.x.ravel(), solution.parameters])
+    count, chosen = len(coordinates), np.ascontiguousarray(full[:, coordinates])
+    if len(x) > len(full):  # parameters beside the points are seen too
+        others = solution.q.across(np.arange(len(full), len(x)))[coordinates]
+        chosen = np.concatenate([chosen, others.T])
+    now = (total / count) ** 0.5
+    result = []
+    for group, fit in zip(solution.network.groups, solution.fits, strict=True):
+        slopes = group.predict(x)[1]
+        columns = np.broadcast_to(group.columns, slopes.shape)
+        slopes, columns = np.where(columns < 0, 0.0, slopes), np.maximum(columns, 0)
+        gained = np.empty(len(slopes))
+        for low in range(0, len(slopes), BATCH):
+            part = slice(low, low + BATCH)
+            across = np.zeros((len(slopes[part]), count))
+            for own, at in zip(slopes[part].T, columns[part].T, strict=True):
+                across += chosen[at] * own[:, None]
+            gained[part] = np.einsum("mc,mc->m", across, across)
+        left = fit.sigma**2 * np.where(fit.redundancy > 1e-9, fit.redundancy, 0.0)
+        with np.errstate(divide="ignore"):
+            result.append(np.sqrt((total + gained / left) / count) - now)
+    return tuple(result)

@@ -1,0 +1,214 @@
+"""Positions of many targets from ranges to known stations, by weighted least squares.
+
+The stations are known here; where they are not, the network is adjusted as one (`adjustment`, `network`).
+Every threshold is a pure number: in standard uncertainties, or relative to the size of the stations' figure.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from catseye.errors import EstimationError, InputError
+from catseye.estimation.network.positions import descent
+from catseye.estimation.network.positions.start import SIGNIFICANT, Planes, patterns_of, planes_of, starts
+from catseye.estimation.network.positions.status import TEXTS, Status
+from catseye.estimation.network.positions.trilateration import FLAT
+
+LANES = 2**15  # ranges a chunk of the plain form, so that its arrays stay in the cache
+LANES_COMPILED = 2**18
+COMPILED_FROM = 2_000_000  # ranges: loading numba takes as long as the plain form for these
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Positions of t targets.
+
+    x            (t, 3) m; nan unless the status is FOUND or CONTRADICTING
+    covariance   (t, 3, 3) m^2, a priori (variance factor 1), of stations without uncertainty; nan likewise
+    status       (t,) int8 of `Status`; `text` says it in words
+    ranges       (t,) used for each
+    iterations   (t,) Gauss-Newton steps; 0 where none was tried
+    pvv          (t,) sum of squared residuals in sigmas; nan where none was tried
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    status: np.ndarray
+    ranges: np.ndarray
+    iterations: np.ndarray
+    pvv: np.ndarray
+
+    @property
+    def degrees_of_freedom(self) -> np.ndarray:
+        """(t,) ranges less three; negative where there are too few."""
+        return self.ranges - 3
+
+    def text(self, target: int) -> str:
+        """The status of one target in words: what is wrong and what to do."""
+        status, ranges = Status(self.status[target]), int(self.ranges[target])
+        freedom = ranges - 3 if status == Status.CONTRADICTING else ranges
+        ratio = float(np.sqrt(self.pvv[target] / max(freedom, 1)))
+        return TEXTS[status].format(ranges=ranges, ratio=ratio, iterations=int(self.iterations[target]))
+
+    def require_found(self) -> "Positions":
+        """These positions, or EstimationError that names the first target without one, why, and how many there are."""
+        bad = np.flatnonzero(self.status != Status.FOUND)
+        if len(bad):
+            raise EstimationError(f"target {bad[0]} ({len(bad)} of {len(self.status)} likewise): {self.text(bad[0])}")
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class _Chunk:
+    """Some targets: d (k, s) m, u (1 or k, s) m, near (1 or k, 3) m from the stations' centre or None."""
+
+    d: np.ndarray
+    u: np.ndarray
+    near: np.ndarray | None
+
+    def of(self, lanes: np.ndarray | slice) -> "_Chunk":
+        """Some of them."""
+        u, near = (a if a is None or len(a) == 1 else a[lanes] for a in (self.u, self.near))
+        assert u is not None
+        return _Chunk(np.ascontiguousarray(self.d[lanes]), u, near)
+
+
+def positions(
+    stations: np.ndarray,
+    distances: np.ndarray,
+    sigma: np.ndarray,
+    *,
+    near: np.ndarray | None = None,
+    compiled: bool | None = None,
+    threads: int = 1,
+) -> Positions:
+    """Least-squares positions of many targets, each from its ranges to known stations, with covariance and status.
+
+    stations    (s, 3) m, known: their uncertainty is not in the covariance, for that adjust the network
+    distances   (t, s) m, nan where missing; any subset serves
+    sigma       (s,) or (t, s) m, standard uncertainties of the ranges, independent
+    near        (3,) or (t, 3) m, nan where unknown: a point on the target's side of the stations' plane; used only
+                where the ranges do not tell the two mirror images apart by 5 sigma: the image on that side is taken,
+                without it none is
+    compiled    whether to use the compiled form (None: from two million ranges on); both give the same to rounding
+    threads     that share the work of the compiled form; one is best below a megabyte of ranges
+
+    The start is closed: differences of squared ranges give the place in the principal plane of the stations that see
+    the target, their mean the height, up to its sign. Gauss-Newton goes on from there, damped if it must be, until the
+    curvature of the ranges foresees a next step below 1e-4 sigma. The rank is judged by that curvature too: where one
+    sigma of the position bends the ranges by 0.25 sigma, its height over the plane of the stations is not held.
+    Working memory is bounded; it is a small part of the answer's. Raises InputError for shapes or stations.
+
+    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model); [PARKER04] section 3.1.2 wants it, without equations.
+
+    >>> s = np.array([[0.0, 0, 0], [50, 0, 1], [0, 50, 2], [50, 50, 9]])
+    >>> d = np.linalg.norm(np.array([20.0, 10, 30]) - s, axis=1)
+    >>> found = positions(s, [d, [30.0, 40, np.nan, np.nan]], np.full(4, 1e-4))
+    >>> np.round(found.x[0], 6).tolist(), found.text(1)
+    ([20.0, 10.0, 30.0], 'seen by 2 ranges only: three are needed; measure from another station')
+    """
+    s, targets = _checked(stations, distances, sigma, near)
+    t, m = targets.d.shape
+    if compiled is None:
+        compiled = targets.d.size >= COMPILED_FROM
+    status, ranges, iterations = (np.empty(t, dtype=kind) for kind in (np.int8, np.int32, np.int32))
+    out = Positions(np.empty((t, 3)), np.empty((t, 3, 3)), status, ranges, iterations, np.empty(t))
+    origin = s.mean(axis=0)
+    s = s - origin
+    if targets.near is not None:
+        targets = _Chunk(targets.d, targets.u, targets.near - origin)
+    whole = planes_of(s, np.ones((1, m), dtype=bool))
+    fast = _compiled(s, whole, origin) if compiled and whole.count[0] >= 3 and not whole.collinear[0] else None
+    size = max((LANES_COMPILED if compiled else LANES) // m, 1)
+
+    def work(first: int) -> None:
+        rows = slice(first, first + size)
+        part = Positions(*(getattr(out, f.name)[rows] for f in fields(Positions)))
+        chunk = targets.of(rows)
+        lanes = np.arange(len(chunk.d)) if fast is None else np.flatnonzero(~fast(chunk, part))
+        if len(lanes):
+            _plain(s, chunk if fast is None else chunk.of(lanes), whole=whole, part=part, lanes=lanes)
+            part.x[lanes] += origin
+
+    with ThreadPoolExecutor(threads) as pool:  # the compiled form lets go of the interpreter
+        for _ in pool.map(work, range(0, t, size)) if threads > 1 else map(work, range(0, t, size)):
+            pass
+    return out
+
+
+def _checked(
+    stations: np.ndarray, distances: np.ndarray, sigma: np.ndarray, near: np.ndarray | None
+) -> tuple[np.ndarray, _Chunk]:
+    """The arguments of `positions` as float arrays, or InputError."""
+    s, d, u = (np.asarray(a, dtype=float) for a in (stations, distances, sigma))
+    if s.ndim != 2 or s.shape[1] != 3 or d.ndim != 2 or d.shape[1] != len(s) or not len(s):
+        raise InputError(f"stations {s.shape} and distances {d.shape}: (s, 3) and (t, s) are expected, s at least 1")
+    if not np.isfinite(s).all():
+        raise InputError(f"station {np.flatnonzero(~np.isfinite(s).all(axis=1))[0]} has no finite coordinates")
+    if u.shape not in ((len(s),), d.shape):
+        raise InputError(f"sigma has shape {u.shape}: ({len(s)},) or {d.shape} is expected")
+    if u.ndim == 1 and not ((u > 0.0) & (u < np.inf)).all():
+        i = int(np.flatnonzero(~((u > 0.0) & (u < np.inf)))[0])
+        raise InputError(f"sigma of station {i} is {u[i]} m: positive and finite is expected; mark missing ranges nan")
+    side = None if near is None else np.asarray(near, dtype=float)
+    if side is not None and side.shape not in ((3,), (len(d), 3)):
+        raise InputError(f"near has shape {side.shape}: (3,) or ({len(d)}, 3) is expected")
+    return s, _Chunk(d, np.ascontiguousarray(np.atleast_2d(u)), None if side is None else np.atleast_2d(side))
+
+
+def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Chunk, Positions], np.ndarray]:
+    """The compiled form for these stations: writes a chunk's answers, returns (k,) whether it vouches for them."""
+    from catseye.estimation.network.positions import kernel
+
+    frame = np.concatenate([whole.centre, whole.axes[0], whole.inverse])
+    site = kernel.Site(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)
+    d = descent
+    limits = kernel.Limits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
+
+    def fast(chunk: _Chunk, part: Positions) -> np.ndarray:
+        good = np.empty(len(chunk.d), dtype=bool)
+        near = np.full((1, 3), np.nan) if chunk.near is None else np.ascontiguousarray(chunk.near)
+        answers = kernel.Answers(part.x, part.covariance, part.ranges, part.iterations, part.pvv, good)
+        kernel.locate(kernel.Measured(chunk.d, chunk.u, near), site, limits, answers)
+        part.status[:] = Status.FOUND
+        return good
+
+    return fast
+
+
+def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lanes: np.ndarray) -> None:
+    """Answers of a chunk, written into the lanes of `part`, relative to the stations' centre; for any trouble."""
+    ranges, planes, which, refused = _sorted_out(s, chunk, whole)
+    status = np.select(
+        [refused, planes.count[which] < 3, planes.collinear[which]],
+        [Status.REFUSED, Status.TOO_FEW, Status.COLLINEAR],
+        Status.FOUND,
+    )
+    part.status[lanes], part.ranges[lanes], part.iterations[lanes] = status, ranges.count, 0
+    part.x[lanes], part.covariance[lanes], part.pvv[lanes] = np.nan, np.nan, np.nan
+    possible = np.flatnonzero(status == Status.FOUND)
+    if not len(possible):
+        return
+    ranges, which, lanes = ranges.of(possible), which[possible], lanes[possible]
+    start = starts(planes, which, ranges.d, ranges.u, near=chunk.of(possible).near)
+    found, status = descent.least_squares_positions(ranges, start)
+    answered = status <= Status.CONTRADICTING
+    part.status[lanes], part.pvv[lanes], part.iterations[lanes] = status, found.pvv, found.iterations
+    part.x[lanes[answered]], part.covariance[lanes[answered]] = found.x[answered], found.covariance[answered]
+
+
+def _sorted_out(s: np.ndarray, chunk: _Chunk, whole: Planes) -> tuple[descent.Ranges, Planes, np.ndarray, np.ndarray]:
+    """Ranges with the missing ones made harmless, planes and patterns of what is seen, targets to refuse."""
+    d, u = chunk.d, chunk.u
+    fit = (d >= 0.0) & (d < np.inf) & (u > 0.0) & (u < np.inf)
+    if fit.all():
+        which = np.zeros(len(d), dtype=int)
+        return descent.Ranges(s, d, u, np.full(len(d), len(s))), whole, which, which > 0
+    given = ~np.isnan(d)
+    refused = (given & ~fit).any(axis=1)
+    seen = given & ~refused[:, None]
+    patterns, which = patterns_of(seen)
+    ranges = descent.Ranges(s, np.where(seen, d, 0.0), np.where(seen, u, np.inf), given.sum(axis=1))
+    return ranges, planes_of(s, patterns), which, refused

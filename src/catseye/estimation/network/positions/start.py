@@ -1,0 +1,98 @@
+"""Where a position is sought first, in closed form: in the principal plane of the stations that see the target.
+
+Differences of squared ranges give the foot in that plane, their mean the height over it, up to its sign.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.estimation.network.positions.trilateration import FLAT
+
+SIGNIFICANT = 5.0  # sigmas by which ranges must tell one mirror image from the other
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The principal plane of the stations of each of p patterns of visibility.
+
+    centre, axes   (p, 3), (p, 3, 3) of their figure: centroid, and directions by falling extent; the last is the normal
+    rows           (p, 3, s): their products with `half_square - d^2 / 2` are the target's coordinates along the axes
+    half_square    (p, s) half the squared distance of each station from the centre; 0 where it does not see
+    inverse        (p, 3) reciprocals of the sums of squares along the axes; infinite where the figure is flat
+    count          (p,) stations that see
+    collinear      (p,) they stand on one line
+    """
+
+    centre: np.ndarray
+    axes: np.ndarray
+    rows: np.ndarray
+    half_square: np.ndarray
+    inverse: np.ndarray
+    count: np.ndarray
+    collinear: np.ndarray
+
+
+def planes_of(s: np.ndarray, patterns: np.ndarray) -> Planes:
+    """With q_i = s_i - centre, z from the centre: q_i.z = (z^2 + q_i^2 - d_i^2) / 2, and sum q_i = 0 rids it of z^2."""
+    count = patterns.sum(axis=1)
+    centre = patterns @ s / np.maximum(count, 1)[:, None]
+    q = (s - centre[:, None]) * patterns[..., None]
+    extent, vectors = np.linalg.eigh(np.swapaxes(q, 1, 2) @ q)
+    extent, axes = extent[:, ::-1], np.swapaxes(vectors, 1, 2)[:, ::-1]
+    held = extent > FLAT * extent[:, :1]
+    inverse = np.where(held, 1.0 / np.where(held, extent, 1.0), np.inf)
+    rows = axes @ np.swapaxes(q, 1, 2) * np.where(held, inverse, 0.0)[..., None]
+    return Planes(centre, axes, rows, np.sum(q * q, axis=2) / 2, inverse, count, ~held[:, 1])
+
+
+def patterns_of(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The distinct rows (p, s) of a table of bools, and which of them each row is."""
+    bits = np.packbits(seen, axis=1)
+    keys = np.zeros((len(bits), -(-bits.shape[1] // 8) * 8), dtype=np.uint8)
+    keys[:, : bits.shape[1]] = bits
+    words = keys.view(np.uint64)
+    words = words[:, 0] if words.shape[1] == 1 else np.ascontiguousarray(words).view(f"V{8 * words.shape[1]}")[:, 0]
+    _, index, which = np.unique(words, return_index=True, return_inverse=True)
+    return seen[index], which
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Foot in the stations' plane (k, 3), height over it (k,) up to its sign, the normal (k, 3), and the sign (k,) that
+    the ranges tell, else that of the side where the target is known to be, else 0; and that side itself."""
+
+    foot: np.ndarray
+    height: np.ndarray
+    normal: np.ndarray
+    sign: np.ndarray
+    side: np.ndarray
+
+    def of(self, lanes: np.ndarray) -> "Starts":
+        """Those of some of the targets."""
+        return Starts(self.foot[lanes], self.height[lanes], self.normal[lanes], self.sign[lanes], self.side[lanes])
+
+
+def starts(planes: Planes, which: np.ndarray, d: np.ndarray, u: np.ndarray, *, near: np.ndarray | None) -> Starts:
+    """The closed form for targets of patterns `which` (k,), d and u as in `descent.Ranges`, near (1 or k, 3).
+
+    The height comes from the mean square of the ranges, or from the stations' own spread along the normal, which also
+    tells the sign: whichever is better known, with u^2 of 1 / n + z1^2 / E1 + z2^2 / E2 against z3^2 / E3, E the sums
+    of squares of the stations along their axes.
+    """
+    one = len(planes.count) == 1  # what all share is not copied for each
+    y = (planes.half_square[0] if one else planes.half_square[which]) - d * d / 2
+    z = y @ planes.rows[0].T if one else np.einsum("ks,kcs->kc", y, planes.rows[which])
+    lever = planes.rows[0, 2] if one else planes.rows[which, 2]
+    variance = np.sum((lever * d * np.where(u < np.inf, u, 0.0)) ** 2, axis=1)
+    square = -2.0 * y.sum(axis=1) / planes.count[which] - z[:, 0] ** 2 - z[:, 1] ** 2
+    told = z[:, 2] ** 2 > SIGNIFICANT**2 * variance
+    bound = np.minimum(planes.inverse[which], 1e200)  # finite, so that nothing times it is nothing
+    level = 1.0 / planes.count[which] + np.sum(z[:, :2] ** 2 * bound[:, :2], axis=1)
+    spread = told & ((square < 0.25 * z[:, 2] ** 2) | (z[:, 2] ** 2 * bound[:, 2] < level))
+    height = np.where(spread, np.abs(z[:, 2]), np.sqrt(np.maximum(square, 0.0)))
+    foot = planes.centre[which] + np.einsum("kc,kca->ka", z[:, :2], planes.axes[which, :2])
+    normal, side = planes.axes[which, 2], np.zeros(len(d))
+    if near is not None:
+        side = np.nan_to_num(np.sign(np.sum((near - planes.centre[which]) * normal, axis=1)))
+    return Starts(foot, height, normal, np.where(told, np.sign(z[:, 2]), side), side)

@@ -1,0 +1,82 @@
+"""The covariance of a ranging solution over the parameter vector of its network."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from catseye.estimation.network.multilateration.solution import Mapped, RangingSolution
+
+ROWS = 5_000  # observations whose products are formed at once
+
+
+@dataclass(frozen=True, eq=False)
+class RangingCovariance:
+    """See `covariance.Covariance`: stations' parameters held whole, targets by how they follow them.
+
+    solution          the answer
+    station, target   (points,) index among its stations, or targets; -1
+    zero, scale       (stations,) which parameter of the network it is, counted after the points; -1
+    """
+
+    solution: RangingSolution
+    station: np.ndarray
+    target: np.ndarray
+    zero: np.ndarray
+    scale: np.ndarray
+
+    @cached_property
+    def _own(self) -> np.ndarray:
+        """(N,) where each parameter of the network stands among the stations' parameters; -1 for targets'."""
+        count, width = len(self.station), self.solution.width
+        used = sum(int(np.sum(c >= 0)) for c in (self.zero, self.scale))
+        place = np.full(3 * count + used, -1)
+        at = np.flatnonzero(self.station >= 0)
+        place[3 * at[:, None] + np.arange(3)] = self.station[at][:, None] * width + np.arange(3)
+        for k, columns in ((3, self.zero), (4, self.scale)):
+            mine = np.flatnonzero(columns >= 0)
+            place[3 * count + columns[mine]] = mine * width + k
+        return place
+
+    @cached_property
+    def _all(self) -> Mapped:
+        own, n = self._own, len(self.solution.covariance)
+        maps, target = np.zeros((len(own), n)), np.full(len(own), -1)
+        mine, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
+        maps[mine, own[mine]] = 1.0
+        target[late] = self.target[late // 3]
+        maps[late] = self.solution.following(np.arange(len(self.solution.targets)))[target[late], late % 3]
+        return Mapped(maps, target, np.arange(len(own)) % 3)
+
+    def matrix(self) -> np.ndarray:
+        return self.solution.joined(self._all, self._all)
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        return self.solution.joined(self._all, self._all[columns])
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        chosen = self._all[columns]
+        return self.solution.joined(chosen, chosen)
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Rows of the stations' parameters and of one target's coordinates."""
+        at, a, everything = np.maximum(columns, 0), np.where(columns < 0, 0.0, a), self._all
+        result = np.empty(at.shape)
+        for low in range(0, len(at), ROWS):
+            part = slice(low, low + ROWS)
+            result[part] = self.solution.products(everything[at[part]], a[part])
+        return result
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        result = np.empty((len(self.station), 3, 3))
+        result[self.station >= 0] = self.solution.covariance_stations
+        result[self.target >= 0] = self.solution.covariance_targets
+        return result[first // 3]
+
+    def diagonal(self) -> np.ndarray:
+        own = self._own
+        result = np.empty(len(own))
+        late = np.flatnonzero(own < 0)
+        result[own >= 0] = np.diag(self.solution.covariance)[own[own >= 0]]
+        result[late] = self.solution.covariance_targets[self.target[late // 3], late % 3, late % 3]
+        return result

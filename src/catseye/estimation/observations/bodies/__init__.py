@@ -1,0 +1,1 @@
+"""Conditions on bodies: rigid bodies, planes, lines, spheres, moving frames."""

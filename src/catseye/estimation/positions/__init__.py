@@ -1,6 +1,0 @@
-"""Positions of many targets from ranges to known stations."""
-
-from catseye.estimation.positions.dispatch import Positions, positions
-from catseye.estimation.positions.status import TEXTS, Status
-
-__all__ = ["TEXTS", "Positions", "Status", "positions"]

@@ -1,0 +1,1 @@
+"""How good an answer is: covariance, ellipsoids, reliability, robustness, variance components."""

@@ -1,0 +1,394 @@
+"""Reliability: tests of single observations and of the whole, what they can find, and what escapes them.
+
+w tests trust the claimed sigmas: w = standardised residual, N(0, 1). tau tests take sigma from the same adjustment:
+tau = w / s0, never more than the root of the degrees of freedom. Of an unchecked observation (nothing else would show
+its error) no test says anything: it is named unchecked, never accepted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtr, chdtrc, chdtri, nctdtr, ndtr, ndtri, stdtr, stdtrit
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+
+UNCHECKED = 1e-4  # sigma^2 over the variance of the estimated error below which w is a ratio of rounding and curvature
+
+ACCEPTED = "accepted"
+SUSPECT = "suspect"
+NOT_CHECKED = "unchecked: no other observation would show its error"
+LEFT_OUT = "left out"
+TOO_LARGE = "too large: observations are worse than claimed, wrong ones among them, or something is not modelled"
+TOO_SMALL = "too small: observations are better than claimed"
+NO_REDUNDANCY = "not tested: no degrees of freedom"
+
+
+def w_probability(w: np.ndarray) -> np.ndarray:
+    """Two-sided p-value of each w, sigma known.
+
+    Source: [BAARDA68] (the conventional alternative hypothesis, one observation wrong).
+
+    >>> round(float(w_probability(np.array(-3.2905267))), 6)
+    0.001
+    """
+    return 2.0 * ndtr(-np.abs(w))
+
+
+def tau_probability(tau: np.ndarray, degrees_of_freedom: float) -> np.ndarray:
+    """Two-sided p-value of each tau = w / s0, s0^2 = [pvv] / degrees of freedom of the same adjustment.
+
+    tau                  (...)
+    degrees_of_freedom   f, more than 1: with one, every |tau| is 1
+
+    t = tau sqrt((f - 1) / (f - tau^2)) is Student's with f - 1 degrees of freedom, exactly.
+    Raises EstimationError for f <= 1 or |tau| beyond sqrt(f), which no adjustment gives.
+
+    Source: [POPE76] (tau and its relation to Student's t).
+    """
+    f = _at_least_one(degrees_of_freedom)
+    square = np.square(np.asarray(tau, dtype=float))
+    if np.any(square > f * (1.0 + 1e-9)):
+        raise EstimationError(
+            f"tau of {np.sqrt(square.max()):.6g} is beyond the root of {f:g} degrees of freedom; "
+            "the variance factor belongs to another adjustment"
+        )
+    with np.errstate(divide="ignore"):  # at the very end t is infinite and p is zero
+        return 2.0 * stdtr(f - 1.0, -np.sqrt(square * (f - 1.0) / np.maximum(f - square, 0.0)))
+
+
+def w_critical(level: float) -> float:
+    """|w| exceeded with probability `level`, both sides together.
+
+    Source: [BAARDA68].
+
+    >>> round(w_critical(0.001), 4)
+    3.2905
+    """
+    return float(-ndtri(0.5 * _probability("level", level)))
+
+
+def tau_critical(level: float, degrees_of_freedom: float) -> float:
+    """|tau| exceeded with probability `level`, both sides together; EstimationError for f <= 1.
+
+    Source: [POPE76] (tau and its relation to Student's t).
+
+    >>> round(tau_critical(0.05, 10.0), 4)
+    1.9039
+    """
+    f = _at_least_one(degrees_of_freedom)
+    t = -float(stdtrit(f - 1.0, 0.5 * _probability("level", level)))
+    return float(np.sqrt(f) * t / np.sqrt(f - 1.0 + t * t))
+
+
+def _at_least_one(degrees_of_freedom: float) -> float:
+    if not degrees_of_freedom > 1.0:
+        raise EstimationError(
+            f"a tau test needs more than 1 degree of freedom, there are {degrees_of_freedom:.3g}; use the w test"
+        )
+    return float(degrees_of_freedom)
+
+
+def _probability(name: str, value: float) -> float:
+    if not 0.0 < value < 1.0:
+        raise EstimationError(f"{name} {value:g} is no probability between 0 and 1")
+    return float(value)
+
+
+def single_level(family_level: float, tests: int, correction: str = "sidak") -> float:
+    """Level of each of m tests, so that the chance of any false alarm among them is at most `family_level`.
+
+    family_level   0 to 1
+    tests          m
+    correction     "sidak": 1 - (1 - level)^(1/m), exact for independent w, safe for w with any correlations;
+                   "bonferroni": level / m, safe for anything, tau too; "none": family_level itself
+
+    Source: [SIDAK67] theorem 1.
+
+    >>> round(single_level(0.05, 480), 9)
+    0.000106855
+    """
+    level = _probability("family level", family_level)
+    if tests < 1:
+        raise EstimationError("no observation is checked by others, so none can be tested")
+    if correction == "sidak":
+        return float(-np.expm1(np.log1p(-level) / tests))
+    if correction in ("bonferroni", "none"):
+        return level / tests if correction == "bonferroni" else level
+    raise EstimationError(f"correction {correction!r} has no level of a single test; known: sidak, bonferroni, none")
+
+
+def adjusted_probability(p: np.ndarray, correction: str = "sidak") -> np.ndarray:
+    """p-values (m,) corrected for their number: below a family level exactly where the corrected test rejects.
+
+    correction   as `single_level`; or "benjamini-hochberg": the level is then the share of false alarms among alarms
+
+    Benjamini and Hochberg's is proven for independent tests and positive dependence; elsewhere it is a guide.
+
+    Source: [SIDAK67] theorem 1; [BENJAMINI95] section 3.
+
+    >>> adjusted_probability(np.array([0.01, 0.04, 0.03]), "benjamini-hochberg")
+    array([0.03, 0.04, 0.04])
+    """
+    p = np.asarray(p, dtype=float)
+    m = len(p)
+    if correction == "sidak":
+        with np.errstate(divide="ignore"):  # a p of 1 stays 1
+            return -np.expm1(m * np.log1p(-p))
+    if correction == "bonferroni":
+        return np.minimum(m * p, 1.0)
+    if correction == "benjamini-hochberg":
+        order = np.argsort(p)[::-1]
+        stepped = np.minimum.accumulate(p[order] * m / np.arange(m, 0, -1))
+        return np.minimum(stepped[np.argsort(order)], 1.0)
+    if correction == "none":
+        return p
+    raise EstimationError(f"correction {correction!r} is unknown; known: sidak, bonferroni, benjamini-hochberg, none")
+
+
+def power(noncentrality: float, level: float, degrees_of_freedom: float = np.inf) -> float:
+    """Probability that the two-sided test finds an error of `noncentrality` standard uncertainties of its estimate.
+
+    noncentrality        error of the observation over the standard uncertainty of its estimated error
+    level                of the single test
+    degrees_of_freedom   finite for the tau test; infinite for the w test
+
+    Source: [BAARDA68]; for tau the equivalent t test with one degree of freedom less, [POPE76].
+
+    >>> round(power(4.1321, 0.001), 4)
+    0.8
+    """
+    if np.isinf(degrees_of_freedom):
+        k = w_critical(level)
+        return float(ndtr(noncentrality - k) + ndtr(-noncentrality - k))
+    f = _at_least_one(degrees_of_freedom) - 1.0
+    t = -float(stdtrit(f, 0.5 * _probability("level", level)))
+    return float(1.0 - nctdtr(f, noncentrality, t) + nctdtr(f, noncentrality, -t))
+
+
+def noncentrality(level: float, wanted_power: float, degrees_of_freedom: float = np.inf) -> float:
+    """Baarda's delta_0: the noncentrality at which the two-sided test of this level has the wanted power.
+
+    Solved exactly, both tails counted; arguments as `power`. Raises EstimationError for a power not above the level.
+
+    Source: [BAARDA68].
+
+    >>> round(noncentrality(0.001, 0.80), 4)
+    4.1321
+    """
+    if not _probability("level", level) < _probability("power", wanted_power):
+        raise EstimationError(f"a power of {wanted_power:g} is not above the level {level:g}: nothing to be found")
+    low, high = 0.0, 1.0
+    while power(high, level, degrees_of_freedom) < wanted_power:
+        low, high = high, 2.0 * high
+    for _ in range(60):  # halved to rounding; the power grows with the noncentrality
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if power(middle, level, degrees_of_freedom) < wanted_power else (low, middle)
+    return 0.5 * (low + high)
+
+
+def detectable_bias(sigma: np.ndarray, redundancy: np.ndarray, delta0: float) -> np.ndarray:
+    """Smallest error that the test finds (internal reliability), in the observation's unit; infinite if unchecked.
+
+    sigma        (...) standard uncertainty of the observation
+    redundancy   (...) its redundancy number, independent observations
+    delta0       `noncentrality`
+
+    Source: [BAARDA68]; [FOERSTNER16] chapter 4, detectability.
+
+    >>> detectable_bias(1e-4, np.array([0.25, 0.0]), 4.0)
+    array([0.0008,    inf])
+    """
+    checked = np.asarray(redundancy) >= UNCHECKED
+    return np.where(checked, delta0 * sigma / np.sqrt(np.where(checked, redundancy, 1.0)), np.inf)
+
+
+def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
+    """Effect of the largest undetected error (external reliability): on any function of the parameters, at most this
+    many of its standard uncertainties; infinite if unchecked.
+
+    redundancy   (...) of independent observations
+    delta0       `noncentrality`
+
+    Source: [BAARDA68]; [FOERSTNER16] chapter 4, sensitivity.
+
+    >>> bias_to_noise(np.array([0.5, 0.0]), 4.0)
+    array([ 4., inf])
+    """
+    r = np.asarray(redundancy, dtype=float)
+    checked = r >= UNCHECKED
+    return np.where(checked, delta0 * np.sqrt(np.maximum(1.0 - r, 0.0) / np.where(checked, r, 1.0)), np.inf)
+
+
+def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """What an error of each observation alone does to the parameters: rows of (Q A' P) times the error.
+
+    q            (n, n) covariance of the parameters
+    jacobian     (m, n)
+    covariance   of the observations: (m,) variances of independent ones, or (m, m)
+    bias         (m,) errors, such as detectable ones; where infinite (unchecked) the effect is infinite or 0
+
+    Returns (m, n): row i is the change of the parameters by bias i, its sign with it.
+
+    Source: [BAARDA68] (external reliability); [FOERSTNER16] chapter 4.
+    """
+    if np.ndim(covariance) == 1:
+        gain = (jacobian / np.asarray(covariance)[:, None]) @ q
+    else:
+        gain = np.linalg.solve(covariance, jacobian @ q)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(gain) > 1e-12 * np.abs(gain).max(initial=0.0), gain * np.asarray(bias)[:, None], 0.0)
+
+
+def worst_effects(effects: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which observation's undetected error moves each point most, and how far.
+
+    effects   (m, 3k) of `effects_of_bias`, for the coordinates of k points
+
+    Returns (k,) rows and (k,) lengths, m.
+    """
+    length = np.linalg.norm(effects.reshape(len(effects), -1, 3), axis=2)
+    worst = np.argmax(length, axis=0)
+    return worst, length[worst, np.arange(length.shape[1])]
+
+
+@dataclass(frozen=True)
+class GlobalTest:
+    """Two-sided test of the variance factor against its a-priori value 1.
+
+    factor        [pvv] / degrees of freedom
+    lower, upper  the interval in which it must lie; it depends on the degrees of freedom and the level alone
+    p             two-sided p-value; nan without redundancy
+    verdict       "accepted", or what it means
+    """
+
+    factor: float
+    lower: float
+    upper: float
+    p: float
+    verdict: str
+
+
+def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> GlobalTest:
+    """Chi-square test of [pvv] against the claimed sigmas, both sides: it fails where they are wrong.
+
+    pvv                  v' C^-1 v
+    degrees_of_freedom   f, need not be whole
+    level                chance of a false alarm
+
+    The interval is about the a-priori value 1. One about [pvv] / f itself (a known bug elsewhere) could never fail.
+
+    Source: [BAARDA68] (overall model test); [FOERSTNER16] chapter 4.
+
+    >>> global_test(20.0, 10.0).verdict, round(global_test(20.0, 10.0).upper, 4)
+    ('accepted', 2.0483)
+    """
+    f, half = float(degrees_of_freedom), 0.5 * _probability("level", level)
+    if not f > 1e-9:
+        return GlobalTest(np.nan, np.nan, np.nan, np.nan, NO_REDUNDANCY)
+    lower, upper = float(chdtri(f, 1.0 - half)) / f, float(chdtri(f, half)) / f
+    below, above = float(chdtr(f, pvv)), float(chdtrc(f, pvv))
+    verdict = TOO_LARGE if above < half else TOO_SMALL if below < half else ACCEPTED
+    return GlobalTest(pvv / f, lower, upper, min(2.0 * min(below, above), 1.0), verdict)
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationTests:
+    """Tests of all observations; tuples with one (m,) array a group.
+
+    statistic   w, or tau where sigma was estimated; nan of the unchecked and of those left out
+    p           its p-value; nan likewise
+    adjusted    p corrected for the number of tests
+    verdict     (m,) texts: ACCEPTED, SUSPECT, NOT_CHECKED or LEFT_OUT
+    tests       how many were made
+    """
+
+    statistic: tuple[np.ndarray, ...]
+    p: tuple[np.ndarray, ...]
+    adjusted: tuple[np.ndarray, ...]
+    verdict: tuple[np.ndarray, ...]
+    tests: int
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An observation that the tests reject: group and row, statistic, p-values, estimated and detectable error."""
+
+    group: int
+    row: int
+    statistic: float
+    p: float
+    adjusted: float
+    estimated_error: float
+    detectable_error: float
+
+
+def checked(fit: Fit) -> np.ndarray:
+    """Which (m,) observations the others check; right with correlations too, where redundancy numbers mislead."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return fit.sigma**2 > UNCHECKED * (fit.detectable_error / NONCENTRALITY) ** 2
+
+
+def observation_tests(
+    fits: Sequence[Fit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
+) -> ObservationTests:
+    """The test of every observation of an adjustment, corrected for their number.
+
+    fits          all groups of one adjustment
+    level         of the family: the chance of any false alarm (of the share of false ones, "benjamini-hochberg")
+    correction    as `adjusted_probability`
+    known_sigma   True: w tests; False: tau tests with the variance factor of all groups together
+
+    Source: [BAARDA68]; [POPE76]; [SIDAK67]; [BENJAMINI95].
+    """
+    tested = [f.active & checked(f) & np.isfinite(f.standardised) for f in fits]
+    statistic = [np.where(t, f.standardised, np.nan) for t, f in zip(tested, fits, strict=True)]
+    together = np.concatenate([s[t] for s, t in zip(statistic, tested, strict=True)] or [np.zeros(0)])
+    if known_sigma:
+        p = w_probability(together)
+    else:
+        degrees = float(sum(np.sum(f.redundancy[f.active]) for f in fits))
+        s0 = np.sqrt(sum(f.pvv for f in fits) / _at_least_one(degrees))
+        statistic, together = [s / s0 for s in statistic], together / s0
+        p = tau_probability(together, degrees)
+    cuts = np.cumsum([np.count_nonzero(t) for t in tested])[:-1]
+    spread = [(np.split(values, cuts)) for values in (p, adjusted_probability(p, correction))]
+    values = [[_filled(t, part) for t, part in zip(tested, parts, strict=True)] for parts in spread]
+    verdict = [
+        np.where(~f.active, LEFT_OUT, np.where(~t, NOT_CHECKED, np.where(a < level, SUSPECT, ACCEPTED)))
+        for f, t, a in zip(fits, tested, values[1], strict=True)
+    ]
+    return ObservationTests(tuple(statistic), tuple(values[0]), tuple(values[1]), tuple(verdict), len(together))
+
+
+def _filled(where: np.ndarray, values: np.ndarray) -> np.ndarray:
+    full = np.full(len(where), np.nan)
+    full[where] = values
+    return full
+
+
+def suspects(
+    fits: Sequence[Fit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
+) -> list[Suspect]:
+    """Observations that the tests reject, worst first; arguments as `observation_tests`.
+
+    One wrong observation can make its neighbours suspect too; `robustness.snoop` tells them apart.
+
+    Source: [BAARDA68]; [POPE76].
+    """
+    tests = observation_tests(fits, level=level, correction=correction, known_sigma=known_sigma)
+    found = [
+        Suspect(
+            group=i,
+            row=int(k),
+            statistic=float(tests.statistic[i][k]),
+            p=float(tests.p[i][k]),
+            adjusted=float(tests.adjusted[i][k]),
+            estimated_error=float(fit.estimated_error[k]),
+            detectable_error=float(fit.detectable_error[k]),
+        )
+        for i, fit in enumerate(fits)
+        for k in np.flatnonzero(tests.verdict[i] == SUSPECT)
+    ]
+    return sorted(found, key=lambda s: (s.p, -abs(s.statistic)))

@@ -1,0 +1,1 @@
+"""Paraboloids, poses, fields over a surface."""

@@ -1,0 +1,308 @@
+"""The pose of a group of points: its rigid motion from one epoch, or from its design, to another, in six numbers.
+
+Six numbers mean nothing without the frame of their axes and the pivot about which the group turns; both are part of a
+`Pose` and can be changed, and the covariance follows. The fit is `rigid_body.fit_transformation`. A point that moved
+on its own against the others can be found (robust start) or named (single tests) and is left out whole.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from catseye.errors import EstimationError, FrameError
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
+from catseye.estimation.quality.robustness import estimate_robustly
+from catseye.estimation.shapes.rigid_body import (
+    CONVERGED,
+    POINTS,
+    Transformation,
+    fit_transformation,
+    motion_columns,
+    turned_covariance,
+)
+from catseye.geometry.frame import Transform
+
+COMPONENTS = tuple(f"{kind} {axis}" for kind in ("translation", "rotation") for axis in "xyz")
+METHODS = ("l1", "huber", "igg3", "biweight")
+LIMIT = 4.0  # |w| from which a coordinate speaks against its point: one good coordinate in 16 000
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a group of points is against where it was: second = pivot + translation + R (first - pivot).
+
+    frame         whose axes all numbers are in
+    motion        the fit: pivot, translation, matrix, covariance (6, 6), residuals, status
+    names         n, of the points that count, in the order of the residuals
+    gain          (6, 3n): small changes of second less first, turned with the motion, to changes of the six numbers
+    w             (n,) largest |w| of a point's three coordinates; nan where nothing checks it
+    p             chance of such a sum of squares or a larger one, if the group is rigid; nan without redundancy
+    left_out      name: its largest |w| against all that count
+    """
+
+    frame: str
+    motion: Transformation
+    names: tuple[str, ...]
+    gain: np.ndarray
+    w: np.ndarray
+    p: float
+    left_out: dict[str, float]
+
+    @property
+    def pivot(self) -> np.ndarray:
+        """(3,) m."""
+        return self.motion.pivot
+
+    @property
+    def translation(self) -> np.ndarray:
+        """(3,) m, of the pivot."""
+        return self.motion.translation
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """(3,) rad, rotation vector, right-hand rule."""
+        return self.motion.rotation
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(6, 6) m and rad, translation then rotation (a further small turn about the frame's axes)."""
+        return self.motion.covariance
+
+    @property
+    def u(self) -> np.ndarray:
+        """(6,) standard uncertainties of translation and rotation, m and rad."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def about(self, pivot: np.ndarray) -> "Pose":
+        """The same motion about another pivot (3,) m: no point goes elsewhere, the covariance follows. Exact."""
+        move = pivot_change(np.asarray(pivot, dtype=float) - self.pivot, self.motion.matrix)
+        return replace(self, motion=self.motion.about(pivot), gain=move @ self.gain)
+
+    def in_frame(self, to_from: Transform) -> "Pose":
+        """The same motion in other axes: pivot, translation, rotation and covariance follow. Exact.
+
+        to_from   from this pose's frame; raises FrameError where it starts elsewhere
+        """
+        if to_from.from_ != self.frame:
+            raise FrameError(f"a pose in the frame '{self.frame}' cannot be told by {to_from}")
+        turn, m = to_from.rotation, self.motion
+        both = np.kron(np.eye(2), turn)
+        moved = replace(
+            m,
+            pivot=to_from.points(m.pivot),
+            translation=turn @ m.translation,
+            matrix=turn @ m.matrix @ turn.T,
+            covariance=both @ m.covariance @ both.T,
+            residual=m.residual @ turn.T,
+        )
+        gain = turned_covariance(both @ self.gain, turn, columns=True)
+        return replace(self, frame=to_from.to, motion=moved, gain=gain)
+
+    def displacement(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far points (k, 3) m of the first place go, (k, 3) m, with the covariance (3k, 3k) of the pose alone."""
+        x = np.asarray(points, dtype=float)
+        columns = motion_columns((x - self.pivot) @ self.motion.matrix.T, np.zeros(3))[:, :6]
+        return self.motion.apply(x) - x, columns @ self.covariance @ columns.T
+
+
+def fit_pose(
+    names: Sequence[str],
+    first: np.ndarray,
+    second: np.ndarray,
+    *,
+    frame: str,
+    covariance_first: np.ndarray | None = None,
+    covariance_second: np.ndarray | None = None,
+    cross: np.ndarray | None = None,
+    pivot: np.ndarray | None = None,
+    robust: str | None = None,
+    limit: float = LIMIT,
+) -> Pose:
+    """The rigid motion that takes a group's first places to its second, weighted, with full covariance.
+
+    names               n, of the points
+    first, second       (n, 3) m, in the frame
+    frame               whose axes they are in
+    covariance_first    (3n, 3n) m^2, may be singular; None: exact, as a design
+    covariance_second   likewise; one of the two at least
+    cross               (3n, 3n) m^2, of the first (rows) with the second (columns), if any
+    pivot               (3,) m, about which the rotation is told; the points' mean if None
+    robust              None keeps every point; one of METHODS leaves out points that moved on their own: an L1 start,
+                        then that method's weights, by `robustness.estimate_robustly`; what it rejects goes whole
+    limit               |w| of a coordinate beyond which `robust` rejects
+
+    After a robust start the points that stay count fully, so the covariance is that of plain least squares with them;
+    that they were chosen is not in it. Raises EstimationError as `fit_transformation`.
+    """
+    called = tuple(names)
+    if covariance_first is None and covariance_second is None:
+        raise EstimationError("a pose needs the covariance of one epoch at least, both are missing")
+    if robust is not None and robust not in METHODS:
+        raise EstimationError(f"robust method {robust!r} is none of {', '.join(METHODS)}")
+    x, y = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    size = (3 * len(called), 3 * len(called))
+    zero = np.zeros(size)
+    given = [zero if q is None else np.asarray(q, dtype=float) for q in (covariance_first, covariance_second, cross)]
+    if any(q.shape != size for q in given):
+        shapes = ", ".join(str(q.shape) for q in given)
+        raise EstimationError(f"covariances of {len(called)} points have shapes {shapes} (expected {size})")
+    where = x.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
+    problem = _Problem(called, x, y, given[0], given[1], given[2], where)
+    keep, statistic = np.ones(len(called), dtype=bool), np.zeros(len(called))
+    if robust is not None and len(called) > POINTS["rigid"]:
+        keep, statistic = _kept(problem, robust, limit)
+    chosen = problem.of(keep)
+    motion = chosen.fit()
+    linear = chosen.linear(motion)
+    return Pose(
+        frame=frame,
+        motion=motion,
+        names=chosen.names,
+        gain=linear.gain,
+        w=_largest_w(linear),
+        p=_chance(motion),
+        left_out={name: float(w) for name, w, k in zip(called, statistic, keep, strict=True) if not k},
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Points of two epochs with their covariances; `fit` and `linear` solve for the motion."""
+
+    names: tuple[str, ...]
+    x: np.ndarray
+    y: np.ndarray
+    qx: np.ndarray
+    qy: np.ndarray
+    cross: np.ndarray
+    pivot: np.ndarray
+
+    def of(self, keep: np.ndarray) -> "_Problem":
+        """The same with some points (n,) bool only."""
+        rows = np.flatnonzero(np.repeat(keep, 3))
+        at = np.ix_(rows, rows)
+        names = tuple(n for n, k in zip(self.names, keep, strict=True) if k)
+        return replace(
+            self, names=names, x=self.x[keep], y=self.y[keep], qx=self.qx[at], qy=self.qy[at], cross=self.cross[at]
+        )
+
+    def fit(self, extra: np.ndarray | None = None) -> Transformation:
+        """The motion; `extra` (3n,) m^2 adds to the variances of the second epoch."""
+        return fit_transformation(
+            self.x,
+            self.y,
+            covariance_first=self.qx,
+            covariance_second=self.qy if extra is None else self.qy + np.diag(extra),
+            cross=self.cross,
+            pivot=self.pivot,
+            names=self.names,
+        )
+
+    def spread(self, matrix: np.ndarray) -> np.ndarray:
+        """Covariance (3n, 3n) of second less turned first."""
+        shared = turned_covariance(self.cross, matrix, columns=False)
+        both = turned_covariance(turned_covariance(self.qx, matrix, columns=True), matrix, columns=False)
+        return np.asarray(self.qy + both - shared - shared.T)
+
+    def linear(self, motion: Transformation, extra: np.ndarray | None = None) -> LinearEstimate:
+        """The linear estimate at the motion's end, for its gain and weights."""
+        spread = self.spread(motion.matrix)
+        if extra is not None:
+            spread = spread + np.diag(extra)
+        columns = motion_columns((self.x - self.pivot) @ motion.matrix.T, np.zeros(3))[:, :6]
+        rows = [f"{name} {axis}" for name in self.names for axis in "xyz"]
+        return best_linear_estimate(columns, motion.residual.ravel(), spread, parameters=COMPONENTS, rows=rows)
+
+
+def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) bool which points stay, and (n,) the largest |w| of each, nothing being left out for being unchecked."""
+    sigma = np.sqrt(np.diag(problem.spread(np.eye(3))))
+
+    def solve(inflation: Sequence[np.ndarray]) -> list[Fit]:
+        (factor,) = inflation
+        extra = (np.square(factor) - 1.0) * sigma**2
+        motion = problem.fit(extra)
+        return [_fit(problem.linear(motion, extra), motion, problem.spread(motion.matrix), sigma)]
+
+    found = estimate_robustly(solve, [len(sigma)], method=method, start="l1", limit=limit)
+    if found.status != CONVERGED:
+        raise EstimationError(f"the robust pose did not settle: {found.status}")
+    statistic = np.abs(np.nan_to_num(found.statistic[0])).reshape(-1, 3).max(axis=1)
+    keep = np.asarray(~np.any(found.rejected[0].reshape(-1, 3), axis=1))
+    if int(keep.sum()) < POINTS["rigid"]:
+        raise EstimationError(
+            f"a robust pose of {len(keep)} points would leave {int(keep.sum())} (expected 3 or more): the group does "
+            "not move as one, or its covariance is too small; fit without robust and look at the residuals"
+        )
+    return keep, statistic
+
+
+def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sigma: np.ndarray) -> Fit:
+    """One group of 3n rows for `estimate_robustly`; its own weight undone is the estimator's business.
+
+    The error in row i alone that explains the residuals best is (P v)_i / P_ii, of variance 1 / P_ii.
+    """
+    weight = np.diag(linear.weight)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        estimated = np.where(weight > 0.0, linear.weighted_residual / weight, 0.0)
+        u = np.where(weight > 0.0, 1.0 / np.sqrt(weight), np.inf)
+    return Fit(
+        name="points",
+        active=np.ones(len(sigma), dtype=bool),
+        residual=motion.residual.ravel(),
+        sigma=sigma,
+        redundancy=np.einsum("ij,ji->i", spread, linear.weight),
+        standardised=estimated / u,
+        estimated_error=estimated,
+        detectable_error=NONCENTRALITY * u,
+        pvv=linear.pvv,
+    )
+
+
+def _largest_w(linear: LinearEstimate) -> np.ndarray:
+    """(n,) largest |w| of each point's coordinates: w_i = (P v)_i / sqrt(P_ii), Baarda's test with correlations."""
+    weight = np.diag(linear.weight)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        w = np.where(weight > 0.0, np.abs(linear.weighted_residual) / np.sqrt(weight), np.nan)
+    by_point = w.reshape(-1, 3)
+    known = np.isfinite(by_point).any(axis=1)
+    largest = np.max(np.where(np.isfinite(by_point), by_point, -1.0), axis=1)
+    return np.asarray(np.where(known, largest, np.nan))
+
+
+def _chance(motion: Transformation) -> float:
+    from scipy import special
+
+    if not motion.degrees_of_freedom:
+        return float("nan")
+    return float(special.chdtrc(motion.degrees_of_freedom, motion.pvv))
+
+
+def pivot_change(arm: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """(6, 6) that takes the six numbers to a pivot further by an arm (3,) m: t' = t + w x (R arm).
+
+    arm      (3,) m, new pivot less old
+    matrix   (3, 3) R of the motion
+    """
+    move = np.eye(6)
+    move[:3] = motion_columns((arm @ matrix.T)[None], np.zeros(3))[:, :6]
+    return move
+
+
+def relative_pose(body: Pose, to: Pose, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Small motion (6,) of a body as seen from another that moved too, about the body's pivot, and covariance (6, 6).
+
+    body, to   poses in one frame, of small turns
+    cross      (6, 6) covariance of the body's six numbers (rows) with the other's; zero where their points share none
+
+    relative = (t - t_o - w_o x (p - p_o), w - w_o). First order in the turns: what is left out is their product, a
+    nanometre for 2 arc seconds at 10 m. Raises FrameError for two frames.
+    """
+    if body.frame != to.frame:
+        raise FrameError(f"poses in the frames '{body.frame}' and '{to.frame}' cannot be subtracted")
+    carried = to.about(body.pivot)
+    difference = np.concatenate([body.translation - carried.translation, body.rotation - carried.rotation])
+    mixed = cross @ pivot_change(body.pivot - to.pivot, to.motion.matrix).T
+    return difference, body.covariance + carried.covariance - mixed - mixed.T

@@ -1,0 +1,137 @@
+"""Paraboloids through the same points at many epochs, at once: place, focal length, deviations, covariance of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.shapes.paraboloid import PARAMETERS, POSE, Measure, fit_paraboloid, ordered
+from catseye.geometry.frame import Transform
+
+CONVERGED, TOO_FEW, UNHELD, UNSETTLED = 0, 1, 2, 3
+STATUS = {
+    CONVERGED: "converged",
+    TOO_FEW: "fewer points than parameters",
+    UNHELD: "the points do not hold the paraboloid",
+    UNSETTLED: "not settled",
+}
+LARGE = 20_000  # points times epochs from which the compiled form pays for its import
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSeries:
+    """What T epochs of k points say; an epoch without an answer holds nan and its status says why.
+
+    free         what was fitted
+    parameters   (T, p) m and rad: vertex in the nominal paraboloid's own axes, tilts about its x and y, focal length
+                 less the nominal one; of these what is free
+    covariance   (T, p, p)
+    deviation    (T, k) m, normal, above zero towards the focus; nan where a point was not seen
+    points       (T,) points seen
+    status       (T,) 0 where converged, else a key of STATUS
+    """
+
+    free: tuple[str, ...]
+    parameters: np.ndarray
+    covariance: np.ndarray
+    deviation: np.ndarray
+    points: np.ndarray
+    status: np.ndarray
+
+    def require_converged(self) -> "SurfaceSeries":
+        """This series, or EstimationError that names the first epoch without an answer."""
+        bad = np.flatnonzero(self.status != CONVERGED)
+        if len(bad):
+            raise EstimationError(
+                f"epoch {bad[0] + 1} of {len(self.status)}: {STATUS[int(self.status[bad[0]])]}, "
+                f"{self.points[bad[0]]} points seen; {len(bad)} epochs without an answer"
+            )
+        return self
+
+
+def fit_series(
+    points: np.ndarray,
+    variance: np.ndarray,
+    nominal: Transform,
+    focal_length: float,
+    *,
+    free: Sequence[str] = POSE,
+    weights: np.ndarray | None = None,
+    measure: Measure = "normal",
+    compiled: bool | None = None,
+) -> SurfaceSeries:
+    """As `fit_paraboloid`, each epoch for itself.
+
+    points         (T, k, 3) m, in the frame `nominal.to`; nan in a point that was not seen
+    variance       (k,) or (T, k) m^2, of the points along their normals; points independent
+    nominal        outer frame from the nominal paraboloid's
+    focal_length   m, held, or where the search begins
+    free           of "vertex", "axis", "focal-length"
+    weights        (k,) of squares; 1 without
+    measure        "normal" or "half-path"
+    compiled       by the kernel (2209 points of 1000 epochs in seconds), or plainly; None: by size
+
+    Raises EstimationError for names that are not parts of a paraboloid and for shapes that do not fit.
+    """
+    points, free = np.asarray(points, dtype=float), ordered(free)
+    if points.ndim != 3 or points.shape[2] != 3:
+        raise EstimationError(f"points of a series have the shape {points.shape} (expected epochs, points, 3)")
+    epochs, k, _ = points.shape
+    weights = np.ones(k) if weights is None else np.ascontiguousarray(weights, dtype=float)
+    variance = np.ascontiguousarray(np.broadcast_to(np.asarray(variance, dtype=float), (epochs, k)))
+    if compiled is None:
+        compiled = epochs * k >= LARGE
+    if not compiled:
+        return _plainly(points, variance, nominal, focal_length, free, weights, measure)
+    from catseye.estimation.shapes.surface_series_kernel import series  # numba is heavy
+
+    chosen = np.repeat([name in free for name in PARAMETERS], list(PARAMETERS.values()))
+    columns = np.flatnonzero(chosen).astype(np.int64)
+    local = np.ascontiguousarray((points - nominal.translation) @ nominal.rotation)
+    found = series(local, variance, weights, columns, float(focal_length), measure == "half-path")
+    return SurfaceSeries(free, *found)
+
+
+def _plainly(
+    points: np.ndarray,
+    variance: np.ndarray,
+    nominal: Transform,
+    focal_length: float,
+    free: tuple[str, ...],
+    weights: np.ndarray,
+    measure: Measure,
+) -> SurfaceSeries:
+    """A call of `fit_paraboloid` an epoch, in the nominal paraboloid's own frame."""
+    own = Transform(nominal.from_, nominal.from_, np.eye(3), np.zeros(3))
+    epochs, k, _ = points.shape
+    p = sum(PARAMETERS[name] for name in free)
+    local = (points - nominal.translation) @ nominal.rotation
+    made = SurfaceSeries(
+        free,
+        np.full((epochs, p), np.nan),
+        np.full((epochs, p, p), np.nan),
+        np.full((epochs, k), np.nan),
+        np.isfinite(local).all(axis=2).sum(axis=1),
+        np.zeros(epochs, dtype=np.int64),
+    )
+    for epoch in range(epochs):
+        seen = np.isfinite(local[epoch]).all(axis=1)
+        blocks = variance[epoch, seen, None, None] * np.eye(3)
+        try:
+            fit = fit_paraboloid(
+                local[epoch, seen], blocks, own, focal_length, free=free, weights=weights[seen], measure=measure
+            )
+        except EstimationError as problem:
+            text = str(problem)
+            made.status[epoch] = TOO_FEW if "needs" in text else UNHELD if "hold" in text else UNSETTLED
+            continue
+        parts = {
+            "vertex": fit.translation,
+            "axis": fit.rotation[:2],
+            "focal-length": np.array([fit.focal_length - focal_length]),
+        }
+        made.parameters[epoch] = np.concatenate([parts[name] for name in free]) if free else []
+        made.covariance[epoch] = fit.parameter_covariance
+        made.deviation[epoch, seen] = fit.deviation
+    return made

@@ -1,7 +1,0 @@
-"""Figures from lengths alone: stations and targets both unknown."""
-
-from catseye.estimation.unfolding.factors import classical_scaling
-from catseye.estimation.unfolding.location import locate
-from catseye.estimation.unfolding.unfold import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, unfold
-
-__all__ = ["NO_FIT", "TOO_FEW", "UNFOLDED", "Unfolding", "classical_scaling", "locate", "unfold"]

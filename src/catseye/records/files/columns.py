@@ -1,0 +1,143 @@
+"""Tables of many rows, read by column: fast where all is well, precise where it is not.
+
+Lines are counted from 1, the header is line 1.
+"""
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.errors import InputError
+from catseye.records.files.refusal import NUMBER, refusal, shown
+
+Check = Callable[[list[str]], None]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A CSV table by column, all cells text without spaces around them.
+
+    file     its name, for refusals
+    cells    column name -> cells, one a row
+    lines    where each row stands in the file
+    """
+
+    file: str
+    cells: dict[str, list[str]]
+    lines: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def refuse(self, row: int, problem: str) -> InputError:
+        """The error of one row, counted from 0."""
+        return refusal(self.file, f"line {self.lines[row]}, {problem}")
+
+    def numbers(self, name: str, blank: float | None = None) -> np.ndarray:
+        """A column as finite numbers (rows,); a blank cell is `blank`, refused if None."""
+        cells = self.cells[name]
+        if blank is not None and "" in cells:
+            cells = [cell or repr(blank) for cell in cells]
+        try:
+            values = np.array(list(map(float, cells)))
+        except ValueError:
+            values = np.array([float(cell) if NUMBER.fullmatch(cell) else np.nan for cell in cells])
+        bad = ~np.isfinite(values)
+        if blank is not None:
+            bad &= [cell != "" for cell in self.cells[name]]
+        if "_" in "".join(cells):  # which Python's float takes for a separator
+            bad |= ["_" in cell for cell in cells]
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise self.refuse(row, f"{name} = {shown(self.cells[name][row])} (expected a finite number)")
+        return values
+
+    def check(self, name: str, good: np.ndarray, expected: str) -> None:
+        """Refuses the first row (of a bool a row) that is not good, with its cell."""
+        if not good.all():
+            row = int(np.argmin(good))
+            raise self.refuse(row, f"{name} = {shown(self.cells[name][row])} (expected {expected})")
+
+    def where(self) -> tuple[str, ...]:
+        """The place of every row, in words."""
+        return tuple(map("line {}".format, self.lines))
+
+
+def columns_of(text: str, file: str, required: Sequence[str], optional: Sequence[str] = ()) -> Columns:
+    """The columns of a CSV text with a header, in any order.
+
+    text       the whole file
+    file       its name, for refusals
+    required   columns that must be there
+    optional   columns that may
+
+    Raises InputError for another or a missing or double column, a row of another width, a table without rows.
+
+    >>> columns_of("to,from\\nT1,S1\\n", "r.csv", ["from", "to"]).cells["from"]
+    ['S1']
+    """
+    text = text.replace("\r\n", "\n")
+
+    def check(header: list[str]) -> None:
+        _check_header(file, header, required, optional)
+
+    header, cells, lines = _quoted(text, file, check) if '"' in text else _plain(text, file, check)
+    if not lines:
+        raise refusal(file, "holds a header and no rows (expected at least one)")
+    width, strip = len(header), str.strip
+    columns = {name: list(map(strip, cells[at::width])) for at, name in enumerate(header)}
+    return Columns(file, columns, lines)
+
+
+def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:
+    wanted = f"(expected the header {','.join(required)}" + (f", perhaps {','.join(optional)})" if optional else ")")
+    for name in header:
+        if name not in required and name not in optional:
+            raise refusal(file, f"line 1, column {shown(name)} is not known {wanted}")
+        if header.count(name) > 1:
+            raise refusal(file, f"line 1, column {shown(name)} is there {header.count(name)} times {wanted}")
+    for name in required:
+        if name not in header:
+            raise refusal(file, f"line 1, column {name!r} is missing {wanted}")
+
+
+def _plain(text: str, file: str, check: Check) -> tuple[list[str], list[str], Sequence[int]]:
+    """Header, all cells row by row, and the rows' lines; one split of the whole text, as no list a row is made."""
+    text = text.rstrip()
+    if not text:
+        raise refusal(file, "holds no text: empty")
+    first, _, body = text.partition("\n")
+    header = [cell.strip() for cell in first.split(",")]
+    check(header)
+    lines = body.split("\n") if body else []
+    commas = len(header) - 1
+    if any(line.count(",") != commas for line in lines):
+        row = next(i for i, line in enumerate(lines) if line.count(",") != commas)
+        raise _uneven(file, row + 2, lines[row].split(","), len(header))
+    return header, body.replace("\n", ",").split(",") if body else [], range(2, len(lines) + 2)
+
+
+def _quoted(text: str, file: str, check: Check) -> tuple[list[str], list[str], Sequence[int]]:
+    reader = csv.reader(io.StringIO(text.rstrip(), newline=""), strict=True)
+    cells: list[str] = []
+    lines: list[int] = []
+    try:
+        header = [cell.strip() for cell in next(reader)]
+        check(header)
+        start = reader.line_num + 1
+        for row in reader:
+            if len(row) != len(header):
+                raise _uneven(file, start, row, len(header))
+            cells += row
+            lines.append(start)
+            start = reader.line_num + 1
+    except csv.Error as problem:
+        raise refusal(file, f"line {reader.line_num} is not CSV: {problem}") from problem
+    return header, cells, lines
+
+
+def _uneven(file: str, line: int, row: list[str], width: int) -> InputError:
+    return refusal(file, f"line {line}, {len(row)} fields = {shown(','.join(row))} (expected {width})")

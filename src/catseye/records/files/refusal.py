@@ -1,0 +1,145 @@
+"""Refusals in words: one line of file, place, value and what was expected, and perhaps what the value looks like."""
+
+import difflib
+import math
+import re
+from datetime import date
+from typing import Any
+
+from pydantic import ValidationError
+
+from catseye.constants import DEGREE, ZERO_CELSIUS_K
+from catseye.errors import InputError
+from catseye.records.files.record import Record
+
+LONGEST_VALUE = 60  # characters of an offending value that a refusal repeats
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
+
+# A value outside its range that factor and shift bring inside was probably written in another unit.
+OTHER_UNITS = (
+    ("_mm", 1e3, 0.0, "metres"),
+    ("_m", 1e-3, 0.0, "millimetres"),
+    ("_rad", DEGREE, 0.0, "degrees"),
+    ("_c", 1.0, -ZERO_CELSIUS_K, "kelvin"),
+    ("_mb", 1e-2, 0.0, "pascals"),
+    ("_mb", 10.0, 0.0, "kilopascals"),
+    ("_um", 1e-3, 0.0, "nanometres"),
+    ("_volt", 1e-3, 0.0, "millivolts"),
+    ("_hz", 1e6, 0.0, "megahertz"),
+    ("_hz", 1e9, 0.0, "gigahertz"),
+)
+EXPECTED = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "string_too_short": "some text",
+    "tuple_type": "a list",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "date_type": "a date",
+}
+
+
+def refusal(file: str, problem: str) -> InputError:
+    """The error whose text is one line, whatever the names and values in it hold."""
+    text = f"{file}: {problem}"
+    return InputError("".join(c if c.isprintable() else ascii(c)[1:-1] for c in text))
+
+
+def unreadable(file: str, problem: OSError) -> InputError:
+    return refusal(file, f"cannot be read: {problem.strerror or problem}")
+
+
+def shown(value: object) -> str:
+    """A value as a refusal repeats it: on one line, shortened.
+
+    >>> shown("two\\nlines")
+    "'two\\\\nlines'"
+    """
+    if isinstance(value, date):
+        return value.isoformat()
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of thousands of digits, which Python declines to print
+        return "a number of thousands of digits"
+    except RecursionError:
+        return "a deeply nested value"
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}... ({len(text)} characters)"
+
+
+def explained(problem: ValidationError, document: dict[str, Any], kind: type[Record]) -> str:
+    """The first of a validation's errors in words; an unknown version explains all others, an unknown key a missing."""
+    errors = problem.errors(include_url=False)
+    version = [error for error in errors if error["type"] == "version"]
+    if version:
+        errors = version
+    errors = sorted(errors, key=lambda error: error["type"] != "extra_forbidden")
+    first = errors[0]
+    place, key, parent = placed(first["loc"], document)
+    text = f"{place}{worded(first, key, parent, kind)}"
+    return text if len(errors) == 1 else f"{text} (and {len(errors) - 1} more)"
+
+
+def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:
+    """The path of a place in a document, its last named key, and the table or cell that it leads to."""
+    path, key = "", ""
+    for step in loc:
+        if isinstance(document, list) and isinstance(step, int):
+            document = document[step] if step < len(document) else None
+            name = document.get("name") if isinstance(document, dict) else None
+            path += f"[{shown(name)}]" if isinstance(name, str) else f"[{step}]"
+        elif isinstance(document, dict):
+            document, key = document.get(str(step)), str(step)
+            word = key if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", key) else shown(key)
+            path += f".{word}" if path else word
+        else:
+            break
+    return path, key, document
+
+
+def worded(error: Any, key: str, found: Any, kind: type[Record]) -> str:
+    """What is wrong with the value found at a place, and what was expected."""
+    name, context, value = error["type"], error.get("ctx", {}), error["input"]
+    if name == "missing":
+        return " is missing (expected a value)"
+    if name == "rule":
+        return f": {context['text']}" if error["loc"] else context["text"]
+    cell = isinstance(found, str) and isinstance(value, int | float)
+    written = f" = {found if cell and NUMBER.fullmatch(found) else shown(value)}"
+    if name == "extra_forbidden":
+        known = all_keys(kind)
+        close = difflib.get_close_matches(key[:LONGEST_VALUE], known, n=1)
+        return f"{written} is not a known key (expected {f'perhaps {close[0]}' if close else 'no such key'})"
+    if name in ("range", "length"):
+        size = f" has the length {context['size']:.6g}" if name == "length" else ""
+        return f"{written}{size}{other_unit(key, context)} ({error['msg']})"
+    if name in EXPECTED:
+        return f"{written} (expected {EXPECTED[name]})"
+    if name == "literal_error":
+        return f"{written} (expected {context['expected']})"
+    if name in ("too_long", "too_short"):
+        limit = context.get("max_length", context.get("min_length"))
+        return f"{written} has {context['actual_length']} values (expected {limit})"
+    message = error["msg"]
+    return f"{written} ({message if message.startswith('expected') else f'expected otherwise: {message}'})"
+
+
+def other_unit(key: str, context: dict[str, Any]) -> str:
+    """What a value out of its range looks like, as ' looks like metres', or nothing."""
+    if context["high"] < 0 <= -context["high"] <= context["size"] <= -context["low"]:
+        return " has the wrong sign"
+    if context["size"] == 0.0:
+        return ""
+    for suffix, factor, shift, unit in OTHER_UNITS:
+        size = context["size"] * factor + shift
+        if key.endswith(suffix) and math.isfinite(size) and context["low"] <= size <= context["high"]:
+            return f" looks like {unit}"
+    return ""
+
+
+def all_keys(kind: Any) -> list[str]:
+    """Every key that a kind of file may hold, at any depth."""
+    schema = kind.model_json_schema()
+    tables = [schema, *schema.get("$defs", {}).values()]
+    return sorted({key for table in tables for key in table.get("properties", {})})

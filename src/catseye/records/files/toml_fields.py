@@ -1,0 +1,157 @@
+"""A table of our TOML, taken key by key: units are in the keys, and a key that nothing takes is refused."""
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, PPM
+from catseye.errors import InputError
+from catseye.records.files.refusal import refusal, shown
+
+GON = 0.9 * DEGREE
+LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
+ANGLE = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "urad": 1e-6,
+    "deg": DEGREE,
+    "arcsec": ARCSECOND,
+    "gon": GON,
+    "mgon": 1e-3 * GON,
+    "cc": 1e-4 * GON,
+}
+RATIO = {"ppm": PPM, "ppb": 1e-9, "ratio": 1.0}
+DIMENSIONS = {"m": LENGTH, "rad": ANGLE, "1": RATIO}
+DMS = re.compile(r"([+-]?)([0-9]+)-([0-9]+)-([0-9]+(?:\.[0-9]*)?)")
+
+
+@dataclass(eq=False)
+class Fields:
+    """One table of a file.
+
+    file     its name, for refusals
+    place    where the table stands
+    values   its keys and values
+    taken    keys that something asked for
+    """
+
+    file: str
+    place: str
+    values: dict[str, Any]
+    taken: set[str] = field(default_factory=set)
+    asked: set[str] = field(default_factory=set)
+
+    def refuse(self, problem: str) -> InputError:
+        return refusal(self.file, f"{self.place}, {problem}")
+
+    def has(self, key: str) -> bool:
+        self.asked.add(key)
+        return key in self.values
+
+    def take(self, key: str, kind: type | tuple[type, ...], expected: str, default: Any = None) -> Any:
+        """A value of some type; the default where the key is not there, which None forbids."""
+        self.asked.add(key)
+        self.taken.add(key)
+        if key not in self.values:
+            if default is None:
+                raise self.refuse(f"{key} is missing (expected {expected})")
+            return default
+        value = self.values[key]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise self.refuse(f"{key} = {shown(value)} (expected {expected})")
+        return value
+
+    def text(self, key: str, default: str | None = None) -> str:
+        return str(self.take(key, str, "some text", default))
+
+    def tables(self, key: str) -> list["Fields"]:
+        """Tables within this one, none if the key is not there."""
+        found = self.take(key, list, "tables", [])
+        if not all(isinstance(table, dict) for table in found):
+            raise self.refuse(f"{key} = {shown(found)} (expected tables)")
+        return [Fields(self.file, f"{self.place}, {key} {i}", table) for i, table in enumerate(found, start=1)]
+
+    def keyed(self, stem: str, units: dict[str, float]) -> tuple[str, float] | None:
+        """The one key of a stem and its unit's size in SI, or None; refused if there are two."""
+        keys = [f"{stem}_{unit}" if stem else unit for unit in units]
+        self.asked.update(keys)
+        found = [key for key in keys if key in self.values]
+        if len(found) > 1:
+            raise self.refuse(f"{found[0]} and {found[1]} say the same (expected one of them)")
+        return (found[0], units[found[0].removeprefix(f"{stem}_")]) if found else None
+
+    def quantity(self, stem: str, units: dict[str, float], default: float | None = None) -> float:
+        """A number in SI, by whichever unit its key says; angles also as stem_dms = "ddd-mm-ss.s"."""
+        if units is ANGLE and f"{stem}_dms" in self.values:
+            return self._dms(f"{stem}_dms")
+        key = self.keyed(stem, units)
+        if key is None:
+            if default is None:
+                raise self.refuse(f"{stem} is missing (expected {', '.join(f'{stem}_{unit}' for unit in units)})")
+            return default
+        return self.number(key[0]) * key[1]
+
+    def number(self, key: str, default: float | None = None) -> float:
+        value = float(self.take(key, (int, float), "a finite number", default))
+        if not math.isfinite(value):
+            raise self.refuse(f"{key} = {value} (expected a finite number)")
+        return value
+
+    def array(self, key: str, shape: tuple[int, ...]) -> np.ndarray:
+        """Numbers of a shape, 0 in it for any size."""
+        value = self.take(key, list, "numbers")
+        try:
+            array = np.array(value, dtype=float)
+        except (TypeError, ValueError):
+            array = np.full(1, np.nan)
+        fits = array.ndim == len(shape) and all(s in (0, n) for s, n in zip(shape, array.shape, strict=True))
+        if not fits or not np.isfinite(array).all():
+            wanted = " x ".join(str(s) if s else "any number" for s in shape)
+            raise self.refuse(f"{key} = {shown(value)} (expected {wanted} finite numbers)")
+        return array
+
+    def vector(self, stem: str, units: dict[str, float], default: Sequence[float] | None = None) -> np.ndarray:
+        """(3,) in SI."""
+        key = self.keyed(stem, units)
+        if key is None:
+            if default is None:
+                raise self.refuse(f"{stem} is missing (expected {', '.join(f'{stem}_{unit}' for unit in units)})")
+            return np.array(default, dtype=float)
+        return self.array(key[0], (3,)) * key[1]
+
+    def uncertainties(self, size: int, *, or_zero: bool = False) -> np.ndarray | None:
+        """Covariance (size, size) m^2 from covariance_mm2, or from u_mm and its like, one or each; None without."""
+        key = self.keyed("u", LENGTH)
+        if self.has("covariance_mm2"):
+            if key is not None:
+                raise self.refuse(f"{key[0]} and covariance_mm2 say the same (expected one of them)")
+            return self.array("covariance_mm2", (size, size)) * MILLIMETRE**2
+        if key is None:
+            return None
+        one = not isinstance(self.values[key[0]], list)
+        u = np.full(size, self.number(key[0])) if one else self.array(key[0], (size,))
+        if not np.all(u >= 0.0 if or_zero else u > 0.0):
+            limit = "0 or above" if or_zero else "above 0: nothing is measured without error"
+            raise self.refuse(f"{key[0]} = {shown(self.values[key[0]])} (expected {limit})")
+        return np.diag((u * key[1]) ** 2)
+
+    def done(self) -> None:
+        """Refuses the first key that nothing took."""
+        for key in self.values:
+            if key not in self.taken:
+                close = difflib.get_close_matches(key, sorted(self.asked - set(self.values)), n=1)
+                hint = f"perhaps {close[0]}" if close else "no such key"
+                raise self.refuse(f"{shown(key)} is not a known key here (expected {hint})")
+
+    def _dms(self, key: str) -> float:
+        text = self.text(key)
+        parts = DMS.fullmatch(text)
+        if parts is None or float(parts[3]) >= 60.0 or float(parts[4]) >= 60.0:
+            raise self.refuse(f"{key} = {shown(text)} (expected degrees-minutes-seconds, ' and \" below 60)")
+        size = (float(parts[2]) + float(parts[3]) / 60.0 + float(parts[4]) / 3600.0) * DEGREE
+        return -size if parts[1] == "-" else size

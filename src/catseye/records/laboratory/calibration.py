@@ -1,0 +1,107 @@
+"""RECORD.toml of a calibration: what was found, with full covariance, tests, readings and where it all came from."""
+
+from datetime import date
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from catseye.records.files.record import Name, Record, Version, broken_rule
+
+Words = Annotated[str, Field(min_length=1)]
+Positive = Annotated[float, Field(ge=0.0)]
+AGREES = 1e-9  # relative: u² and the diagonal are two roundings of one number
+
+
+class CalibratedQuantity(Record):
+    """One number: its key with the unit in it, value and standard uncertainty in that unit, and what it means.
+
+    coverage   factor of u for an interval of 95.45 %; 2 where the record does not say
+    """
+
+    key: Words
+    value: float
+    u: Positive
+    unit: str
+    meaning: str
+    coverage: Positive = 2.0
+
+
+class CovarianceTable(Record):
+    """The full matrix, rows and columns in the order of the keys; in the product of their units."""
+
+    order: Annotated[tuple[str, ...], Field(strict=False)]
+    matrix: Annotated[tuple[Annotated[tuple[float, ...], Field(strict=False)], ...], Field(strict=False)]
+
+
+class DecisionTable(Record):
+    """A test; statistic, limit and passed are missing where the readings did not allow it."""
+
+    name: Words
+    statistic: float | None = None
+    limit: float | None = None
+    passed: bool | None = None
+    text: str
+
+
+class ReadingsTable(Record):
+    """The readings with their residuals, as the certificate shows them."""
+
+    columns: Annotated[tuple[str, ...], Field(strict=False)]
+    rows: Annotated[tuple[Annotated[tuple[float | int | str, ...], Field(strict=False)], ...], Field(strict=False)]
+
+
+class CalibrationRecord(Record):
+    """The whole of a record; `record` holds what can be copied into the record of the instrument."""
+
+    format: Annotated[str, Version("calibration")]
+    kind: Name
+    title: Words
+    instrument: Words
+    serial: int | Words
+    measured_on: date
+    valid_until: date
+    by: Words
+    report: Words
+    made_by: Words
+    variance_factor: Positive | None = None
+    degrees_of_freedom: Annotated[int, Field(ge=0)]
+    method: str
+    notes: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    record: dict[str, Any]
+    quantity: Annotated[tuple[CalibratedQuantity, ...], Field(strict=False, min_length=1)]
+    covariance: CovarianceTable
+    decision: Annotated[tuple[DecisionTable, ...], Field(strict=False)] = ()
+    readings: ReadingsTable
+    inputs_sha256: dict[str, str]
+    sheet: dict[str, Any]
+
+    @model_validator(mode="after")
+    def _has_a_covariance_of_its_quantities(self) -> "CalibrationRecord":
+        keys = tuple(q.key for q in self.quantity)
+        if self.covariance.order != keys:
+            raise broken_rule(
+                f"covariance.order = {list(self.covariance.order)} (expected {list(keys)}, the quantities)"
+            )
+        n = len(keys)
+        if len(self.covariance.matrix) != n or any(len(row) != n for row in self.covariance.matrix):
+            raise broken_rule(f"covariance.matrix is not {n} by {n}, as there are {n} quantities")
+        matrix = np.array(self.covariance.matrix)
+        scale = np.array([q.u for q in self.quantity])
+        bound = np.outer(scale, scale)
+        if np.any(np.abs(matrix - matrix.T) > AGREES * bound):
+            raise broken_rule("covariance.matrix is not symmetric")
+        if np.any(np.abs(np.diag(matrix) - scale**2) > AGREES * scale**2):
+            raise broken_rule("covariance.matrix does not hold the squares of u on its diagonal")
+        safe = np.where(scale > 0.0, scale, 1.0)
+        if np.linalg.eigvalsh(matrix / np.outer(safe, safe)).min() < -1e-9:
+            raise broken_rule("covariance.matrix is not positive: a combination of quantities would have u² below 0")
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> "CalibrationRecord":
+        width = len(self.readings.columns)
+        for number, row in enumerate(self.readings.rows, start=1):
+            if len(row) != width:
+                raise broken_rule(f"readings.rows, row {number} has {len(row)} cells (expected {width})")
+        return self

@@ -1,0 +1,186 @@
+"""Star offsets as TPOINT text: where sources were and what the encoders read when the beam was on them.
+
+What is accepted, exactly: docs/formats/star-offsets.md. Angles become radians; azimuth is clockwise from north.
+"""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from catseye.constants import DEGREE
+from catseye.records.files.reading import Folder
+from catseye.records.files.refusal import NUMBER, refusal, shown
+
+COMMENT, OPTION, END = "!", ":", "END"
+MARK = "! azimuth clockwise from north and elevation in degrees: of the source, then of the encoders"  # of our files
+LARGEST_OFFSET = 5.0 * DEGREE  # between sky and encoders: more is another column order or unit
+
+
+@dataclass(frozen=True, eq=False)
+class StarOffsets:
+    """Observed sources of an altazimuth telescope, one a row, as read-only columns.
+
+    file                 name, for messages
+    caption              first line
+    options              words after the colons, as NODA
+    latitude             rad
+    run                  words of the run's line after the latitude, as they stand: date, weather, ...
+    azimuth, elevation   (n,) rad, of the source on the sky, refracted ("observed place")
+    azimuth_encoder, elevation_encoder   (n,) rad, as the telescope read them with the beam on the source
+    auxiliary            (n, k) further readings of each line, in their own units
+    line                 (n,) where each stands in the file
+    digest               SHA-256 of the file, "" where there is none
+    """
+
+    file: str
+    caption: str
+    options: tuple[str, ...]
+    latitude: float
+    run: tuple[str, ...]
+    azimuth: np.ndarray
+    elevation: np.ndarray
+    azimuth_encoder: np.ndarray
+    elevation_encoder: np.ndarray
+    auxiliary: np.ndarray
+    line: tuple[int, ...]
+    digest: str
+
+    def __len__(self) -> int:
+        return len(self.azimuth)
+
+    @property
+    def correction(self) -> np.ndarray:
+        """(n, 2) rad: encoders less sky, azimuth (brought within half a turn) times cos E of the sky, and elevation."""
+        across = (self.azimuth_encoder - self.azimuth + math.pi) % (2.0 * math.pi) - math.pi
+        return np.column_stack([across * np.cos(self.elevation), self.elevation_encoder - self.elevation])
+
+
+def read_star_offsets(path: Path | str) -> StarOffsets:
+    """A TPOINT file of an altazimuth telescope; InputError names file, line, value and what was expected."""
+    path = Path(path)
+    text = Folder(path.parent).text(path.name)
+    return parsed(text, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
+    """Star offsets from the text of a file.
+
+    text     whole
+    file     its name, for refusals
+    digest   SHA-256, if known
+    """
+    lines = [(k, row.strip()) for k, row in enumerate(text.replace("\r\n", "\n").split("\n"), start=1)]
+    told = [(k, row) for k, row in lines if row and not row.startswith(COMMENT)]
+    if not told:
+        raise refusal(file, "holds comments only (expected a caption line)")
+    caption, rest = told[0][1], told[1:]
+    options = [(k, word) for k, row in rest if row.startswith(OPTION) for word in row.lstrip(": ").split()]
+    mount = _refuse_options(file, options)
+    body = [(k, row) for k, row in rest if not row.startswith(OPTION)]
+    ends = [i for i, (_, row) in enumerate(body) if row.upper() == END]
+    body = body[: ends[0]] if ends else body
+    if not body:
+        raise refusal(file, "has no line with the latitude (expected degrees, minutes, seconds after the options)")
+    latitude, run = _run(file, *body[0])
+    rows = [_numbers(file, k, row) for k, row in body[1:]]
+    if not rows:
+        raise refusal(file, "has no observations (expected lines of azimuth, elevation, azimuth, elevation, degrees)")
+    width = len(rows[0])
+    for (k, _), row in zip(body[1:], rows, strict=True):
+        _refuse_row(file, k, row, width)
+    table = np.array(rows)
+    found = StarOffsets(
+        file=file,
+        caption=caption,
+        options=tuple(word for _, word in options if word != mount),
+        latitude=latitude,
+        run=run,
+        azimuth=table[:, 0] * DEGREE,
+        elevation=table[:, 1] * DEGREE,
+        azimuth_encoder=table[:, 2] * DEGREE,
+        elevation_encoder=table[:, 3] * DEGREE,
+        auxiliary=table[:, 4:],
+        line=tuple(k for k, _ in body[1:]),
+        digest=digest,
+    )
+    _refuse_far(found)
+    return found
+
+
+def _refuse_options(file: str, options: Sequence[tuple[int, str]]) -> str:
+    """The mount's word; an equatorial telescope is refused."""
+    for k, word in options:
+        if word.upper() == "EQUAT":
+            raise refusal(file, f"line {k}, option EQUAT is an equatorial mount (expected ALTAZ)")
+    mounts = [word for _, word in options if word.upper() == "ALTAZ"]
+    if not mounts:
+        raise refusal(file, "has no option ': ALTAZ' (expected it: without, the columns are hour angles, declinations)")
+    return mounts[0]
+
+
+def _run(file: str, line: int, row: str) -> tuple[float, tuple[str, ...]]:
+    """Latitude, rad, from degrees, minutes, seconds, and the words after."""
+    words = row.split()
+    if len(words) < 3 or not all(NUMBER.fullmatch(w) for w in words[:3]):
+        raise refusal(file, f"line {line}, {shown(row)} (expected the latitude: degrees minutes seconds)")
+    degrees, minutes, seconds = (float(w) for w in words[:3])
+    if not (abs(degrees) <= 90.0 and 0.0 <= minutes < 60.0 and 0.0 <= seconds < 60.0):
+        raise refusal(file, f"line {line}, latitude {' '.join(words[:3])} (expected -90 to 90, 0 to 60, 0 to 60)")
+    size = abs(degrees) + minutes / 60.0 + seconds / 3600.0
+    if size > 90.0:
+        raise refusal(file, f"line {line}, latitude {' '.join(words[:3])} is beyond the pole (expected -90 to 90)")
+    return (-size if words[0].startswith("-") else size) * DEGREE, tuple(words[3:])
+
+
+def _numbers(file: str, line: int, row: str) -> list[float]:
+    words = row.split()
+    for word in words:
+        if not NUMBER.fullmatch(word):
+            raise refusal(file, f"line {line}, {shown(word)} is not a number (expected numbers, ! before a comment)")
+    return [float(word) for word in words]
+
+
+def _refuse_row(file: str, line: int, row: Sequence[float], width: int) -> None:
+    if len(row) < 4 or len(row) != width:
+        wanted = "4 or more: azimuth, elevation, azimuth, elevation" if width < 4 else f"{width} as in the first"
+        raise refusal(file, f"line {line} has {len(row)} numbers (expected {wanted})")
+    for value, name, low, high in zip(row, ("azimuth", "elevation") * 2, (-540, -5) * 2, (540, 95) * 2, strict=False):
+        if not low <= value <= high:
+            raise refusal(file, f"line {line}, {name} = {value} (expected {low} to {high} degrees)")
+
+
+def _refuse_far(found: StarOffsets) -> None:
+    size = np.hypot(*found.correction.T)
+    worst = int(np.argmax(size))
+    if size[worst] > LARGEST_OFFSET:
+        raise refusal(
+            found.file,
+            f"line {found.line[worst]}, sky and encoders are {size[worst] / DEGREE:.2f} degrees apart (expected up to "
+            f"{LARGEST_OFFSET / DEGREE:g}: azimuth clockwise from north in both pairs)",
+        )
+
+
+def star_offsets_text(offsets: StarOffsets) -> str:
+    """The same as TPOINT text, angles in degrees to 1e-7, 0.4 milliarcseconds."""
+    total = round(abs(offsets.latitude) / DEGREE * 36_000.0)
+    sign = "-" if offsets.latitude < 0.0 else ""
+    place = f"{sign}{total // 36_000:02d} {total % 36_000 // 600:02d} {total % 600 / 10:04.1f}"
+    head = [
+        offsets.caption,
+        ": ALTAZ",
+        *(f": {word}" for word in offsets.options),
+        " ".join([place, *offsets.run]),
+        MARK,
+    ]
+    angles = np.column_stack(
+        [offsets.azimuth, offsets.elevation, offsets.azimuth_encoder, offsets.elevation_encoder]
+    ) / DEGREE  # fmt: skip
+    rows = [
+        " ".join([*(f"{v:12.7f}" for v in row), *(f"{v:.9g}" for v in more)])
+        for row, more in zip(angles, offsets.auxiliary, strict=True)
+    ]
+    return "\n".join([*head, *rows, END]) + "\n"

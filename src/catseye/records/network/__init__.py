@@ -1,0 +1,1 @@
+"""Network files: TOML, STAR*NET, GNU Gama, a folder of tables."""

@@ -1,0 +1,40 @@
+"""A network from a file or a folder, whatever program wrote it.
+
+folder        points.csv and ranges.csv                  `network_folder`
+.toml         our own, `format = "catseye-network-1"`    `network_toml`
+.gkf, .xml    GNU Gama                                   `gama`
+.dat          STAR*NET                                   `starnet`
+"""
+
+from pathlib import Path
+
+from catseye.estimation.network.model import Network
+from catseye.records.files.refusal import refusal, shown
+from catseye.records.network.folder import read_network_folder
+from catseye.records.network.gama import read_gama
+from catseye.records.network.starnet import read_starnet
+from catseye.records.network.toml import read_network_toml
+
+READERS = {
+    ".toml": read_network_toml,
+    ".gkf": read_gama,
+    ".xml": read_gama,
+    ".dat": read_starnet,
+}
+
+
+def read_network(path: Path | str) -> Network:
+    """The network of a file, by the end of its name, or of a folder.
+
+    path   a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
+
+    Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return read_network_folder(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"
+        raise refusal(path.name, f"ends in {shown(path.suffix)} ({kinds})")
+    return reader(path)

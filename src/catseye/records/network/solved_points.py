@@ -1,0 +1,125 @@
+"""Points as a reduction left them: coordinates.json with its full covariance, and the posture beside it."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catseye.constants import DEGREE
+from catseye.records.files.reading import Folder
+from catseye.records.files.refusal import refusal, shown
+
+FORMAT = "catseye-reduction-1"  # of coordinates.json and pose.json
+FILE, BESIDE = "coordinates.json", "pose.json"
+DRAWN = 1e-6  # of two standard uncertainties' product: how unsymmetric a covariance in print may be
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedPoints:
+    """The points of one epoch in the ground frame.
+
+    file         as named by the user, for messages
+    campaign     name
+    names        n
+    x            (n, 3) m
+    covariance   (3n, 3n) m^2
+    posture      azimuth and elevation, rad, if pose.json beside it says
+    hashes       SHA-256 of the files read, by their names
+    """
+
+    file: str
+    campaign: str
+    names: tuple[str, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    posture: tuple[float, float] | None
+    hashes: dict[str, str]
+
+    def block(self, names: Sequence[str]) -> np.ndarray:
+        """(3k, 3k) m^2, of some points in this order."""
+        return self.between(names, names)
+
+    def between(self, names: Sequence[str], others: Sequence[str]) -> np.ndarray:
+        """(3k, 3m) m^2, covariance of some points with others."""
+        return np.asarray(self.covariance[np.ix_(self._rows(names), self._rows(others))])
+
+    def places(self, names: Sequence[str]) -> np.ndarray:
+        """(k, 3) m, of some points in this order."""
+        at = {name: k for k, name in enumerate(self.names)}
+        return np.asarray(self.x[[at[n] for n in names]])
+
+    def _rows(self, names: Sequence[str]) -> list[int]:
+        at = {name: 3 * k for k, name in enumerate(self.names)}
+        return [at[n] + axis for n in names for axis in range(3)]
+
+
+def read_solved_points(path: Path | str) -> SolvedPoints:
+    """Points from a coordinates.json, or from a directory that `catseye reduce --out` wrote.
+
+    path   the file, or the directory
+
+    Raises InputError with the file, the place in it, the value and what was expected.
+    """
+    path = Path(path)
+    folder, name = (Folder(path), FILE) if path.is_dir() else (Folder(path.parent), path.name)
+    found = _object(folder, name)
+    points, order = found.get("points"), found.get("covariance_order")
+    if not isinstance(points, dict) or not points or not isinstance(order, list):
+        raise refusal(name, "has no points with covariance_order (expected coordinates.json of catseye reduce --out)")
+    names = tuple(points)
+    if order != [f"{n} {axis}" for n in names for axis in "xyz"]:
+        raise refusal(name, "covariance_order is not that of points x, y, z (expected as catseye reduce writes it)")
+    if found.get("frame") != "ground":
+        raise refusal(name, f"frame = {shown(found.get('frame'))} (expected 'ground')")
+    x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
+    covariance = _covariance(name, found.get("covariance"), len(order))
+    beside = folder.directory / BESIDE
+    posture = _posture(_object(folder, BESIDE)) if beside.is_file() else None
+    hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
+    return SolvedPoints(str(path), str(found.get("campaign", "")), names, x, covariance, posture, hashes)
+
+
+def _object(folder: Folder, name: str) -> dict[str, Any]:
+    text = folder.text(name)
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as problem:
+        raise refusal(name, f"is not JSON: {problem}") from problem
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        told = shown(found.get("format")) if isinstance(found, dict) else "none"
+        raise refusal(name, f"format = {told} (expected '{FORMAT}', as catseye reduce --out writes it)")
+    return found
+
+
+def _number(file: str, point: str, row: Any, axis: str) -> float:
+    value = row.get(axis) if isinstance(row, dict) else None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise refusal(file, f"points[{shown(point)}].{axis} = {shown(value)} (expected a number, m)")
+    return float(value)
+
+
+def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
+    try:
+        q = np.array(rows, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise refusal(file, "covariance is no table of numbers (expected one row a coordinate)") from problem
+    if q.shape != (size, size) or not np.isfinite(q).all():
+        raise refusal(file, f"covariance has shape {q.shape} (expected ({size}, {size}), all finite)")
+    scale = np.sqrt(np.abs(np.outer(np.diag(q), np.diag(q))))
+    if np.any(np.diag(q) < 0.0) or np.any(np.abs(q - q.T) > DRAWN * scale + 1e-30):
+        raise refusal(file, "covariance is not symmetric or has a negative variance (expected a covariance, m^2)")
+    return 0.5 * (q + q.T)
+
+
+def _posture(found: dict[str, Any]) -> tuple[float, float] | None:
+    told = found.get("nominal_posture")
+    if not isinstance(told, dict):
+        return None
+    angles: list[Any] = [told.get(key) for key in ("azimuth_deg", "elevation_deg")]
+    if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
+        raise refusal(BESIDE, f"nominal_posture = {shown(told)} (expected azimuth_deg and elevation_deg)")
+    return float(angles[0]) * DEGREE, float(angles[1]) * DEGREE

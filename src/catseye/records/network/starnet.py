@@ -1,0 +1,293 @@
+"""STAR*NET's lines of a three-dimensional survey (.dat), as its reference manual defines them.
+
+Read are the codes C and E (coordinates), A, D, V, DV, B, M, BM (observations), DB DN DM DE (direction sets), L
+(levelling), and the options .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION; the rest is
+refused by name, but for options that only shape the listing. Text after # is a comment, after ' a description.
+
+What a project file would say and a .dat cannot is taken as: metres, degrees-minutes-seconds, north before east,
+At-From-To, slope distance and zenith angle, three-dimensional. Standard errors are in the lines, in seconds (with GONS
+in milligons) and the line's unit of length. Where they are missing or `&`, a comment must say what they are:
+
+    # catseye: angle_arcsec = 2, zenith_arcsec = 3, distance_mm = 1, distance_ppm = 1.5
+
+with direction_, azimuth_, zenith_, angle_arcsec, distance_mm + distance_ppm D, elevation_mm, from there on. Nothing is
+assumed without it. `!` holds a coordinate; on an observation it stands for 1e-7 m or 1e-9 rad. `*` frees a coordinate
+and leaves an observation out; the network's description says so. A coordinate of C without standard errors is free.
+
+The network is plane: no curvature, no refraction. `.REFRACTION k` turns both on, with the coefficient k, for the zenith
+angles of the whole file; horizontal angles are at the mark, distances chords between the ends of the heights. A zenith
+angle beyond half a turn is of the second face.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE, PPM
+from catseye.errors import InputError
+from catseye.estimation.network.model import Network
+from catseye.records.files.reading import Folder
+from catseye.records.files.refusal import NUMBER, refusal, shown
+from catseye.records.network.draft import NetworkDraft
+from catseye.records.network.kinds import LENGTHS, Row
+from catseye.records.network.starnet_lines import Line, Settings, angle_of, lines_of, number_of, set_option
+
+FIXED_LENGTH = 1e-7  # m, standard uncertainty of a `!` observation: small against any survey, kind to the arithmetic
+FIXED_ANGLE = 1e-9  # rad
+DEFAULTS = {  # observation -> the comment's key
+    "angle": "angle_arcsec",
+    "direction": "direction_arcsec",
+    "azimuth": "azimuth_arcsec",
+    "zenith_angle": "zenith_arcsec",
+    "height_difference": "elevation_mm",
+}
+DISTANCES = ("slope_distance", "horizontal_distance")
+
+
+def read_starnet(path: Path) -> Network:
+    """The network of a STAR*NET .dat file; InputError, with its line, for what cannot be used or is not known.
+
+    path   the file
+
+    Source: [STARNET04] chapter 5.
+    """
+    return starnet_network(Folder(path.parent).text(path.name), path.name)
+
+
+def starnet_network(text: str, file: str) -> Network:
+    """The same of the file's text.
+
+    text   lines
+    file   its name, for refusals
+    """
+    reader = _Reader(file)
+    for line in lines_of(text):
+        reader.read(line)
+    return reader.network()
+
+
+class _Reader:
+    def __init__(self, file: str) -> None:
+        self.draft = NetworkDraft(file, implied=True)
+        self.settings = Settings()
+        self.coordinates: dict[str, dict[str, tuple[float, str, str]]] = {}
+        self.sets: dict[str, int] = {}
+        self.station, self.orientation = "", -1
+        self.left_out: list[str] = []
+        self.held: list[str] = []
+
+    def refuse(self, line: Line, problem: str) -> InputError:
+        return self.draft.refuse(line.place, problem)
+
+    def read(self, line: Line) -> None:
+        """One line, by its code."""
+        if not self.settings.data and not line.code.startswith(".DAT"):
+            return
+        if line.code.startswith("."):
+            set_option(self.settings, line, self.refuse)
+        elif line.code in CODES:
+            CODES[line.code](self, line)
+        else:
+            known = ", ".join(CODES)
+            raise self.refuse(line, f"{shown(line.text)} is not known here (expected one of the codes {known})")
+
+    def network(self) -> Network:
+        """All lines together."""
+        if self.orientation >= 0:
+            raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
+        for name, known in self.coordinates.items():
+            place = next(iter(known.values()))[2]
+            xyz = [known[axis][0] if axis in known else np.nan for axis in "xyz"]
+            self.draft.point(name, xyz, fixed=[known.get(a, (0, "", ""))[1] == "!" for a in "xyz"], place=place)
+            for axis, (value, error, where) in known.items():
+                if error not in ("!", "*"):
+                    self.draft.observe(Row("coordinates", (name,), value, float(error), where, component=axis))
+        notes = [(self.left_out, "take no part (*)"), (self.held, "are held to 1e-7 m or 1e-9 rad (!)")]
+        self.draft.description = "; ".join(f"{', '.join(places)} {what}" for places, what in notes if places)
+        if self.settings.refraction is not None:
+            bent = {"refraction": self.settings.refraction, "curved": 1.0}
+            rows = self.draft.rows
+            self.draft.rows = [replace(row, known=bent) if row.kind == "zenith_angle" else row for row in rows]
+        return self.draft.network(hold_untouched=True)
+
+    def stations(self, line: Line, count: int) -> list[str]:
+        """Names joined by the separator, At-From-To in that order whatever the file's."""
+        words = line.words
+        joined = words[1] if len(words) > 1 else ""
+        names = joined.split(self.settings.separator)
+        if len(names) != count or not all(names):
+            form = self.settings.separator.join(["At", "From", "To"][3 - count :] if count > 1 else ["Station"])
+            raise self.refuse(line, f"{line.code}: stations {shown(joined)} (expected {form})")
+        if count == 3 and not self.settings.at_from_to:
+            names = [names[1], names[0], names[2]]
+        return names
+
+    def place_coordinates(self, line: Line) -> None:
+        """C: north, east, elevation; E: elevation."""
+        settings, words = self.settings, line.words
+        axes = "z" if line.code == "E" else ("yx" if settings.north_first else "xy") + ("z" if settings.three_d else "")
+        numbers = words[2:]
+        if len(numbers) not in (len(axes), 2 * len(axes)):
+            form = f"{len(axes)} coordinates and none or {len(axes)} standard errors"
+            raise self.refuse(line, f"{line.code}: {len(numbers)} values (expected a name, {form})")
+        errors = numbers[len(axes) :] or ["*"] * len(axes)
+        point = self.coordinates.setdefault(words[1], {})
+        for axis, word, error in zip(axes, numbers, errors, strict=False):
+            if axis in point:
+                raise self.refuse(line, f"{axis} of {shown(words[1])} is in {point[axis][2]} already (expected once)")
+            value = number_of(line, word, self.refuse) * settings.length
+            if error not in ("!", "*"):
+                sigma = number_of(line, error, self.refuse) * settings.length
+                error = "!" if sigma == 0.0 else repr(sigma)  # a prior without error holds the coordinate
+            point[axis] = (value, error, line.place)
+
+    def measure(
+        self, line: Line, ends: Sequence[str], kinds: Sequence[tuple[str, tuple[str, ...]]], first: int
+    ) -> None:
+        """Observations from word `first` on, then none or all of their standard errors, then perhaps HI/HT."""
+        words = line.words[first:]
+        if len(words) < len(kinds):
+            form = " ".join(kind.replace("_", " ") for kind, _ in kinds)
+            raise self.refuse(line, f"{line.code}: {len(words)} values (expected {form})")
+        values, rest = words[: len(kinds)], words[len(kinds) :]
+        heights = (0.0, 0.0)
+        if rest and "/" in rest[-1]:
+            parts = rest.pop().split("/")
+            if len(parts) != 2:
+                raise self.refuse(line, f"{line.code}: heights {shown('/'.join(parts))} (expected HI/HT)")
+            heights = tuple(number_of(line, part, self.refuse) * self.settings.length for part in parts)  # type: ignore[assignment]
+        if rest and len(rest) != len(kinds):
+            form = f"none or {len(kinds)}, then perhaps HI/HT"
+            raise self.refuse(
+                line, f"{line.code}: {len(rest)} standard errors {shown(' '.join(rest))} (expected {form})"
+            )
+        errors = rest or ["&"] * len(kinds)
+        for (kind, points), word, error in zip(kinds, values, errors, strict=True):
+            if word != "?":
+                self._observe(line, kind, points or tuple(ends), word=word, error=error, heights=heights)
+
+    def _observe(
+        self, line: Line, kind: str, ends: tuple[str, ...], *, word: str, error: str, heights: tuple[float, float]
+    ) -> None:
+        length = kind in LENGTHS
+        value = (
+            number_of(line, word, self.refuse) * self.settings.length
+            if length
+            else angle_of(line, word, self.settings, self.refuse, bearing=kind == "azimuth")
+        )
+        if kind == "zenith_angle" and value > np.pi:
+            value = 2.0 * np.pi - value  # the second face
+        if error == "*":
+            self.left_out.append(f"{kind.replace('_', ' ')} of {line.place}")
+            return
+        u = self._standard_error(line, kind, error=error, value=value)
+        heights = heights if kind in ("slope_distance", "zenith_angle", "height_difference") else (0.0, 0.0)
+        parameters = {"orientation": self.orientation} if kind == "direction" else {}
+        self.draft.observe(Row(kind, ends, value, u, line.place, heights if any(heights) else (), parameters))
+
+    def _standard_error(self, line: Line, kind: str, *, error: str, value: float) -> float:
+        length = kind in LENGTHS
+        if error == "!":
+            self.held.append(f"{kind.replace('_', ' ')} of {line.place}")
+            return FIXED_LENGTH if length else FIXED_ANGLE
+        if error != "&":
+            unit = self.settings.length if length else self.settings.angle_error
+            return number_of(line, error, self.refuse) * unit
+        defaults = self.settings.defaults
+        if kind in DISTANCES and ("distance_mm" in defaults or "distance_ppm" in defaults):
+            return defaults.get("distance_mm", 0.0) * MILLIMETRE + defaults.get("distance_ppm", 0.0) * PPM * value
+        key = DEFAULTS.get(kind, "distance_mm")
+        if key not in defaults:
+            wanted = f"expected one in the line, or above it the comment '# catseye: {key} = ...'"
+            raise self.refuse(line, f"{line.code}: {kind.replace('_', ' ')} has no standard error ({wanted})")
+        return defaults[key] * (MILLIMETRE if length else np.pi / 648_000.0)
+
+    def _distance_and_height(self, ends: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
+        """What a line gives of the way from one point to another, by the mode."""
+        settings = self.settings
+        if not settings.three_d:
+            return [("horizontal_distance", ends)]
+        if settings.delta:
+            return [("horizontal_distance", ends), ("height_difference", ends)]
+        return [("slope_distance", ends), ("zenith_angle", ends)]
+
+    def angle(self, line: Line) -> None:
+        self.measure(line, self.stations(line, 3), [("angle", ())], 2)
+
+    def distance(self, line: Line) -> None:
+        self.measure(line, self.stations(line, 2), [(self._distance_and_height(())[0][0], ())], 2)
+
+    def vertical(self, line: Line) -> None:
+        if not self.settings.three_d:
+            raise self.refuse(line, "V: a vertical observation in two dimensions (expected .3D above it)")
+        self.measure(line, self.stations(line, 2), [(self._distance_and_height(())[1][0], ())], 2)
+
+    def distance_vertical(self, line: Line) -> None:
+        ends = tuple(self.stations(line, 2))
+        self.measure(line, ends, self._distance_and_height(ends), 2)
+
+    def bearing(self, line: Line) -> None:
+        self.measure(line, self.stations(line, 2), [("azimuth", ())], 2)
+
+    def all_measures(self, line: Line) -> None:
+        at, back, to = self.stations(line, 3)
+        self.measure(line, (), [("angle", (at, back, to)), *self._distance_and_height((at, to))], 2)
+
+    def bearing_measures(self, line: Line) -> None:
+        ends = tuple(self.stations(line, 2))
+        self.measure(line, ends, [("azimuth", ends), *self._distance_and_height(ends)], 2)
+
+    def begin_set(self, line: Line) -> None:
+        if self.orientation >= 0:
+            raise self.refuse(line, f"DB: the set at {shown(self.station)} is still open (expected DE before it)")
+        if len(line.words) != 2:
+            raise self.refuse(line, f"DB: {shown(line.text)} (expected DB and one station)")
+        self.station = line.words[1]
+        self.sets[self.station] = self.sets.get(self.station, 0) + 1
+        name = f"orientation {self.station} set {self.sets[self.station]}"
+        self.orientation = self.draft.parameter(name, unit="rad")
+
+    def in_set(self, line: Line) -> None:
+        if self.orientation < 0:
+            raise self.refuse(line, f"{line.code}: outside a direction set (expected DB before it)")
+        if len(line.words) < 2:
+            raise self.refuse(line, f"{line.code}: {shown(line.text)} (expected a station)")
+        ends = (self.station, line.words[1])
+        more = self._distance_and_height(ends) if line.code == "DM" else []
+        self.measure(line, ends, [("direction", ends), *more], 2)
+
+    def end_set(self, line: Line) -> None:
+        if self.orientation < 0:
+            raise self.refuse(line, "DE: no direction set is open (expected DB before it)")
+        self.station, self.orientation = "", -1
+
+    def level(self, line: Line) -> None:
+        """L: height difference, length of the section, standard error; the length only serves project defaults."""
+        ends = tuple(self.stations(line, 2))
+        words = line.words[2:]
+        if len(words) == 3 and NUMBER.fullmatch(words[1]):
+            words = [words[0], words[2]]
+        elif len(words) != 1:
+            raise self.refuse(line, f"L: {len(words)} values (expected height difference, length and standard error)")
+        error = words[1] if len(words) == 2 else "&"
+        self._observe(line, "height_difference", ends, word=words[0], error=error, heights=(0.0, 0.0))
+
+
+CODES: dict[str, Callable[[_Reader, Line], None]] = {
+    "C": _Reader.place_coordinates,
+    "E": _Reader.place_coordinates,
+    "A": _Reader.angle,
+    "D": _Reader.distance,
+    "V": _Reader.vertical,
+    "DV": _Reader.distance_vertical,
+    "B": _Reader.bearing,
+    "M": _Reader.all_measures,
+    "BM": _Reader.bearing_measures,
+    "DB": _Reader.begin_set,
+    "DN": _Reader.in_set,
+    "DM": _Reader.in_set,
+    "DE": _Reader.end_set,
+    "L": _Reader.level,
+}

@@ -1,0 +1,1 @@
+"""A campaign, its shots, its weather; and a living night's records."""

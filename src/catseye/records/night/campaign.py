@@ -1,0 +1,122 @@
+"""A campaign: a directory of records, weather, shots and samples, read whole or refused in one line."""
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from catseye.constants import SECONDS_PER_DAY
+from catseye.records.files.reading import Folder
+from catseye.records.files.refusal import refusal, shown
+from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
+from catseye.records.night.shot import Shot, Shots, in_row, read_buffers, refuse_shots, shot_columns
+from catseye.records.night.weather import Weather, WeatherSample, weather_columns
+from catseye.records.site.folder import (
+    REFERENCE,
+    SiteFolder,
+    read_records,
+    refuse_directory,
+    refuse_stranger,
+    refuse_unjoined,
+)
+
+LONGEST_CAMPAIGN = 1.0  # days from its start to any shot
+WEATHER_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a shot may lie outside the weather
+SOUND_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a path temperature may lie outside the shots
+PATH_TEMPERATURES = "path_temperatures.csv"  # optional
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign(SiteFolder):
+    """Everything that a campaign's directory holds: its site and its night.
+
+    `path_temperatures` is None where no line's temperature was measured by sound.
+    """
+
+    weather: Weather
+    shots: Shots
+    frames: np.ndarray
+    path_temperatures: PathTemperatureTable | None = None
+
+
+def read_campaign(directory: Path | str) -> Campaign:
+    """The campaign in the directory (layout: examples/night-01/README.md); a bad one raises InputError."""
+    folder = Folder(Path(directory))
+    refuse_directory(folder.directory, "campaign")
+    records = read_records(folder)
+    samples = folder.table("weather.csv", WeatherSample)
+    shots = folder.table("shots.csv", Shot)
+    buffers = read_buffers(folder)
+    sounded = os.path.lexists(folder.directory / PATH_TEMPERATURES)
+    lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
+
+    campaign = Campaign(
+        **records.named(folder),
+        weather=weather_columns(samples),
+        shots=shot_columns(shots),
+        frames=buffers,
+        path_temperatures=path_temperature_columns(lines) if lines else None,
+    )
+    refuse_unjoined(campaign, records)
+    refuse_weather(samples, [station.name for station in campaign.site.weather_station])
+    refuse_shots("shots.csv", shots, buffers)
+    refuse_strangers(campaign, shots)
+    refuse_times(campaign, shots)
+    refuse_path_temperatures(campaign, lines)
+    return campaign
+
+
+def refuse_strangers(campaign: Campaign, shots: Iterable[Shot]) -> None:
+    known, rangers = set(campaign.target_names), set(campaign.rangers)
+    for row, shot in enumerate(shots, start=1):
+        refuse_stranger("shots.csv", row, shot, known, rangers)
+
+
+def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> None:
+    """Each station's samples come in order of time, and each station has some."""
+    latest: dict[str, float] = {}
+    for row, sample in enumerate(samples, start=1):
+        if sample.station not in stations:
+            expected = f"expected one of {', '.join(stations)}, as in site.toml"
+            raise in_row("weather.csv", row, f"station = {shown(sample.station)} ({expected})")
+        if sample.mjd_utc <= latest.get(sample.station, 0.0):
+            before = f"is not after {latest[sample.station]!r}, {sample.station}'s last"
+            raise in_row("weather.csv", row, f"mjd_utc = {sample.mjd_utc!r} {before} (expected in order of time)")
+        latest[sample.station] = sample.mjd_utc
+    for station in stations:
+        if station not in latest:
+            raise refusal("weather.csv", f"station = {shown(station)} of site.toml has no row (expected at least one)")
+
+
+def refuse_times(campaign: Campaign, shots: Iterable[Shot]) -> None:
+    """Every shot was fired during the campaign, and the weather was known."""
+    start = campaign.site.campaign.start_mjd_utc
+    first, last = float(campaign.weather.mjd_utc.min()), float(campaign.weather.mjd_utc.max())
+    for row, shot in enumerate(shots, start=1):
+        if abs(shot.mjd_utc - start) > LONGEST_CAMPAIGN:
+            expected = f"expected within {LONGEST_CAMPAIGN:g} day of the campaign's start, {start!r}"
+            raise in_row("shots.csv", row, f"mjd_utc = {shot.mjd_utc!r} ({expected})")
+        if not first - WEATHER_MARGIN <= shot.mjd_utc <= last + WEATHER_MARGIN:
+            span = f"weather.csv covers {first!r} to {last!r}"
+            raise in_row("shots.csv", row, f"mjd_utc = {shot.mjd_utc!r} has no weather ({span}; expected within 1 h)")
+
+
+def refuse_path_temperatures(campaign: Campaign, lines: Sequence[PathTemperature]) -> None:
+    """Every line has two known ends, was sounded during the shots, and once at a time."""
+    if not lines:
+        return
+    known, rangers = set(campaign.target_names) - {REFERENCE}, set(campaign.rangers)
+    first, last = float(campaign.shots.mjd_utc.min()), float(campaign.shots.mjd_utc.max())
+    seen: dict[tuple[frozenset[str], float], int] = {}
+    for row, line in enumerate(lines, start=1):
+        refuse_stranger(PATH_TEMPERATURES, row, line, known, rangers)
+        if not first - SOUND_MARGIN <= line.mjd_utc <= last + SOUND_MARGIN:
+            span = f"the shots cover {first!r} to {last!r}; expected within 1 h"
+            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r} is outside the campaign ({span})")
+        key = (frozenset((line.ranger, line.target)), line.mjd_utc)
+        if key in seen:
+            same = f"{line.ranger} - {line.target} has a temperature at that time in row {seen[key]}"
+            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r}: {same} (expected one)")
+        seen[key] = row

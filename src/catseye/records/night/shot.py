@@ -1,0 +1,149 @@
+"""shots.csv and frames.npy: which ranger shot at which target and when, and the buffers of samples."""
+
+import hashlib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, BinaryIO
+
+import numpy as np
+from pydantic import model_validator
+
+from catseye.errors import InputError
+from catseye.records.files.reading import Folder, column
+from catseye.records.files.record import Mjd, Name, Record, Within, broken_rule
+from catseye.records.files.refusal import refusal, shown, unreadable
+from catseye.records.site.site import MOST_SAMPLES, too_many_samples
+
+MAGIC = b"\x93NUMPY"
+LONGEST_HEADER = 65_536  # bytes; numpy itself writes 118 here
+SAMPLE_BYTES = 2
+
+
+class Shot(Record):
+    """A row of shots.csv: one measured range; `frame` is its buffer's row in frames.npy, counted from 0."""
+
+    shot: Annotated[int, Within(0, 2**53)]
+    mjd_utc: Mjd
+    ranger: Name
+    target: Name
+    cycles: Annotated[int, Within(1, MOST_SAMPLES)]
+    samples_per_cycle: Annotated[int, Within(3, MOST_SAMPLES)]
+    frame: Annotated[int, Within(0, 2**53)]
+
+    @model_validator(mode="after")
+    def _fits_a_buffer(self) -> "Shot":
+        if self.cycles * self.samples_per_cycle > MOST_SAMPLES:
+            raise broken_rule(too_many_samples(self.cycles, self.samples_per_cycle, MOST_SAMPLES))
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """All shots in the order of the file, as read-only columns."""
+
+    shot: np.ndarray
+    mjd_utc: np.ndarray
+    ranger: tuple[str, ...]
+    target: tuple[str, ...]
+    cycles: np.ndarray
+    samples_per_cycle: np.ndarray
+    frame: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ranger)
+
+
+def shot_columns(shots: Sequence[Shot]) -> Shots:
+    return Shots(
+        shot=column([shot.shot for shot in shots], np.int64),
+        mjd_utc=column([shot.mjd_utc for shot in shots], np.float64),
+        ranger=tuple(shot.ranger for shot in shots),
+        target=tuple(shot.target for shot in shots),
+        cycles=column([shot.cycles for shot in shots], np.int64),
+        samples_per_cycle=column([shot.samples_per_cycle for shot in shots], np.int64),
+        frame=column([shot.frame for shot in shots], np.int64),
+    )
+
+
+def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
+    """The buffers (rows, samples) of int16, mapped read-only; nothing in the file is ever run."""
+    path = folder.path(file)
+    try:
+        with path.open("rb") as stream:
+            header = header_of(stream, file)
+            shape, fortran = checked_header(header, file)
+            start, size = stream.tell(), path.stat().st_size
+            promised = math.prod(shape) * SAMPLE_BYTES
+            if size - start != promised:
+                fault = "truncated" if size - start < promised else "too long"
+                held = f"holds {size - start} bytes of data, its header promises {promised}"
+                raise refusal(file, f"{held}: {fault}")
+            stream.seek(0)
+            folder.hashes[file] = hashlib.file_digest(stream, "sha256").hexdigest()
+        return np.memmap(path, dtype="<i2", mode="r", offset=start, shape=shape, order="F" if fortran else "C")
+    except OSError as problem:
+        raise unreadable(file, problem) from problem
+
+
+def header_of(stream: BinaryIO, file: str) -> str:
+    """The header's text, which describes the array; the stream stands at the data afterwards."""
+    opening = stream.read(8)
+    if not opening:
+        raise refusal(file, "holds 0 bytes: empty")
+    if len(opening) < 8 or opening[:6] != MAGIC or opening[6] not in (1, 2, 3):
+        raise refusal(file, f"starts with {shown(opening)} (expected the .npy signature {MAGIC!r}, version 1 to 3)")
+    width = 2 if opening[6] == 1 else 4
+    length = int.from_bytes(stream.read(width), "little")
+    header = stream.read(min(length, LONGEST_HEADER))
+    if len(header) != length:
+        raise refusal(file, f"holds {len(header)} bytes of header, its size field promises {length}: truncated")
+    return header.decode("latin-1")
+
+
+def checked_header(header: str, file: str) -> tuple[tuple[int, int], bool]:
+    """The shape, and whether columns come first, of an array that can be buffers."""
+    kind = re.search(r"['\"]descr['\"]: *['\"]([^'\"]*)['\"]", header)
+    order = re.search(r"['\"]fortran_order['\"]: *(True|False)", header)
+    shape = re.search(r"['\"]shape['\"]: *\(([0-9, ]{0,60})\)", header)
+    if kind and kind[1].startswith("|O"):
+        raise refusal(file, f"header, descr = {shown(kind[1])} holds pickled objects, never read (expected '<i2')")
+    if not kind or kind[1] != "<i2":
+        raise refusal(file, f"header, descr = {shown(kind[1] if kind else header)} (expected '<i2', int16)")
+    if not order or not shape:
+        raise refusal(file, f"header {shown(header)} (expected fortran_order and shape)")
+    sizes = [int(size) for size in re.findall("[0-9]+", shape[1])]
+    if len(sizes) != 2 or not all(sizes):
+        raise refusal(file, f"header, shape = ({shape[1]}) (expected (buffers, samples), none of them zero)")
+    return (sizes[0], sizes[1]), order[1] == "True"
+
+
+def refuse_shots(file: str, shots: Sequence[Shot], buffers: np.memmap) -> None:
+    """Shots come in order of time, each once, each with a buffer of its own that holds its samples."""
+    if not shots:
+        raise refusal(file, "row 1 is missing, 0 shots (expected at least one)")
+    rows, width = buffers.shape
+    rows_of_ids: dict[int, int] = {}
+    rows_of_frames: dict[int, int] = {}
+    latest: dict[str, float] = {}
+    previous = -math.inf
+    for row, shot in enumerate(shots, start=1):
+        if not shot.frame < rows:
+            raise in_row(file, row, f"frame = {shot.frame} is not in frames.npy (expected 0 to {rows - 1})")
+        if shot.cycles * shot.samples_per_cycle > width:
+            raise in_row(file, row, too_many_samples(shot.cycles, shot.samples_per_cycle, width))
+        if (first := rows_of_ids.setdefault(shot.shot, row)) != row:
+            raise in_row(file, row, f"shot = {shot.shot} is in row {first} already (expected each shot once)")
+        if (first := rows_of_frames.setdefault(shot.frame, row)) != row:
+            raise in_row(file, row, f"frame = {shot.frame} is in row {first} already (expected a buffer a shot)")
+        if shot.mjd_utc < previous:
+            raise in_row(file, row, f"mjd_utc = {shot.mjd_utc!r} is before {previous!r} (expected in order of time)")
+        if shot.mjd_utc <= latest.get(shot.ranger, -math.inf):
+            again = f"mjd_utc = {shot.mjd_utc!r} is the time of {shot.ranger}'s last shot too"
+            raise in_row(file, row, f"{again} (expected a later time)")
+        latest[shot.ranger] = previous = shot.mjd_utc
+
+
+def in_row(file: str, row: int, problem: str) -> InputError:
+    return refusal(file, f"row {row}, {problem}")

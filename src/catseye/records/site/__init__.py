@@ -1,0 +1,1 @@
+"""A site: monuments, mirrors, targets, triplets, what is in the way."""

@@ -1,0 +1,182 @@
+"""A beam from laser to reflector to detector, element by element; the layout is docs/formats/beam.md."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from catseye.records.files.record import Certificate, Record, Version, Within, broken_rule
+
+Millimetres = Annotated[float, Within(0, 1e6)]
+Size = Annotated[float, Within(1e-4, 1e6)]  # mm, of what has one
+Curved = Annotated[float, Within(-1e7, 1e7)]  # mm; above zero where the centre lies behind the surface
+Share = Annotated[float, Within(0, 1, above=True)]
+Leak = Annotated[float, Within(0, 1)]
+Quality = Annotated[float, Within(1, 100)]
+Incidence = Annotated[float, Within(0, 89)]  # degrees
+Axis = Literal["x", "y"]
+Kind = Literal["space", "lens", "thick_lens", "mirror", "plate", "aperture", "splitter", "isolator"]
+
+# keys of each kind: needed, and welcome besides
+KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "space": (("length_mm",), ()),
+    "lens": (("focal_length_mm",), ("acts",)),
+    "thick_lens": (("thickness_mm", "glass"), ("r1_mm", "r2_mm")),
+    "mirror": ((), ("radius_mm", "incidence_deg", "plane", "coating")),
+    "plate": (("thickness_mm", "glass"), ("incidence_deg", "plane")),
+    "aperture": (("aperture_radius_mm",), ()),
+    "splitter": (("transmission",), ()),
+    "isolator": ((), ("turn_deg", "leak")),
+}
+COMMON = {"kind", "name", "aperture_radius_mm", "transmission"}
+
+
+class Laser(Record):
+    """[laser]: two planes, x and y; the waist of each as a radius at 1/e^2, or from the full angle at half maximum.
+
+    power_mw                 mean
+    waist_*_um               radius at 1/e^2
+    divergence_*_deg         full angle at half maximum, as data sheets of diodes have it; instead of the waist
+    astigmatism_um           by how much the waist of x lies deeper in the laser than that of y, which stands at 0
+    quality_*                M^2
+    polarization             along which axis the field lies; behind an isolator it is turned by 45 degrees
+    back_reflection          share of the emitted power that comes back to the isolator, from all there is
+    regulation_rad           phase for each unit of relative change of the power; see `signal.feedback`
+    """
+
+    power_mw: Annotated[float, Within(1e-6, 1e5)]
+    waist_x_um: Annotated[float, Within(0.05, 1e5)] | None = None
+    waist_y_um: Annotated[float, Within(0.05, 1e5)] | None = None
+    divergence_x_deg: Annotated[float, Within(1e-4, 60)] | None = None
+    divergence_y_deg: Annotated[float, Within(1e-4, 60)] | None = None
+    astigmatism_um: Annotated[float, Within(-1000, 1000)] = 0.0
+    quality_x: Quality = 1.0
+    quality_y: Quality = 1.0
+    polarization: Axis = "x"
+    back_reflection: Leak | None = None
+    regulation_rad: Annotated[float, Within(-10, 10)] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_size_in_each_plane(self) -> "Laser":
+        for axis in ("x", "y"):
+            given = [key for key in (f"waist_{axis}_um", f"divergence_{axis}_deg") if getattr(self, key) is not None]
+            if len(given) != 1:
+                raise broken_rule(
+                    f"laser has {' and '.join(given) or 'neither'} (expected waist_{axis}_um or "
+                    f"divergence_{axis}_deg, one of them)"
+                )
+        return self
+
+
+class Element(Record):
+    """[[outward]], [[inward]]: one thing that the light meets, in order.
+
+    kind                 space, lens, thick_lens, mirror, plate, aperture, splitter, isolator
+    aperture_radius_mm   of any element: what passes beside it is lost
+    transmission         of any element, coating of a mirror not counted
+    length_mm            of a space, in air
+    focal_length_mm      of a thin lens; acts = "x" or "y" for a cylindrical one
+    r1_mm, r2_mm         of a thick lens, above zero where the centre lies behind; missing means flat
+    thickness_mm, glass  of a thick lens or a plate
+    radius_mm            of a mirror, above zero for a hollow one; missing means flat
+    incidence_deg        on a mirror or a plate; `plane` is the axis that lies in the plane of incidence
+    coating              of a mirror, by its name in `optics.coating`
+    turn_deg, leak       of an isolator: what its rotator turns, what each polarizer leaks
+    """
+
+    kind: Kind
+    name: str = ""
+    aperture_radius_mm: Size | None = None
+    transmission: Share = 1.0
+    length_mm: Millimetres | None = None
+    focal_length_mm: Curved | None = None
+    acts: Literal["both", "x", "y"] | None = None
+    r1_mm: Curved | None = None
+    r2_mm: Curved | None = None
+    thickness_mm: Millimetres | None = None
+    glass: str | None = None
+    radius_mm: Curved | None = None
+    incidence_deg: Incidence | None = None
+    plane: Axis | None = None
+    coating: str | None = None
+    turn_deg: Annotated[float, Within(0, 90)] | None = None
+    leak: Leak | None = None
+
+    @model_validator(mode="after")
+    def _has_the_keys_of_its_kind(self) -> "Element":
+        needed, welcome = KEYS[self.kind]
+        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
+        for key in needed:
+            if key not in given:
+                raise broken_rule(f"{key} is missing (expected for kind = '{self.kind}')")
+        for key in sorted(given - COMMON - set(needed) - set(welcome)):
+            raise broken_rule(f"{key} = {getattr(self, key)!r} does not belong to kind = '{self.kind}'")
+        for key in ("focal_length_mm", "r1_mm", "r2_mm", "radius_mm"):
+            if getattr(self, key) == 0.0:
+                raise broken_rule(f"{key} = 0 (expected another length; a flat surface has no such key)")
+        return self
+
+
+class Reflector(Record):
+    """[reflector]: a retroreflector, centred in the beam.
+
+    radius_mm     of its clear aperture
+    reflectance   of all its surfaces
+    """
+
+    name: str = ""
+    radius_mm: Size
+    reflectance: Share = 1.0
+
+
+class Detector(Record):
+    """[detector]: a round photodiode behind the last inward element.
+
+    radius_mm                     of the active disc
+    offset_um, u_offset_um        of the image from its centre, and the standard uncertainty of each coordinate
+    spot_um                       radius of the image at 1/e^2; from the beam if missing
+    sheet_resistance_ohm          per square; with capacitance_pf the delay across the disc: `optics.detector`
+    """
+
+    radius_mm: Size
+    offset_um: Annotated[float, Within(0, 1e5)] = 0.0
+    u_offset_um: Annotated[float, Within(0, 1e5)] = 0.0
+    spot_um: Annotated[float, Within(0.1, 1e5)] | None = None
+    sheet_resistance_ohm: Annotated[float, Within(1e-3, 1e6)] | None = None
+    capacitance_pf: Annotated[float, Within(1e-3, 1e5)] | None = None
+
+    @model_validator(mode="after")
+    def _has_resistance_with_capacitance(self) -> "Detector":
+        if (self.sheet_resistance_ohm is None) != (self.capacitance_pf is None):
+            raise broken_rule("sheet_resistance_ohm and capacitance_pf go together (expected both or none)")
+        return self
+
+    @model_validator(mode="after")
+    def _has_its_image_on_it(self) -> "Detector":
+        if self.offset_um > self.radius_mm * 1e3:
+            raise broken_rule(
+                f"offset_um = {self.offset_um:g} is beside the disc (expected up to {self.radius_mm * 1e3:g}, as its "
+                "radius_mm says)"
+            )
+        return self
+
+
+class BeamTrain(Certificate):
+    """The whole file.
+
+    wavelength_um    of the light in air
+    modulation_hz    of its amplitude
+    distance_m       from the last outward element to the reflector and from it to the first inward one
+    distances_m      for the table of returned power; a doubling row about distance_m if missing
+    """
+
+    format: Annotated[int | str, Version("beam")]
+    name: str
+    wavelength_um: Annotated[float, Within(0.3, 2.0)] = 0.780
+    modulation_hz: Annotated[float, Within(1e6, 1e11)] = 1500e6
+    distance_m: Annotated[float, Within(0.01, 1e6)]
+    distances_m: Annotated[tuple[Annotated[float, Within(0.01, 1e6)], ...], Field(strict=False, max_length=200)] = ()
+    laser: Laser
+    outward: Annotated[tuple[Element, ...], Field(strict=False)]
+    reflector: Reflector
+    inward: Annotated[tuple[Element, ...], Field(strict=False)]
+    detector: Detector

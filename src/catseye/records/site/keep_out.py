@@ -1,0 +1,105 @@
+"""keep-out.toml: boxes that no beam may enter, and the Sun's cone."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.geometry.keep_out import Box
+from catseye.records.files.record import Certificate, Name, Record, Vector, Version, Within, broken_rule
+
+SMALLEST_MM, LARGEST_MM = 50.0, 1e6  # of a box: a sandwich in mm, a mountain in mm; neither can be metres
+FARTHEST_MM = 1e7
+Margin = Annotated[float, Within(0, 2000)]  # counts
+
+
+class KeepOutBox(Record):
+    """[[box]]: an upright solid in the ground frame, by its two corners or by its centre and size.
+
+    low_mm, high_mm      corners with the least and the greatest x, y, z, before the turn
+    centre_mm, size_mm   instead
+    turn_deg             about its vertical middle axis, from x towards y
+    why                  what it keeps the beam off; a refusal says it
+    """
+
+    name: Name
+    why: str = Field(min_length=3)
+    low_mm: Vector | None = None
+    high_mm: Vector | None = None
+    centre_mm: Vector | None = None
+    size_mm: Vector | None = None
+    turn_deg: Annotated[float, Within(-360, 360)] = 0.0
+
+    @model_validator(mode="after")
+    def _is_given_one_way(self) -> "KeepOutBox":
+        corners = (self.low_mm is not None) + (self.high_mm is not None)
+        middle = (self.centre_mm is not None) + (self.size_mm is not None)
+        if (corners, middle) not in ((2, 0), (0, 2)):
+            given = [k for k in ("low_mm", "high_mm", "centre_mm", "size_mm") if getattr(self, k) is not None]
+            raise broken_rule(
+                f"{self.name} is given by {', '.join(given) or 'nothing'} "
+                "(expected low_mm and high_mm, or centre_mm and size_mm)"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_solid_in_millimetres(self) -> "KeepOutBox":
+        centre, size = self._centre_and_size_mm()
+        for axis, (c, s) in zip("xyz", zip(centre, size, strict=True), strict=True):
+            if s <= 0.0 and self.low_mm is not None:
+                low, high = c - 0.5 * s, c + 0.5 * s
+                raise broken_rule(
+                    f"{self.name}: low_mm = {low:g} is not below high_mm = {high:g} along {axis} (expected low < high)"
+                )
+            if not SMALLEST_MM <= s <= LARGEST_MM:
+                metres = " looks like metres" if SMALLEST_MM <= 1e3 * s <= LARGEST_MM else ""
+                limits = f"expected {SMALLEST_MM:g} to {LARGEST_MM:g}"
+                raise broken_rule(f"{self.name}: its size along {axis}, {s:g} mm{metres} ({limits})")
+            if abs(c) > FARTHEST_MM:
+                raise broken_rule(f"{self.name}: its middle is at {axis} = {c:g} mm (expected within {FARTHEST_MM:g})")
+        return self
+
+    def box(self, length: float = np.inf) -> Box:
+        """In metres and radians, for a beam of a length, m."""
+        centre, size = (np.array(v) * MILLIMETRE for v in self._centre_and_size_mm())
+        return Box(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
+
+    def _centre_and_size_mm(self) -> tuple[list[float], list[float]]:
+        if self.centre_mm is not None and self.size_mm is not None:
+            return list(self.centre_mm), list(self.size_mm)
+        pairs = list(zip(self.low_mm or (), self.high_mm or (), strict=True))
+        return [0.5 * (low + high) for low, high in pairs], [high - low for low, high in pairs]
+
+
+class SunCone(Record):
+    """[sun]: the cone about its middle, and the altitude below which it is set."""
+
+    half_angle_deg: Annotated[float, Within(0.5, 60)] = 5.0
+    horizon_deg: Annotated[float, Within(-90, 0)] = -2.0
+
+
+class KeepOut(Certificate):
+    """The whole of a file.
+
+    beam_length_m   what lies further from a scan point does not count; without it the beam has no end
+    margin_counts   how far azimuth and elevation axis may be off their profile, a later start of one axis included
+    """
+
+    format: Annotated[int | str, Version("keep-out")] = 1
+    sun: SunCone = SunCone()
+    beam_length_m: Annotated[float, Within(1, 1e5)] | None = None
+    margin_counts: Annotated[tuple[Margin, Margin], Field(strict=False)] = (20.0, 20.0)
+    box: Annotated[tuple[KeepOutBox, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _names_each_box_once(self) -> "KeepOut":
+        names = [box.name for box in self.box]
+        for name in names:
+            if names.count(name) > 1:
+                raise broken_rule(f"box {name!r} is given twice (expected each name once)")
+        return self
+
+    def boxes(self) -> tuple[Box, ...]:
+        """All boxes, for beams of this length."""
+        return tuple(box.box(np.inf if self.beam_length_m is None else self.beam_length_m) for box in self.box)

@@ -1,0 +1,194 @@
+"""mirrors/ZPnnn.toml: what the laboratory knows of a ranger's head and mirror."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from catseye.constants import TWO_PI
+from catseye.records.files.record import Certificate, Name, Uncertainty, Version, Within, broken_rule
+
+Counts = Annotated[int, Within(-1_000_000, 1_000_000)]  # 100 000 a turn
+Zero = Annotated[int | float, Within(-1_000_000, 1_000_000)]  # counts; a calibration finds parts of one
+FewCounts = Annotated[float, Within(-1000, 1000)]  # what an encoder may be wrong: 1000 are 3.6 degrees
+Offset = Annotated[float, Within(-100, 100)]
+Tilt = Annotated[float, Within(-0.1, 0.1)]
+PositiveVolts = Annotated[float, Within(0, 10, above=True)]
+AxisOffset = Annotated[float, Within(-10, 10)]  # mm
+Cycle = Annotated[float, Within(-1, 1)]  # mm
+SmallTilt = Annotated[float, Within(-0.05, 0.05)]
+UncertainTilt = Annotated[float, Within(0, 0.05, above=True)]
+UncertainCounts = Annotated[float, Within(0, 1000, above=True)]
+Orders = Annotated[tuple[FewCounts, ...], Field(strict=False, max_length=8)]
+Part = int | Annotated[str, Field(min_length=1)]  # a serial number
+Setting = Annotated[int, Within(0, 2**30 - 1)]  # of the motion chip
+Gain = Annotated[int, Within(0, 32_767)]
+Interval = Annotated[int, Within(0, 255)]
+CountLimit = Annotated[int, Within(0, 25_000)]
+
+UNCERTAIN = (
+    (("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm"), "u_axis_mm"),
+    (("amplitude_to_phase_rad",), "u_amplitude_to_phase_rad"),
+    (("cyclic_cosine_mm", "cyclic_sine_mm"), "u_cyclic_mm"),
+    (("azimuth_encoder_cosine_counts", "azimuth_encoder_sine_counts"), "u_encoder_counts"),
+    (("elevation_encoder_cosine_counts", "elevation_encoder_sine_counts"), "u_encoder_counts"),
+    (("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad"), "u_tilt_rad"),
+)
+PAIRED = (
+    ("cyclic_cosine_mm", "cyclic_sine_mm"),
+    ("azimuth_encoder_cosine_counts", "azimuth_encoder_sine_counts"),
+    ("elevation_encoder_cosine_counts", "elevation_encoder_sine_counts"),
+)
+
+
+class MirrorGeometry(Certificate):
+    """A mirror as far as its pointing needs: what it ranges with may be missing.
+
+    dx_mm, dy_mm, dz_mm scan point from the Kelvin fixed point, mount's axes, with u_offset_mm each
+    beta1_rad, beta2_rad  small turns about x and y, with u_beta_rad each
+    na0, ne0            encoder counts at zero, with u_zero_counts each
+    az_low_limit, az_high_limit  counts, both allowed
+    axis_offset_mm      elevation axis from the azimuth axis, above zero along the azimuth of the beam
+    mirror_offset_mm    reflecting face from the elevation axis, above zero along its outward normal
+    beam_x_mm, beam_y_mm  laser beam from the azimuth axis where it meets the mirror, mirror's axes at Theta = 0
+    u_axis_mm           of each of these four
+    face_tilt_rad       of the face's outward normal from the plane across the elevation axis, towards the axis's y end
+                        (y of the mirror's axes at Theta = 0)
+    beam_tilt_x_rad, beam_tilt_y_rad  x and y of the direction against which the laser beam comes in; z is nearly 1
+    u_tilt_rad          of each of these three
+    azimuth_encoder_cosine_counts, ..._sine_counts, elevation_encoder_...  orders 1, 2, ... of what the encoder reads
+                        too high, waves of the axis's turn from its zero; with u_encoder_counts of each
+    laser_number, detector_number, head_number, oscillator_number  parts of the head
+    abv_0, aba_0        velocity and acceleration of axis 0 (azimuth), integers of the motion chip: counts a sample
+                        (a sample) times 65 536; fkp_0, fki_0, fkd_0, fil_0, fsi_0 its filter; erl_0 in counts; _1 is
+                        elevation
+    detector_defocus_mm, beam_divergence_rad  with u_ of each: of the optics, for the record
+    notes               what the report's NOTES say
+    """
+
+    format: Annotated[int | str, Version("mirror")] = 1
+    zp: Name
+    laser_number: Part | None = None
+    detector_number: Part | None = None
+    head_number: Part | None = None
+    oscillator_number: Part | None = None
+    leakage_amplitude_volt: Annotated[float, Within(0, 10)] | None = None
+    leakage_phase_rad: Annotated[float, Within(-TWO_PI, TWO_PI)] | None = None
+    u_leakage_volt: PositiveVolts | None = None
+    d0_mm: Annotated[float, Within(50, 1000)] | None = None
+    u_d0_mm: Uncertainty | None = None
+    dx_mm: Offset
+    dy_mm: Annotated[float, Within(50, 1000)]
+    dz_mm: Offset
+    u_offset_mm: Uncertainty | None = None
+    beta1_rad: Tilt
+    beta2_rad: Tilt
+    u_beta_rad: UncertainTilt | None = None
+    axis_offset_mm: AxisOffset = 0.0
+    mirror_offset_mm: AxisOffset = 0.0
+    beam_x_mm: AxisOffset = 0.0
+    beam_y_mm: AxisOffset = 0.0
+    u_axis_mm: Uncertainty | None = None
+    face_tilt_rad: SmallTilt = 0.0
+    beam_tilt_x_rad: SmallTilt = 0.0
+    beam_tilt_y_rad: SmallTilt = 0.0
+    u_tilt_rad: UncertainTilt | None = None
+    detector_defocus_mm: Annotated[float, Within(-100, 100)] | None = None
+    u_detector_defocus_mm: Uncertainty | None = None
+    beam_divergence_rad: Annotated[float, Within(0, 0.1)] | None = None
+    u_beam_divergence_rad: Annotated[float, Within(0, 0.1, above=True)] | None = None
+    amplitude_to_phase_rad: Annotated[float, Within(-0.1, 0.1)] = 0.0
+    u_amplitude_to_phase_rad: Annotated[float, Within(0, 0.1, above=True)] | None = None
+    cyclic_cosine_mm: Annotated[tuple[Cycle, ...], Field(strict=False, max_length=8)] = ()
+    cyclic_sine_mm: Annotated[tuple[Cycle, ...], Field(strict=False, max_length=8)] = ()
+    u_cyclic_mm: Uncertainty | None = None
+    na0: Zero
+    ne0: Zero
+    u_zero_counts: UncertainCounts | None = None
+    azimuth_encoder_cosine_counts: Orders = ()
+    azimuth_encoder_sine_counts: Orders = ()
+    elevation_encoder_cosine_counts: Orders = ()
+    elevation_encoder_sine_counts: Orders = ()
+    u_encoder_counts: UncertainCounts | None = None
+    az_low_limit: Counts
+    az_high_limit: Counts
+    azm_zrg: Counts | None = None
+    elv_zrg: Counts | None = None
+    abv_0: Setting | None = None
+    aba_0: Setting | None = None
+    fkp_0: Gain | None = None
+    fki_0: Gain | None = None
+    fkd_0: Gain | None = None
+    fil_0: Gain | None = None
+    fsi_0: Interval | None = None
+    erl_0: CountLimit | None = None
+    abv_1: Setting | None = None
+    aba_1: Setting | None = None
+    fkp_1: Gain | None = None
+    fki_1: Gain | None = None
+    fkd_1: Gain | None = None
+    fil_1: Gain | None = None
+    fsi_1: Interval | None = None
+    erl_1: CountLimit | None = None
+    notes: Annotated[str, Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _has_room_between_its_limits(self) -> Self:
+        if self.az_low_limit >= self.az_high_limit:
+            low, high = self.az_low_limit, self.az_high_limit
+            raise broken_rule(f"az_low_limit = {low} is not below az_high_limit = {high} (expected low < high)")
+        return self
+
+    @model_validator(mode="after")
+    def _says_how_well_it_knows_its_effects(self) -> Self:
+        for keys, u in UNCERTAIN:
+            for key in keys:
+                value = getattr(self, key)
+                terms = value if isinstance(value, tuple) else (value,)
+                if any(terms) and getattr(self, u) is None:
+                    shown = list(value) if isinstance(value, tuple) else value
+                    raise broken_rule(f"{key} = {shown} has no {u} (expected its standard uncertainty)")
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_sine_for_each_cosine(self) -> Self:
+        for cosine, sine in PAIRED:
+            cosines, sines = len(getattr(self, cosine)), len(getattr(self, sine))
+            if cosines != sines:
+                raise broken_rule(f"{cosine} has {cosines} orders, {sine} {sines} (expected as many of each)")
+        return self
+
+    @model_validator(mode="after")
+    def _accelerates_no_faster_than_it_moves(self) -> Self:
+        for axis in (0, 1):
+            velocity, acceleration = getattr(self, f"abv_{axis}"), getattr(self, f"aba_{axis}")
+            if velocity is not None and acceleration is not None and velocity < acceleration:
+                raise broken_rule(
+                    f"abv_{axis} = {velocity} is below aba_{axis} = {acceleration} (expected no less: the motion chip "
+                    "would pass its velocity in the first sample)"
+                )
+        return self
+
+
+class Mirror(MirrorGeometry):
+    """A laser head with its mirror, all that ranging needs; what is not said here is in `MirrorGeometry`.
+
+    leakage_amplitude_volt, leakage_phase_rad, u_leakage_volt   the phasor that leaks into every shot
+    d0_mm               straight from the scan point to the internal reference cube, with u_d0_mm
+    amplitude_to_phase_rad  growth of the measured phase for each factor e of amplitude above that of the reference
+                        shots, with u_amplitude_to_phase_rad
+    cyclic_cosine_mm, cyclic_sine_mm  of the range read too long, orders 1, 2, ... of the phase after the electronics',
+                        with u_cyclic_mm of each; u_cyclic_mm alone means orders 1 and 2, expected zero
+    azm_zrg, elv_zrg    counts that look at the cube
+
+    The scan point is where the axes should meet: on the azimuth axis, nearest to the elevation axis. D0 is a distance
+    between two points; what offsets add to the way to the cube, at the angles of azm_zrg and elv_zrg, is not in it.
+    """
+
+    leakage_amplitude_volt: Annotated[float, Within(0, 10)]
+    leakage_phase_rad: Annotated[float, Within(-TWO_PI, TWO_PI)]
+    u_leakage_volt: PositiveVolts
+    d0_mm: Annotated[float, Within(50, 1000)]
+    u_d0_mm: Uncertainty
+    u_offset_mm: Uncertainty
+    azm_zrg: Counts
+    elv_zrg: Counts

@@ -1,0 +1,64 @@
+"""A pointing series with its covariance as a TOML file: catseye-pointing-series-1."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from catseye.constants import ARCSECOND
+from catseye.geometry.pointing_series import TERMS, PointingSeries
+from catseye.records.files.record import Certificate, Within, broken_rule
+
+FORMAT = "catseye-pointing-series-1"
+SYMMETRY = 1e-6  # of two standard uncertainties' product: files carry ten digits
+Term = Literal["IA", "IE", "CA", "NPAE", "AW", "AN", "HZCZ", "HZSZ"]
+Row = Annotated[tuple[float, ...], Field(strict=False)]
+Coefficient = Annotated[float, Within(-36_000, 36_000)]  # arcsec: ten degrees
+
+
+class PointingModel(Certificate):
+    """The whole of a pointing series' file.
+
+    terms               names of the coefficients, each once
+    values_arcsec       as many
+    covariance_arcsec2  of these, rows in the same order; none where nothing is known of it
+    sky_rms_arcsec      of the fit, if it was one
+    """
+
+    format: Literal["catseye-pointing-series-1"]
+    name: str = Field(min_length=1, max_length=200)
+    terms: Annotated[tuple[Term, ...], Field(strict=False, min_length=1)]
+    values_arcsec: Annotated[tuple[Coefficient, ...], Field(strict=False)]
+    covariance_arcsec2: Annotated[tuple[Row, ...], Field(strict=False)] | None = None
+    sky_rms_arcsec: Annotated[float, Within(0, 36_000)] | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "PointingModel":
+        k = len(self.terms)
+        if len(set(self.terms)) != k:
+            raise broken_rule(f"terms = {list(self.terms)} names one twice (expected each of {', '.join(TERMS)} once)")
+        if len(self.values_arcsec) != k:
+            raise broken_rule(f"values_arcsec has {len(self.values_arcsec)} values (expected {k}, as terms)")
+        if self.covariance_arcsec2 is not None:
+            _refuse_covariance(self.covariance_arcsec2, k)
+        return self
+
+    @property
+    def series(self) -> PointingSeries:
+        """In radians; a covariance that is not given is zero."""
+        k, values = len(self.terms), np.array(self.values_arcsec) * ARCSECOND
+        given = self.covariance_arcsec2
+        q = np.zeros((k, k)) if given is None else np.array(given) * ARCSECOND**2
+        return PointingSeries(tuple(self.terms), values, q)
+
+
+def _refuse_covariance(rows: tuple[tuple[float, ...], ...], k: int) -> None:
+    if len(rows) != k or any(len(row) != k for row in rows):
+        raise broken_rule(f"covariance_arcsec2 has {len(rows)} rows (expected {k} of {k} numbers, as terms)")
+    q = np.array(rows)
+    variance = np.diag(q)
+    if np.any(variance < 0.0):
+        raise broken_rule(f"covariance_arcsec2 has the variance {variance.min()} (expected 0 or more)")
+    scale = np.sqrt(np.maximum(np.outer(variance, variance), 1e-300))
+    if np.any(np.abs(q - q.T) > SYMMETRY * scale) or np.linalg.eigvalsh(q / scale)[0] < -SYMMETRY * k:
+        raise broken_rule("covariance_arcsec2 is no covariance (expected it symmetric, with no negative eigenvalue)")

@@ -1,0 +1,135 @@
+"""site.toml: posture, frames, telescope constants, ranging constants, converter, weather stations."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from catseye.records.files.record import (
+    Certificate,
+    Elevation,
+    Latitude,
+    Length,
+    Mjd,
+    Name,
+    Pair,
+    Record,
+    TelescopeAzimuth,
+    TelescopeElevation,
+    Vector,
+    Version,
+    Within,
+    broken_rule,
+)
+
+MOST_SAMPLES = 65_536  # of one buffer
+PositiveMillimetres = Annotated[float, Within(500, 1e6)]
+
+
+class Posture(Record):
+    """[campaign]: when, and how the telescope stood."""
+
+    name: str = Field(min_length=1)
+    start_mjd_utc: Mjd
+    azimuth_deg: TelescopeAzimuth
+    elevation_deg: TelescopeElevation
+
+
+class Location(Record):
+    """[site]: longitude east positive; elevation of the ground frame's z = 0 above the sea."""
+
+    latitude_deg: Latitude
+    longitude_deg: Annotated[float, Within(-180, 360)]
+    elevation_of_z0_m: Elevation
+
+
+class GroundFrame(Record):
+    """[frames.ground]: x east, y north, z up."""
+
+    description: str
+
+
+class ReflectorFrame(Record):
+    """[frames.reflector]: z along the paraboloid's axis, and its nominal transformation to ground."""
+
+    description: str
+    reflector_to_elevation_mm: Annotated[Vector, Length(100, 1e6, or_zero=True)]
+    elevation_axis_height_mm: PositiveMillimetres
+
+
+class Frames(Record):
+    """[frames]: the two frames in which positions are given."""
+
+    ground: GroundFrame
+    reflector: ReflectorFrame
+
+
+class Paraboloid(Record):
+    """[paraboloid]: the design surface; its aperture in the reflector frame's x and y."""
+
+    focal_length_mm: PositiveMillimetres
+    aperture_centre_mm: Annotated[Pair, Length(500, 1e6, or_zero=True)]
+    aperture_radius_mm: Annotated[float, Within(250, 1e6)]
+
+
+class Ranging(Record):
+    """[ranging]: the modulation, and how quiet electronics and air usually are.
+
+    bk7_to_air_phase_index_ratio   where given, oblique light is bent by it, as it is; without, by the group index as
+                                   appendix B of the triplet memo has it (0.4 um at 30 degrees)
+    """
+
+    modulation_hz: Annotated[float, Within(1e6, 1e11)]
+    if_hz: Annotated[float, Within(1, 1e8)]
+    wavelength_um: Annotated[float, Within(0.2, 20)]
+    bk7_to_air_group_index_ratio: Annotated[float, Within(1.3, 2.0)]
+    bk7_to_air_phase_index_ratio: Annotated[float, Within(1.3, 2.0)] | None = None
+    electronic_drift_mrad_per_sqrt_hour: Annotated[float, Within(0, 6283)]
+    path_index_fluctuation_ppm: Annotated[float, Within(0, 300)]
+
+
+class Adc(Record):
+    """[adc]: the converter; a code of 32768 stands for full_scale_volt."""
+
+    bits: Annotated[int, Within(8, 16)]
+    full_scale_volt: Annotated[float, Within(0.01, 1000)]
+    samples_per_cycle: Annotated[int, Within(3, MOST_SAMPLES)]
+    cycles: Annotated[int, Within(1, MOST_SAMPLES)]
+
+    @model_validator(mode="after")
+    def _fits_a_buffer(self) -> "Adc":
+        if self.cycles * self.samples_per_cycle > MOST_SAMPLES:
+            raise broken_rule(too_many_samples(self.cycles, self.samples_per_cycle, MOST_SAMPLES))
+        return self
+
+
+class WeatherStation(Record):
+    """[[weather_station]]: its elevation is above sea level."""
+
+    name: Name
+    elevation_m: Elevation
+
+
+class Site(Certificate):
+    """The whole of site.toml."""
+
+    format: Annotated[int | str, Version("site")] = 1
+    campaign: Posture
+    site: Location
+    frames: Frames
+    paraboloid: Paraboloid
+    ranging: Ranging
+    adc: Adc
+    weather_station: Annotated[tuple[WeatherStation, ...], Field(strict=False, min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_each_station_once(self) -> "Site":
+        names = [station.name for station in self.weather_station]
+        for name in names:
+            if names.count(name) > 1:
+                raise broken_rule(f"weather_station {name!r} is given twice (expected each station once)")
+        return self
+
+
+def too_many_samples(cycles: int, samples_per_cycle: int, most: int) -> str:
+    product = cycles * samples_per_cycle
+    return f"cycles * samples_per_cycle = {cycles} * {samples_per_cycle} = {product} (expected at most {most})"

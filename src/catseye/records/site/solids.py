@@ -1,0 +1,175 @@
+"""solids.toml: simple solids that stand between rangers and retroreflectors."""
+
+import re
+from abc import abstractmethod
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.geometry import solids
+from catseye.records.files.reading import read_record
+from catseye.records.files.record import Certificate, Pair, Record, Vector, Version, Within, broken_rule
+
+WORDS = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}")
+
+
+def _plain_words(value: str) -> str:
+    """A name as reasons print it: letters, digits, spaces and _ . - only."""
+    if WORDS.fullmatch(value):
+        return value
+    raise PydanticCustomError("name", "expected up to 60 letters, digits, spaces, _ . -")
+
+
+Words = Annotated[str, AfterValidator(_plain_words)]
+SolidFrame = Literal["ground", "alidade", "elevation", "reflector"]
+FARTHEST_MM = 1e7
+Size = Annotated[float, Within(20, 1e6)]  # mm: thinner than a rod of a lattice, larger than any telescope
+Radius = Annotated[float, Within(10, 5e5)]  # mm
+RadiusOrPoint = Annotated[float, Within(0, 5e5)]  # mm
+Thickness = Annotated[float, Within(0, 1e4)]  # mm
+
+
+class SolidRecord(Record):
+    """What all kinds share: a name, and the frame that carries it."""
+
+    name: Words
+    frame: SolidFrame
+
+    @abstractmethod
+    def solid(self) -> solids.Solid:
+        """In metres, in its frame."""
+
+
+class BoxRecord(SolidRecord):
+    """[[box]]: centre_mm, size_mm (full lengths), turn_deg of its x axis about the frame's z, right-handed."""
+
+    centre_mm: Vector
+    size_mm: Annotated[tuple[Size, Size, Size], Field(strict=False)]
+    turn_deg: Annotated[float, Within(-360, 360)] = 0.0
+
+    def solid(self) -> solids.Box:
+        return solids.Box(_metres(self.centre_mm), _metres(self.size_mm), self.turn_deg * DEGREE)
+
+
+class SphereRecord(SolidRecord):
+    """[[sphere]]: centre_mm, radius_mm."""
+
+    centre_mm: Vector
+    radius_mm: Radius
+
+    def solid(self) -> solids.Sphere:
+        return solids.Sphere(_metres(self.centre_mm), self.radius_mm * MILLIMETRE)
+
+
+class CylinderRecord(SolidRecord):
+    """[[cylinder]]: from_mm to to_mm, centres of its flat ends, radius_mm."""
+
+    from_mm: Vector
+    to_mm: Vector
+    radius_mm: Radius
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> "CylinderRecord":
+        _refuse_no_length(self.name, self.from_mm, self.to_mm)
+        return self
+
+    def solid(self) -> solids.Cone:
+        radius = self.radius_mm * MILLIMETRE
+        return solids.Cone(_metres(self.from_mm), _metres(self.to_mm), radius, radius)
+
+
+class ConeRecord(SolidRecord):
+    """[[cone]]: from_mm to to_mm with from_radius_mm and to_radius_mm, one of which may be 0, a point."""
+
+    from_mm: Vector
+    to_mm: Vector
+    from_radius_mm: RadiusOrPoint
+    to_radius_mm: RadiusOrPoint
+
+    @model_validator(mode="after")
+    def _has_a_length_and_a_width(self) -> "ConeRecord":
+        _refuse_no_length(self.name, self.from_mm, self.to_mm)
+        if max(self.from_radius_mm, self.to_radius_mm) < 10.0:
+            wider = max(self.from_radius_mm, self.to_radius_mm)
+            raise broken_rule(f"{self.name}: its larger radius is {wider:g} mm (expected 10 to 500000)")
+        return self
+
+    def solid(self) -> solids.Cone:
+        radii = (self.from_radius_mm * MILLIMETRE, self.to_radius_mm * MILLIMETRE)
+        return solids.Cone(_metres(self.from_mm), _metres(self.to_mm), *radii)
+
+
+class DishRecord(SolidRecord):
+    """[[dish]]: a piece of the paraboloid z = (x^2 + y^2)/4f about the frame's z axis, vertex in its origin.
+
+    focal_length_mm; aperture_centre_mm (x, y) and aperture_radius_mm; below_mm and above_mm the thickness along z
+    """
+
+    focal_length_mm: Annotated[float, Within(500, 1e6)]
+    aperture_centre_mm: Pair
+    aperture_radius_mm: Annotated[float, Within(250, 1e6)]
+    below_mm: Thickness = 0.0
+    above_mm: Thickness = 0.0
+
+    def solid(self) -> solids.Dish:
+        return solids.Dish(
+            self.focal_length_mm * MILLIMETRE,
+            (self.aperture_centre_mm[0] * MILLIMETRE, self.aperture_centre_mm[1] * MILLIMETRE),
+            self.aperture_radius_mm * MILLIMETRE,
+            below=self.below_mm * MILLIMETRE,
+            above=self.above_mm * MILLIMETRE,
+        )
+
+
+class Solids(Certificate):
+    """The whole of solids.toml: any number of each kind, names different.
+
+    >>> Solids(format="catseye-solids-1").all
+    ()
+    """
+
+    format: Annotated[int | str, Version("solids")] = 1
+    box: Annotated[tuple[BoxRecord, ...], Field(strict=False)] = ()
+    sphere: Annotated[tuple[SphereRecord, ...], Field(strict=False)] = ()
+    cylinder: Annotated[tuple[CylinderRecord, ...], Field(strict=False)] = ()
+    cone: Annotated[tuple[ConeRecord, ...], Field(strict=False)] = ()
+    dish: Annotated[tuple[DishRecord, ...], Field(strict=False)] = ()
+
+    @property
+    def all(self) -> tuple[SolidRecord, ...]:
+        """Every solid, kind by kind."""
+        return (*self.box, *self.sphere, *self.cylinder, *self.cone, *self.dish)
+
+    @model_validator(mode="after")
+    def _names_each_solid_once(self) -> "Solids":
+        names = [solid.name for solid in self.all]
+        for name in names:
+            if names.count(name) > 1:
+                raise broken_rule(f"solid {name!r} is given twice (expected each name once)")
+        return self
+
+    @model_validator(mode="after")
+    def _stands_within_reach(self) -> "Solids":
+        for solid in self.all:
+            for key in ("centre_mm", "from_mm", "to_mm"):
+                for value in getattr(solid, key, ()):
+                    if abs(value) > FARTHEST_MM:
+                        raise broken_rule(f"{solid.name}: {key} holds {value:g} (expected within {FARTHEST_MM:g} mm)")
+        return self
+
+
+def read_solids(path: Path | str) -> Solids:
+    """The solids of a file; InputError in one line for a bad one."""
+    return read_record(path, Solids)
+
+
+def _metres(values: tuple[float, float, float]) -> tuple[float, float, float]:
+    return values[0] * MILLIMETRE, values[1] * MILLIMETRE, values[2] * MILLIMETRE
+
+
+def _refuse_no_length(name: str, start: tuple[float, ...], end: tuple[float, ...]) -> None:
+    if max(abs(a - b) for a, b in zip(start, end, strict=True)) < 10.0:
+        raise broken_rule(f"{name}: from_mm = {list(start)} and to_mm = {list(end)} are the same (expected two ends)")

@@ -1,0 +1,115 @@
+"""What single retroreflectors and feed-arm rangers are: targets.toml, feedarm.toml, benchmarks.csv."""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from catseye.records.files.record import Name, Position, Record, Uncertainty, UnitVector, Version, Within, broken_rule
+
+FrameName = Literal["ground", "alidade", "reflector"]
+PrismHeight = Annotated[float, Within(5, 500)]  # mm
+PrismReference = Annotated[float, Within(2, 500)]  # mm
+GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink
+SQUARE = 2e-3  # cosine: directions are written with three digits or more
+PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate; farther off is lost
+
+
+class Target(Record):
+    """One retroreflector; the keys from normal on belong to a prism, and only to a prism.
+
+    position_mm     approximate, in the named frame
+    u_position_mm   of each of its coordinates; without it the reduction's setting, 10 mm, counts
+    normal          outward normal of the entry face, same frame
+    height_mm, u_height_mm   of the prism; hrp_mm from the entry face down to the reference point
+    pc_mm           prism constant, negative
+    """
+
+    name: Name
+    type: Literal["prism", "hollow"]
+    frame: FrameName
+    position_mm: Position
+    u_position_mm: PositionUncertainty | None = None
+    material: Literal["BK7"] | None = None
+    normal: UnitVector | None = None
+    height_mm: PrismHeight | None = None
+    u_height_mm: Uncertainty | None = None
+    hrp_mm: PrismReference | None = None
+    pc_mm: GlassConstant | None = None
+
+    @model_validator(mode="after")
+    def _has_the_keys_of_its_type(self) -> "Target":
+        for key in ("material", "normal", "height_mm", "u_height_mm", "hrp_mm", "pc_mm"):
+            value = getattr(self, key)
+            if self.type == "prism" and value is None:
+                raise broken_rule(f"{key} is missing (expected for type = 'prism')")
+            if self.type == "hollow" and value is not None:
+                raise broken_rule(f"{key} = {value!r} belongs to a prism (expected none for type = 'hollow')")
+        if self.height_mm is not None and self.hrp_mm is not None:
+            refuse_deep_reference(self.hrp_mm, self.height_mm)
+        return self
+
+
+class Targets(Record):
+    """The whole of targets.toml."""
+
+    format: Annotated[int | str, Version("targets")] = 1
+    target: Annotated[tuple[Target, ...], Field(strict=False)]
+
+
+class FeedArmRanger(Record):
+    """A ranger on the feed arm: its scan point is known nominally, in the reflector frame.
+
+    u_position_mm   of each coordinate of the scan point; without it the reduction's setting, 10 mm, counts
+    mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
+    """
+
+    name: Name
+    zp: Name
+    nominal_scan_point_mm: Position
+    u_position_mm: PositionUncertainty | None = None
+    mount_z: UnitVector | None = None
+    mount_y: UnitVector | None = None
+
+    @model_validator(mode="after")
+    def _knows_two_axes_across_each_other(self) -> "FeedArmRanger":
+        for key, other in (("mount_z", "mount_y"), ("mount_y", "mount_z")):
+            if getattr(self, key) is None and getattr(self, other) is not None:
+                raise broken_rule(f"{other} = {list(getattr(self, other))} has no {key} (expected both or none)")
+        if self.mount_z is not None and self.mount_y is not None:
+            along = sum(z * y for z, y in zip(self.mount_z, self.mount_y, strict=True))
+            if abs(along) > SQUARE:
+                raise broken_rule(
+                    f"mount_y = {list(self.mount_y)} is {math.degrees(math.acos(max(-1.0, min(1.0, along)))):.2f} deg "
+                    f"from mount_z = {list(self.mount_z)} (expected 90, within {math.degrees(SQUARE):.1f})"
+                )
+        return self
+
+
+class AimPoint(Record):
+    """Point A, which the triplets face, in the reflector frame."""
+
+    nominal_mm: Position
+
+
+class FeedArm(Record):
+    """The whole of feedarm.toml."""
+
+    format: Annotated[int | str, Version("feedarm")] = 1
+    ranger: Annotated[tuple[FeedArmRanger, ...], Field(strict=False)]
+    aim_point: AimPoint
+
+
+class Benchmark(Record):
+    """A row of benchmarks.csv: a certified distance from a ranger's scan point to a target."""
+
+    target: Name
+    ranger: Name
+    certified_distance_mm: Annotated[float, Within(500, 1e7)]
+    u_mm: Uncertainty
+
+
+def refuse_deep_reference(hrp_mm: float, height_mm: float) -> None:
+    """The reference point of a prism lies in the glass."""
+    if hrp_mm >= height_mm:
+        raise broken_rule(f"hrp_mm = {hrp_mm} reaches past height_mm = {height_mm} (expected less)")

@@ -1,0 +1,35 @@
+"""Tables of actuators: read back without loss, refused in one line."""
+
+import pytest
+
+from catseye.errors import InputError
+from catseye.gateways.surface.tables import actuators_csv
+from catseye.records.panels.actuators import read_corrections, read_positions
+from repository import TESTS
+
+FORMATS = TESTS / "vectors" / "formats"
+
+
+def test_a_table_of_corrections_is_read_back_to_the_bit():
+    rows = read_corrections(FORMATS / "actuators-1.csv")
+    assert [row.actuator for row in rows] == ["DP01C", "DP01N01", "DP01N02", "DP01N03"]
+    assert actuators_csv(rows) == (FORMATS / "actuators-1.csv").read_text()
+
+
+def test_positions_are_read_by_name():
+    assert read_positions(FORMATS / "actuator-positions-1.csv") == {"DP01C": 0.0, "DP01N01": -1.275, "DP45P03": 25.4}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("actuator,position_mm\nA,1\nA,2\n", "row 2, actuator = 'A' is given twice"),
+        ("actuator,position_mm\nA,far\n", "row 1, position_mm = 'far'"),
+        ("actuator,position_mm\nA,1001\n", "row 1, position_mm"),
+        ("actuator,position\nA,1\n", "column 'position' is not known"),
+    ],
+)
+def test_bad_positions_are_refused(tmp_path, text, said):
+    (tmp_path / "p.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_positions(tmp_path / "p.csv")
