@@ -19,8 +19,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from numba import njit
 
-from catseye.atmosphere import air, air_kernel, ciddor_hill1999_kernel, humidity, rueger1990_kernel
-from catseye.atmosphere.air import MODELS
+from catseye.atmosphere.index import air, air_kernel, ciddor_hill1999_kernel, rueger1990_kernel
+from catseye.atmosphere.index.air import MODELS
+from catseye.atmosphere.weather import humidity
 
 ROUNDS, STATES, SCALARS, BLOCK = 5, 10_000_000, 20_000, 4096
 REPEATS, SHORT = 3, 0.5

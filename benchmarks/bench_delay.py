@@ -16,8 +16,8 @@ import numpy as np
 from scipy.signal import correlate
 from threadpoolctl import threadpool_limits
 
-from catseye.signal.delay import DelayPlan
-from catseye.signal.waveform import chirp, sampled
+from catseye.signal.delay.arrival import DelayPlan
+from catseye.signal.delay.waveform import chirp, sampled
 
 ROUNDS, ONCE, MANY = 15, 20, 100
 SAMPLING_HZ, EXPECTED, WINDOW, TRIALS = 48e3, 0.3, 2e-3, 400

@@ -15,8 +15,8 @@ from numba import njit
 from scipy.signal import butter, sosfiltfilt
 from threadpoolctl import threadpool_limits
 
-from catseye.signal.channels import ChannelStream, interleaved_phasors
-from catseye.signal.phase import detect, phasors
+from catseye.signal.detection.channels import ChannelStream, interleaved_phasors
+from catseye.signal.detection.phase import detect, phasors
 
 ROUNDS = 7
 BYTES, CYCLES, VOLTS = 200_000_000, 128, 10 / 32768

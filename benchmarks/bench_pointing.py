@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from threadpoolctl import threadpool_limits
 
-from catseye.geometry.pointing import Station, aim, counts
+from catseye.geometry.mirror.pointing import Station, aim, counts
 
 ROUNDS, REPEATS = 9, 3
 RANGERS, POINTS = 18, 100_000

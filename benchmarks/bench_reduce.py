@@ -22,7 +22,7 @@ from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
-from catseye.signal.phase import detect
+from catseye.signal.detection.phase import detect
 
 ROUNDS = 5
 EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity
-from catseye.atmosphere.sound import sound
-from catseye.atmosphere.sound_dispersion import dispersion
-from catseye.atmosphere.sound_path import bent_ray_excess, travel_time
+from catseye.atmosphere.index.air import group_refractivity
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.path import bent_ray_excess, travel_time
+from catseye.atmosphere.sound.speed import sound
 from catseye.estimation.shapes.tomography import Prior, Scale
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.air.acoustic import path_temperatures

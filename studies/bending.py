@@ -3,7 +3,7 @@
 python studies/bending.py DIRECTORY
 
 Rays are integrated exactly through the index of Ciddor's formula, pressure by weight; the bound is the one proved in
-`catseye.atmosphere.bending`.
+`catseye.atmosphere.path.bending`.
 """
 
 import sys
@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity, phase_refractivity
-from catseye.atmosphere.bending import excess_bound, index_gradient, pointing_offset, sag, steepest_gradient
-from catseye.atmosphere.path import hydrostatic_pressure_hpa
-from catseye.atmosphere.ray import FOUND, bent_ray, layered
+from catseye.atmosphere.index.air import group_refractivity, phase_refractivity
+from catseye.atmosphere.path.bending import excess_bound, index_gradient, pointing_offset, sag, steepest_gradient
+from catseye.atmosphere.path.mean import hydrostatic_pressure_hpa
+from catseye.atmosphere.path.ray import FOUND, bent_ray, layered
 from catseye.constants import ARCSECOND
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.geometry.encoder import BEAM_PER_COUNT
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 
 LENGTHS = (30.0, 60.0, 120.0, 300.0)  # m
 GRADIENTS = (-0.0342, 0.01, -0.1, 0.3, -1.0, -3.0, 10.0)  # °C/m upwards

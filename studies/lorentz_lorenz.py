@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere import ciddor_hill1999
-from catseye.atmosphere.air import MODELS, group_refractivity
-from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.atmosphere.index import ciddor_hill1999
+from catseye.atmosphere.index.air import MODELS, group_refractivity
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 
 WAVELENGTH_UM, CO2_PPM = 0.780, 450.0

@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.signal.frequency_plan import FrequencyPlan
-from catseye.signal.phase import detect
-from catseye.signal.spectral import bin_phasor, strongest_tone
-from catseye.signal.zero_crossing import crossing_phase
+from catseye.signal.detection.frequency_plan import FrequencyPlan
+from catseye.signal.detection.phase import detect
+from catseye.signal.detection.spectral import bin_phasor, strongest_tone
+from catseye.signal.detection.zero_crossing import crossing_phase
 
 FINE = 4096  # points a cycle of the exact wave
 PER_CYCLE = 64  # of them the converter takes

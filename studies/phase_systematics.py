@@ -16,12 +16,12 @@ from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, 
 from catseye.records.night.campaign import REFERENCE, read_campaign
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
-from catseye.signal.amplitude import amplitude_phase
-from catseye.signal.cyclic import imbalance_range, leakage_range
-from catseye.signal.feedback import fringe_contrast, fringe_uncertainty
-from catseye.signal.leakage import rms_range_error, worst_range_error
-from catseye.signal.multipath import cats_eye_error, largest_share, share_a_pass, two_retroreflectors
-from catseye.signal.walk import estimate_walk, longest_gap, midpoint_uncertainty, walk_test
+from catseye.signal.drift.walk import estimate_walk, longest_gap, midpoint_uncertainty, walk_test
+from catseye.signal.systematics.amplitude import amplitude_phase
+from catseye.signal.systematics.cyclic import imbalance_range, leakage_range
+from catseye.signal.systematics.feedback import fringe_contrast, fringe_uncertainty
+from catseye.signal.systematics.leakage import rms_range_error, worst_range_error
+from catseye.signal.systematics.multipath import cats_eye_error, largest_share, share_a_pass, two_retroreflectors
 
 WAVELENGTH = 0.199811  # m, [PARKER04] eq. 1.30
 LIGHT = 780e-9  # m

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from catseye.gateways.optics.polarization_figures import corners, polarization_plot
-from catseye.optics.corner_polarization import (
+from catseye.optics.glass import slopes
+from catseye.optics.polarization import linear, retardance, retarder, total_reflection_retardance
+from catseye.optics.retroreflector.corner_polarization import (
     far_field_jones,
     returned_power,
     sector_jones,
     solid_corner,
     through_plate,
 )
-from catseye.optics.glass import slopes
-from catseye.optics.polarization import linear, retardance, retarder, total_reflection_retardance
 
 WAVELENGTH_UM, GLASS = 0.780, "BK7-old"
 LIGHT = np.linspace(0.0, np.pi, 181)

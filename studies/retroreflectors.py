@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.optics.retroreflector_figures import Dimensions, aberration_plot, return_plot
-from catseye.optics import dihedral, prism
-from catseye.optics.cats_eye import focal_radius
 from catseye.optics.glass import group_index, index_over_air
 from catseye.optics.ray_trace import Plane, beam, corner, half_path, through_prism
+from catseye.optics.retroreflector import dihedral, prism
+from catseye.optics.retroreflector.cats_eye import focal_radius
 
 HEIGHT, APERTURE = 0.0381, 0.0254  # m
 SEED, RAYS = 1, 200_000

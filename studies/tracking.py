@@ -22,10 +22,10 @@ import numpy as np
 from catseye.constants import DEGREE
 from catseye.gateways.examples import example_campaign
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.geometry.encoder import BEAM_PER_COUNT
-from catseye.geometry.pointing import Station, in_mirror_axes
-from catseye.geometry.time_tag import TimeTag, tag_step
-from catseye.geometry.track import apparent_motion, line_bound, longest_interval
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
+from catseye.geometry.mirror.pointing import Station, in_mirror_axes
+from catseye.geometry.mirror.track import apparent_motion, line_bound, longest_interval
+from catseye.geometry.sky.time_tag import TimeTag, tag_step
 from catseye.optics.spot import offset_range, offset_share, steering_range
 from catseye.records import read_campaign
 from catseye.reduction.site.stations import station_of

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.constants import DEGREE, SPEED_OF_LIGHT, TWO_PI
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.geometry import visibility
-from catseye.geometry.triplet_mount import aim_angles, misaim
-from catseye.optics.prism import obliquity_correction
+from catseye.geometry.antenna.triplet_mount import aim_angles, misaim
+from catseye.geometry.clearance import visibility
+from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.memo import median_series

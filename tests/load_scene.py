@@ -17,7 +17,7 @@ from catseye.constants import TWO_PI
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.parts import TICKS_PER_SECOND, PlannedShot, Round
 from catseye.coordinator.visibility.vantage import vantages_of
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer
 from catseye.ranger.line import nanoseconds_to_ticks
 from catseye.records.night.live import TICKS_PER_DAY

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.geometry.panel_surface import warps
+from catseye.geometry.antenna.panel_surface import warps
 from catseye.records.files.reading import read_record
 from catseye.records.panels.instrument import PanelInstrument
 from catseye.records.panels.layout import PanelLayout, layout_of_site

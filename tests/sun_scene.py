@@ -6,8 +6,8 @@ The mount's turns come from scipy's rotations, the Sun from astropy, the axes' p
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from catseye.geometry.pointing import Station
-from catseye.geometry.slew import Pace
+from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.slew import Pace
 from catseye.records.files.reading import read_record
 from catseye.records.site.keep_out import KeepOut
 from catseye.reduction.site.earth_rotation import Place

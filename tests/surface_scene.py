@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 from catseye.optics.aperture import cos_incidence
 from catseye.optics.zernike import zernike
 from catseye.records.site.folder import read_site

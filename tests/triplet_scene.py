@@ -5,7 +5,7 @@ import tomllib
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletReadings
 from catseye.simulator.laboratory.triplet import POST, TripletScenes, TripletSheets, random_scenes, triplet_sheets

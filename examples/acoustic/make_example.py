@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.records.night.recording import wav_bytes
-from catseye.signal.waveform import chirp
+from catseye.signal.delay.waveform import chirp
 from catseye.simulator.laboratory.acoustic import Recorder, SoundPath
 
 HERE = Path(__file__).parent

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity, phase_refractivity
+from catseye.atmosphere.index.air import group_refractivity, phase_refractivity
 
 HERE = Path(__file__).parent
 C, F = 299_792_458.0, 1500e6

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 from make_examples import HERE
 
-from catseye.geometry.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
-from catseye.geometry.mount import gamma
-from catseye.geometry.plumb import astronomic, azimuth, plumb_from_ground, zenith_angle
-from catseye.geometry.star import POLARIS, star_place
+from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
+from catseye.geometry.frames.plumb import astronomic, azimuth, plumb_from_ground, zenith_angle
+from catseye.geometry.mirror.mount import gamma
+from catseye.geometry.sky.star import POLARIS, star_place
 
 ARCSECOND = np.pi / 648_000
 FRAME = LocalFrame(PINTLE_LATITUDE, PINTLE_LONGITUDE, 775.42, xi=2.1 * ARCSECOND, eta=-3.4 * ARCSECOND)

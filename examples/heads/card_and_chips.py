@@ -16,7 +16,7 @@ import numpy as np
 from lm628 import EXCESSIVE_ERROR, MOTOR_OFF, ON_TARGET, SEEKS_INDEX, Lm628, Port
 from numpy.typing import ArrayLike, NDArray
 
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.ranger.head import Buffer, Homing, Sampling
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 

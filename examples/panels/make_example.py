@@ -66,7 +66,7 @@ def write_maps(solid, directory: Path, rng: np.random.Generator) -> None:
     """Maps on a grid of 9 by 7 points, noise of 5 µm, as the panel lay on the machine."""
     directory.mkdir(exist_ok=True)
     layout = solid.layout
-    from catseye.geometry.panel_surface import panels_under
+    from catseye.geometry.antenna.panel_surface import panels_under
     from catseye.reduction.panels.model import panel_axes
 
     for p, name in enumerate(layout.panels):

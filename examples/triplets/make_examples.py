@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.simulator.laboratory.triplet import TripletScenes, random_scenes, triplet_sheets
 
 HERE = Path(__file__).parent

@@ -13,7 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 from catseye import __version__
-from catseye.atmosphere.air import MODELS
+from catseye.atmosphere.index.air import MODELS
 from catseye.cli import commands
 from catseye.cli.commands import app, join_commands
 from repository import ROOT

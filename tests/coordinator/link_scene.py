@@ -9,7 +9,7 @@ from catseye.coordinator.link.ranger import RangerLink
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.parts import PlannedShot, ticks_now
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.line import Request
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.motion_units import SAMPLE_TIME
 from catseye.simulator.servo.axis import ServoAxis
 from catseye.simulator.servo.kernel import CompiledAxes

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.atmosphere import humidity, path
-from catseye.atmosphere.air import MODELS, air, group_refractivity, phase_refractivity
+from catseye.atmosphere.index.air import MODELS, air, group_refractivity, phase_refractivity
+from catseye.atmosphere.path import mean as path
+from catseye.atmosphere.weather import humidity
 
 temperatures = st.floats(-40.0, 49.0)
 pressures = st.floats(600.0, 1099.0)

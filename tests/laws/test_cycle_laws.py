@@ -5,8 +5,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from catseye.estimation.ambiguity.search import AmbiguityStatus, locate
-from catseye.signal.cycles import decision, fraction, memo_whole_cycles, slip_probability, unwrapped_length
-from catseye.signal.joint_length import JointStatus, joint_length
+from catseye.signal.cycles.joint_length import JointStatus, joint_length
+from catseye.signal.cycles.whole import decision, fraction, memo_whole_cycles, slip_probability, unwrapped_length
 
 half_wavelengths = st.floats(0.01, 1.0)
 lengths = st.floats(1.0, 300.0)

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from catseye.geometry.frame import Transform
-from catseye.geometry.mount import gamma, lambda_, scan_point
-from catseye.geometry.rotation import from_vector, rx, ry, rz, skew, to_vector
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.frames.rotation import from_vector, rx, ry, rz, skew, to_vector
+from catseye.geometry.mirror.mount import gamma, lambda_, scan_point
 
 angles = st.floats(-10.0, 10.0)
 vectors = arrays(float, 3, elements=st.floats(-100.0, 100.0))

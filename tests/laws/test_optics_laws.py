@@ -5,8 +5,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.optics import cats_eye, prism
 from catseye.optics.glass import GLASSES, group_index, phase_index
+from catseye.optics.retroreflector import cats_eye, prism
 
 heights = st.floats(0.005, 0.1)
 indices = st.floats(1.3, 2.2)

@@ -4,7 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.optics.corner_polarization import (
+from catseye.optics.polarization import linear, reflection, retardance, retarder
+from catseye.optics.retroreflector.corner_polarization import (
     REVERSED,
     far_field_jones,
     hollow_corner,
@@ -14,7 +15,6 @@ from catseye.optics.corner_polarization import (
     solid_corner,
     through_plate,
 )
-from catseye.optics.polarization import linear, reflection, retardance, retarder
 
 glasses = st.floats(1.43, 2.0)
 tilts = st.floats(0.0, 0.2)  # total reflection holds to 0.27 rad in glass of 1.45 at every azimuth, 0.3 from 1.5 on

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.estimation.shapes.pose import fit_pose
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 coordinate = st.floats(-100.0, 100.0)
 triple = st.lists(coordinate, min_size=3, max_size=3).map(np.array)

@@ -17,7 +17,7 @@ from catseye.coordinator.plan.value import Knowledge
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.visibility.sweep import nearest
 from catseye.coordinator.visibility.vantage import Vantage
-from catseye.geometry.pointing import Station
+from catseye.geometry.mirror.pointing import Station
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
 from catseye.records.night.live import TICK_SECONDS, LivePosture

@@ -6,17 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
-from catseye.signal.frequency_plan import FrequencyPlan
-from catseye.signal.phase import detect
-from catseye.signal.sampling import (
-    Sampling,
-    aliasing_harmonics,
-    buffer_mean,
-    motion_effect,
-    tone_response,
-)
-from catseye.signal.spectral import bin_phasor, strongest_tone
-from catseye.signal.zero_crossing import crossing_phase, phase_between
+from catseye.signal.detection.frequency_plan import FrequencyPlan
+from catseye.signal.detection.phase import detect
+from catseye.signal.detection.sampling import Sampling, aliasing_harmonics, buffer_mean, motion_effect, tone_response
+from catseye.signal.detection.spectral import bin_phasor, strongest_tone
+from catseye.signal.detection.zero_crossing import crossing_phase, phase_between
 
 phases = st.floats(0.0, 2 * np.pi, exclude_max=True)
 per_cycle = st.integers(3, 40)

@@ -5,9 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
-from catseye.signal.leakage import subtract_leakage
-from catseye.signal.phase import detect
+from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
+from catseye.signal.detection.phase import detect
+from catseye.signal.systematics.leakage import subtract_leakage
 
 phases = st.floats(0.0, 2 * np.pi, exclude_max=True)
 any_angle = st.floats(-1e6, 1e6)

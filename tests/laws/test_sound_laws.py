@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.atmosphere.sound import MODELS, sound, temperature_of_speed_c
-from catseye.atmosphere.sound_dispersion import dispersion
-from catseye.atmosphere.sound_path import bent_ray_excess, pair, straight_line_speed, travel_time
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.path import bent_ray_excess, pair, straight_line_speed, travel_time
+from catseye.atmosphere.sound.speed import MODELS, sound, temperature_of_speed_c
 
 WIDE = sorted(set(MODELS) - {"cramer1993"})
 models = st.sampled_from(WIDE)

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.geometry.keep_out import TOUCH
-from catseye.geometry.pointing import Station, counts
-from catseye.geometry.search_pattern import spiral
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.clearance.keep_out import TOUCH
+from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.search_pattern import spiral
+from catseye.geometry.mirror.slew import trapezoid
 from catseye.reduction.site.earth_rotation import Place
 from sun_scene import (
     DEGREE,

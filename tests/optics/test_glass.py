@@ -3,7 +3,7 @@
 import mpmath
 import pytest
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.errors import ValidityError
 from catseye.optics.glass import (
     GLASSES,
@@ -16,7 +16,7 @@ from catseye.optics.glass import (
     slopes,
     temperature_slopes,
 )
-from catseye.optics.prism import range_constant
+from catseye.optics.retroreflector.prism import range_constant
 
 # Fraunhofer lines of the N-BK7 data sheet, [SCHOTT14]: wavelength in um, index to five digits.
 N_BK7_LINES = [

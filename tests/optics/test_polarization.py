@@ -6,18 +6,6 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.optics.coating import Coating, index
-from catseye.optics.corner_polarization import (
-    EDGES,
-    ORDERS,
-    REVERSED,
-    far_field_jones,
-    hollow_corner,
-    returned_power,
-    sector_jones,
-    sector_shares,
-    solid_corner,
-    through_plate,
-)
 from catseye.optics.polarization import (
     coated,
     ellipse,
@@ -29,7 +17,19 @@ from catseye.optics.polarization import (
     surface,
     total_reflection_retardance,
 )
-from catseye.optics.retroreflector import fresnel
+from catseye.optics.retroreflector.corner_polarization import (
+    EDGES,
+    ORDERS,
+    REVERSED,
+    far_field_jones,
+    hollow_corner,
+    returned_power,
+    sector_jones,
+    sector_shares,
+    solid_corner,
+    through_plate,
+)
+from catseye.optics.retroreflector.kinds import fresnel
 
 GOLD = 0.15 + 4.7j  # near 780 nm; any metal serves these tests
 PERFECT = complex("inf")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.optics import prism
-from catseye.optics.cats_eye import BallCatsEye
-from catseye.optics.dihedral import LEVER, ORDERS, deviations, equal_errors
 from catseye.optics.ray_trace import Plane, Rays, Sphere, beam, corner, half_path, through_ball, through_prism
+from catseye.optics.retroreflector import prism
+from catseye.optics.retroreflector.cats_eye import BallCatsEye
+from catseye.optics.retroreflector.dihedral import LEVER, ORDERS, deviations, equal_errors
 
 H, GROUP, PHASE = 0.0381, 1.527077, 1.510811
 R1, R2 = 1.969 * 0.0254, 3.799 * 0.0254

@@ -1,6 +1,6 @@
 """A scripted head whose time passes by itself, as a clock says."""
 
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from ranger.scripted_head import ScriptedHead
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.geometry.time_tag import PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 from catseye.ranger.head import Sampling
 
 VELOCITY, ACCELERATION = 400_000, 1_000

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.geometry.time_tag import PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer
 from catseye.ranger.motion_units import FRACTION, SAMPLE_TIME
 

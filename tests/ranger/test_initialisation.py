@@ -7,7 +7,7 @@ import pytest
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.pointing import aim, ray
+from catseye.geometry.mirror.pointing import aim, ray
 from catseye.ranger.addresses import feed_address, ranger_addresses
 from catseye.ranger.initialisation import (
     commands_of_ranger,

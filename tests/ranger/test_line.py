@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.ranger.line import (
     LAST_TID,
     LONGEST_REQUEST,

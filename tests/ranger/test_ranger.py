@@ -8,7 +8,7 @@ import pytest
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.geometry.pointing import beam
+from catseye.geometry.mirror.pointing import beam
 from catseye.ranger.handlers.table import replace_file
 from catseye.ranger.line import TICK_NS, format_reply, nanoseconds_of, stamp_text, ticks_of
 from catseye.ranger.ranging import HALF_WAVE_MM, distance_mm, group_index
@@ -549,7 +549,7 @@ def test_a_clock_that_is_set_back_stops_neither_updates_nor_the_watch():
 
 
 def test_amplitude_and_phase_are_those_of_the_signal_s_own_detection():
-    from catseye.signal.phase import detect
+    from catseye.signal.detection.phase import detect
 
     told = ready()
     told.say("CIL 1")

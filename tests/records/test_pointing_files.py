@@ -7,7 +7,7 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
-from catseye.geometry.pointing_series import TERMS
+from catseye.geometry.antenna.pointing_series import TERMS
 from catseye.records.files.reading import read_record
 from catseye.records.files.toml_text import record_toml
 from catseye.records.laboratory.star_offsets import read_star_offsets

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from catseye.signal.delay import DelayPlan, DelayStatus
-from catseye.signal.waveform import chirp, maximum_length_sequence, pulse, sampled
+from catseye.signal.delay.arrival import DelayPlan, DelayStatus
+from catseye.signal.delay.waveform import chirp, maximum_length_sequence, pulse, sampled
 
 FS = 48e3
 TIME = np.arange(2400) / FS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from catseye.signal.drift import drift_along, drift_at
+from catseye.signal.drift.reference import drift_along, drift_at
 
 WALK = 0.01 / 60  # rad per root second: 10 mrad per root hour, as the example night's site has it
 NOISE = 5e-4  # rad, of a reference shot

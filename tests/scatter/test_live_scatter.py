@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from catseye.geometry.frame import Transforms
+from catseye.geometry.frames.frame import Transforms
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.reduction.live.live import LiveSettings
 from catseye.reduction.site.motion import ground_from

@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from catseye.signal.phase import detect
+from catseye.signal.detection.phase import detect
 
 SMALL = [pytest.param(30_000, id="quick"), pytest.param(1_000_000, id="full", marks=pytest.mark.slow)]
 FULL = [pytest.param(1_500, id="quick"), pytest.param(40_000, id="full", marks=pytest.mark.slow)]

@@ -5,7 +5,7 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.estimation.shapes.pose import fit_pose
-from catseye.geometry.pointing_series import TERMS, published
+from catseye.geometry.antenna.pointing_series import TERMS, published
 from catseye.records.laboratory.tilts import Tilts
 from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
 from catseye.reduction.pose.track_profile import joined_tilt, track_profile

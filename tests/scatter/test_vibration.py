@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from catseye.signal.vibration import Mode, follow, start
-from catseye.signal.vibration_modes import find_modes
+from catseye.signal.vibration.filter import Mode, follow, start
+from catseye.signal.vibration.modes import find_modes
 
 U = 5e-5  # m, of a sample
 

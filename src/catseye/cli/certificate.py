@@ -12,10 +12,8 @@ from catseye.errors import InputError
 if TYPE_CHECKING:
     from catseye.gateways.calibrations.field_report_fields import Report
 
-KINDS = (
-    "monument",
-    "mirror",
-)  # as in catseye.gateways.calibrations.field_report_fields, whose import --help spares itself
+# as in catseye.gateways.calibrations.field_report_fields, whose import --help spares itself
+KINDS = ("monument", "mirror")
 
 
 def _known(kind: str) -> str:

@@ -14,7 +14,7 @@ from catseye.reduction.epoch.settings import Settings
 if TYPE_CHECKING:
     from catseye.reduction.epoch.epoch import Reduction
 
-# as in catseye.atmosphere.air, whose import --help spares itself
+# as in catseye.atmosphere.index.air, whose import --help spares itself
 MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 
 ROOMS = (
@@ -54,7 +54,7 @@ def _version(wanted: bool) -> None:
 
 def known_model(name: str) -> str:
     """The name of a model of the index of air."""
-    from catseye.atmosphere.air import MODELS as known
+    from catseye.atmosphere.index.air import MODELS as known
 
     if name not in known:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)}.")

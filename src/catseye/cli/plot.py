@@ -70,7 +70,7 @@ def sky(
 ) -> None:
     """A ranger's sky with Sun, boxes and a slew."""
     from catseye.gateways.steering.plots import sky_plot
-    from catseye.geometry.time_tag import mjd_of
+    from catseye.geometry.sky.time_tag import mjd_of
 
     if (start is None) != (end is None):
         raise typer.BadParameter("go together: --from and --to.", param_hint="'--from'")

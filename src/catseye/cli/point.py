@@ -17,7 +17,7 @@ REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.steering.visibility,
 def time_text(text: str | None) -> str | None:
     """As given, if it is a time."""
     if text is not None:
-        from catseye.geometry.time_tag import mjd_of
+        from catseye.geometry.sky.time_tag import mjd_of
 
         try:
             mjd_of(text)
@@ -141,7 +141,7 @@ def point(
         pointing_table,
     )
     from catseye.gateways.writers.objects import json_line
-    from catseye.geometry.time_tag import mjd_of
+    from catseye.geometry.sky.time_tag import mjd_of
     from catseye.records.files.reading import read_record
     from catseye.records.laboratory.coordinate_list import read_coordinates
     from catseye.records.site.keep_out import KeepOut

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.encoder import choice, prime_counts
-from catseye.geometry.pointing import Station, aim
+from catseye.geometry.mirror.encoder import choice, prime_counts
+from catseye.geometry.mirror.pointing import Station, aim
 from catseye.ranger.values import Value
 
 REFERENCE = "ZRG"

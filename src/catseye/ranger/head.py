@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.errors import ValidityError
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.sky.time_tag import TimeTag
 
 LARGEST_BUFFER = 65_536  # samples: the converter's DMA buffer
 FASTEST_SAMPLING_HZ = 100_000

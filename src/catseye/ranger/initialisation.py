@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.pointing import Station
+from catseye.geometry.mirror.pointing import Station
 from catseye.ranger.commands import MOST_CUBES
 from catseye.ranger.line import Request
 from catseye.records.site.folder import REFERENCE, SiteFolder

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.time_tag import PER_DAY, TimeTag
+from catseye.geometry.sky.time_tag import PER_DAY, TimeTag
 
 TICKS_PER_DAY = 10**8
 TICK_NS = PER_DAY // TICKS_PER_DAY  # 864 000, exact

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import COUNTS_PER_TURN
-from catseye.geometry.slew import Pace
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
+from catseye.geometry.mirror.slew import Pace
 from catseye.records.site.mirror import MirrorGeometry
 
 CLOCK_HZ = 6e6

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from catseye.errors import CatseyeError, InputError
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.handlers.table import HANDLERS, scan_rounds, stream_shots, watch_sun
 from catseye.ranger.head import Head

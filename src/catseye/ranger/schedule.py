@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.line import Request
 
 MOST_ENTRIES = 64  # of one connection

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.head import Buffer, Head, Sampling

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
-from catseye.geometry.encoder import COUNTS_PER_TURN
-from catseye.geometry.keep_out import servo_margin
-from catseye.geometry.pointing import Station, beam
-from catseye.geometry.sun import EARLIEST_MJD, altitude_azimuth
+from catseye.geometry.clearance.keep_out import servo_margin
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
+from catseye.geometry.mirror.pointing import Station, beam
+from catseye.geometry.sky.sun import EARLIEST_MJD, altitude_azimuth
 from catseye.records.site.site import Location
 from catseye.reduction.site.earth_rotation import Place, place_of, rotation_at, sun_at
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
-from catseye.estimation.network.datum import motions
+from catseye.estimation.shapes.motions import motions
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.bodies import bodies_of, lasting_names
 from catseye.reduction.site.motion import GROUND, frames_of, ground_from

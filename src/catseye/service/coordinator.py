@@ -223,6 +223,6 @@ class LiveCoordinator:
 
 def _load_kernel() -> None:
     """What the first buffer needs, compiled code from its cache: 0.5 s in which a loop would hear nobody."""
-    from catseye.signal.buffer_kernel import one_buffer
+    from catseye.signal.detection.buffer_kernel import one_buffer
 
     one_buffer(np.zeros(64, dtype=np.int16), 16, (-32768, 32767), 0.0, 0j, np.zeros(16), np.zeros(8))

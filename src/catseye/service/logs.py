@@ -7,7 +7,7 @@ from typing import Any
 from catseye.coordinator.journal.entries import Solution
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.gateways.writers.objects import plain
-from catseye.geometry.time_tag import MJD_EPOCH
+from catseye.geometry.sky.time_tag import MJD_EPOCH
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, Happening
 
 COLOURS = {"note": "", "warning": "\x1b[33m", "alarm": "\x1b[1;31m"}

@@ -11,7 +11,7 @@ from dataclasses import replace
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.link.preparation import Preparation
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
 from catseye.ranger.ranger import Ranger

@@ -9,8 +9,8 @@ import pytest
 from catseye.records.files.reading import Folder
 from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import read_sheet, wav_bytes, wav_samples
-from catseye.signal.delay import DelayPlan
-from catseye.signal.waveform import sampled
+from catseye.signal.delay.arrival import DelayPlan
+from catseye.signal.delay.waveform import sampled
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "acoustic"

@@ -7,8 +7,8 @@ import typer
 
 from catseye.cli.commands import app
 from catseye.cli.terminal import attempt
-from catseye.optics import prism
 from catseye.optics.glass import GLASSES, group_index
+from catseye.optics.retroreflector import prism
 
 
 @pytest.fixture

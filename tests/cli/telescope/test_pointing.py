@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.geometry.pointing_series import published
+from catseye.geometry.antenna.pointing_series import published
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples" / "pointing"

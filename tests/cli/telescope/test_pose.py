@@ -112,7 +112,7 @@ def test_an_inclinometer_makes_the_alidade_surer(catseye, night, tmp_path):
     text = (site / "targets.toml").read_text()
     # the elevation bearing's targets are typed in the reflector frame at this posture: told as the alidade's
     from catseye.constants import DEGREE
-    from catseye.geometry.antenna import ground_from_alidade
+    from catseye.geometry.antenna.frames import ground_from_alidade
     from catseye.records.network.solved_points import read_solved_points
 
     names = ["ZAG731P", "ZAG731D", "ZEG41040L"]

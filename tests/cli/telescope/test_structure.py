@@ -10,8 +10,8 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.coordinator.journal.entries import AnsweredShot, Solution
 from catseye.coordinator.journal.writer import Journal
 from catseye.gateways.writers.samplers_fits import read_samplers
-from catseye.geometry.antenna import ground_from_reflector
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.antenna.frames import ground_from_reflector
+from catseye.geometry.frames.rotation import from_vector
 from catseye.records.night.live import LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_run

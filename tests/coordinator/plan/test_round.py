@@ -8,7 +8,7 @@ from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.visibility.vantage import nominal_posture
 from catseye.errors import InputError
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.mirror.slew import trapezoid
 from catseye.records.files.reading import read_record
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.solids import Solids

@@ -8,7 +8,7 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import moved, rigid_design, rigid_part
 from catseye.estimation.harmonic.eliminated import weights_of
 from catseye.estimation.harmonic.series import Spread, fit_harmonics
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.frames.rotation import from_vector
 
 
 def scene(seed, *, epochs=12, n=5, shared=2, lost=0.15):

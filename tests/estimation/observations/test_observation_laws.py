@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from catseye.estimation import observations as kinds
 from catseye.estimation.observations.bodies.pose import right_jacobian
 from catseye.estimation.observations.unit_direction import direction
-from catseye.geometry.rotation import from_vector, skew
+from catseye.geometry.frames.rotation import from_vector, skew
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-20.0, 20.0)

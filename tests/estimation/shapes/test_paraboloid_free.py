@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import design_rows, fit_paraboloid
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 F = 60.0
 OUTER = Transform("ground", "dish", Rotation.from_euler("xyz", [0.3, -0.2, 1.1]).as_matrix(), np.array([4.0, 90.0, 50]))

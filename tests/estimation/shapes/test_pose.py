@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError, FrameError
 from catseye.estimation.shapes.pose import METHODS, fit_pose, relative_pose
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 SHIFT, TURN = np.array([4e-4, -2e-4, 3e-4]), np.array([2e-5, -1e-5, 3e-5])
 

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import MODELS, air, group_refractivity
+from catseye.atmosphere.index.air import MODELS, air, group_refractivity
 from catseye.errors import ValidityError
 from catseye.gateways.air.air_figures import NAMES, VARIABLES, _draw, air_plot
 from catseye.gateways.writers.drawing import Figure

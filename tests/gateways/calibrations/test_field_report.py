@@ -24,7 +24,7 @@ from catseye.gateways.calibrations.field_report_fields import (
     written_u,
     written_value,
 )
-from catseye.geometry.mount import gamma, lambda_
+from catseye.geometry.mirror.mount import gamma, lambda_
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples"

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.gateways.optics.retroreflector_figures import Dimensions, aberration_plot, return_plot
-from catseye.optics.prism import obliquity_correction
+from catseye.optics.retroreflector.prism import obliquity_correction
 
 
 @pytest.fixture(scope="module")

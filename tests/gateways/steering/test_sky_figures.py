@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from catseye.gateways.steering.sky_figures import _on_map, sky_figure
-from catseye.geometry.pointing import counts
+from catseye.geometry.mirror.pointing import counts
 from catseye.reduction.steering.reroute import route
 from sun_scene import MORNING, STATION, astropy_sun, boxes, guard
 

@@ -7,8 +7,8 @@ import pytest
 
 from catseye.gateways.steering import tracking_figures
 from catseye.gateways.steering.tracking_figures import miss_figure, search_figure, visibility_figure
-from catseye.geometry.pointing import Station
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.records.site.solids import Solids
 from catseye.reduction.steering.spot_fit import Spot
 from catseye.reduction.steering.tracking import (

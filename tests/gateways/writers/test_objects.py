@@ -82,7 +82,7 @@ def test_nothing_written_names_a_place_on_this_machine(written, reduction):
 
 
 def test_the_air_is_told_with_its_state_and_both_uncertainties():
-    from catseye.atmosphere.air import air
+    from catseye.atmosphere.index.air import air
 
     state = air(20.0, 933.0, 50.0)
     told = air_object(state, 0.78, state.combined_uncertainty(0.3))

@@ -27,7 +27,7 @@ def test_panels_neither_overlap_nor_leave_gaps():
     layout = dish()
     rng = np.random.default_rng(1)
     angle, r = rng.uniform(0.0, 2 * np.pi, 500), 48.0 * np.sqrt(rng.uniform(0.0, 1.0, 500))
-    from catseye.geometry.panel_surface import shares
+    from catseye.geometry.antenna.panel_surface import shares
 
     quads = layout.xy[layout.quad]
     for place in np.column_stack([r * np.cos(angle), 54.0 + r * np.sin(angle)])[:100]:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity, group_refractivity_of_vapour
-from catseye.atmosphere.sound import sound
-from catseye.atmosphere.sound_dispersion import dispersion
-from catseye.atmosphere.sound_path import bent_ray_excess, mean_temperature_excess, travel_time
-from catseye.atmosphere.sound_real_gas import speed
+from catseye.atmosphere.index.air import group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.path import bent_ray_excess, mean_temperature_excess, travel_time
+from catseye.atmosphere.sound.real_gas import speed
+from catseye.atmosphere.sound.speed import sound
 from catseye.errors import ValidityError
 from catseye.reduction.air.acoustic import NO_TIME, NO_WIND, OUTSIDE, USED, path_temperatures
 

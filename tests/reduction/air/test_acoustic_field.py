@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity
-from catseye.atmosphere.sound import sound
+from catseye.atmosphere.index.air import group_refractivity
+from catseye.atmosphere.sound.speed import sound
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import Prior, Scale
 from catseye.reduction.air.acoustic import NO_TIME, OUTSIDE, USED

@@ -13,7 +13,7 @@ from catseye.reduction.air.group_index import (
     phase_slope,
     relative_group_index,
 )
-from catseye.signal.cycles import CycleStatus
+from catseye.signal.cycles.whole import CycleStatus
 
 C, F = 299_792_458.0, 1500e6
 LENGTHS = st.floats(5.0, 1000.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import calibrate_path

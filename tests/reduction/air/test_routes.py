@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from catseye.atmosphere import humidity
-from catseye.atmosphere.air import MODELS, air, group_refractivity_of_vapour
-from catseye.atmosphere.psychrometer import vapour_pressure_of_wet_bulb_hpa, wet_bulb_c
+from catseye.atmosphere.index.air import MODELS, air, group_refractivity_of_vapour
+from catseye.atmosphere.weather import humidity
+from catseye.atmosphere.weather.psychrometer import vapour_pressure_of_wet_bulb_hpa, wet_bulb_c
 from catseye.errors import ValidityError
 from catseye.reduction.air.routes import HYGROMETERS, Moisture, air_by, station_pressure, surface_of
 

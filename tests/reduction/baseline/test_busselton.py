@@ -73,7 +73,7 @@ def by_hand(file, y):
 
 def test_the_reference_index_is_the_closed_formula_at_the_makers_standard_air():
     """286.338 at 12 °C, 1013.25 hPa, 60 %: the closed formula; Ciddor and Hill give 286.296, 0.042 ppm less."""
-    from catseye.atmosphere.air import group_refractivity
+    from catseye.atmosphere.index.air import group_refractivity
 
     lam, vapour = 0.658, 8.41486
     closed = 273.15 / 1013.25 * (287.6155 + 4.88660 / lam**2 + 0.068 / lam**4) * 1013.25 / 285.15

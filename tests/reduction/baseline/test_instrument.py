@@ -6,8 +6,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity
-from catseye.atmosphere.velocity import EARTH_RADIUS
+from catseye.atmosphere.index.air import group_refractivity
+from catseye.atmosphere.sound.velocity import EARTH_RADIUS
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.baseline.adjustment import adjust_baseline
 from catseye.estimation.baseline.model import Claim, Sights

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.quality.propagation import agrees, numerical_sensitivity
-from catseye.optics.prism import oblique_change
+from catseye.optics.retroreflector.prism import oblique_change
 from catseye.records.night.campaign import REFERENCE
 from catseye.records.night.path_temperature import PathTemperatureTable
 from catseye.reduction.budget import Assumptions, explain_shot, items_of, scene_of
@@ -21,8 +21,8 @@ from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
-from catseye.signal.buffers import inspect_buffers
-from catseye.signal.cycle_scatter import _turned
+from catseye.signal.detection.buffers import inspect_buffers
+from catseye.signal.detection.cycle_scatter import _turned
 
 PRISM, BALL, HOLLOW, GROUND = 3, 700, 2, 700  # shots of night-01; 2 is between two feed-arm rangers
 

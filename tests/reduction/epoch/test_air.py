@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity, group_refractivity_of_vapour
-from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.atmosphere.index.air import group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.night.weather import Weather

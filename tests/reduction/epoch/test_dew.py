@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.atmosphere import humidity
+from catseye.atmosphere.weather import humidity
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.records.night.weather import Weather

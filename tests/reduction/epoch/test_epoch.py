@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.dish import dish_advice, dish_prisms

@@ -7,7 +7,7 @@ import pytest
 
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.least_squares.rows import full_jacobian
-from catseye.optics.prism import obliquity_correction
+from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.shots import _obliquity, _tilted, shot_group
 from catseye.reduction.epoch.unknowns import AIR

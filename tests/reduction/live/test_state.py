@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 from catseye.reduction.live.state import (
     USUAL,
     Carried,

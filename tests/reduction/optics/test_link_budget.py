@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.optics.prism import clear_share
+from catseye.optics.retroreflector.prism import clear_share
 from catseye.reduction.optics.link import Link, Reflector
 from catseye.reduction.optics.link_budget import link_budget
 

@@ -6,7 +6,7 @@ from scipy.optimize import curve_fit
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
-from catseye.geometry.pointing_series import TERMS, PointingSeries, published
+from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, published
 from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
 
 
@@ -85,7 +85,7 @@ def test_metrology_goes_in_with_its_own_covariance():
         q[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = block
     seen = published().correction(a, e) + np.linalg.cholesky(q).dot(rng.normal(size=40)).reshape(-1, 2)
     found = fit_pointing(a, e, seen, covariance=q)
-    from catseye.geometry.pointing_series import design
+    from catseye.geometry.antenna.pointing_series import design
 
     d = design(a, e).reshape(40, 8)
     inverse = np.linalg.inv(d.T @ np.linalg.solve(q, d))

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
-from catseye.geometry.antenna import ground_from_alidade
+from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.records.laboratory.tilts import Tilts
 from catseye.reduction.pose.track_profile import coefficient_names, joined_tilt, track_profile
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.sun import altitude_azimuth, sun_direction
+from catseye.geometry.sky.sun import altitude_azimuth, sun_direction
 from catseye.records.site.site import Location
 from catseye.reduction.site.earth_rotation import Place, RotationStatus, _each, place_of, rotation_at, sun_at
 from sun_scene import GREEN_BANK, MORNING, apart, astropy_sun

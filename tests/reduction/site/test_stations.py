@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.geometry.imperfect import Imperfections, imperfect_counts
-from catseye.geometry.pointing import Station
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
+from catseye.geometry.mirror.pointing import Station
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.site.stations import AXES, TILTS, imperfections_of, point, station_of

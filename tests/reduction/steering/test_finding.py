@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.pointing import Station, counts, ray
-from catseye.geometry.search_pattern import count_size, offsets_of_counts
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.mirror.pointing import Station, counts, ray
+from catseye.geometry.mirror.search_pattern import count_size, offsets_of_counts
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import gaussian_spot, matched_radius, offset_share
 from catseye.reduction.steering.finding import SearchResult, adjustment_readings, find, found_point, search_results
 from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
@@ -97,7 +97,7 @@ def test_a_spike_is_not_a_target():
 
 def errors(rng, n, true_of, **how):
     """(error / u) of centres fitted on scans of 2 spot radii about a rounded, wrong start."""
-    from catseye.geometry.search_pattern import raster
+    from catseye.geometry.mirror.search_pattern import raster
 
     ratios, factors = [], []
     for _ in range(n):
@@ -172,7 +172,7 @@ def test_the_derivatives_of_the_fit_are_finite_differences():
 
 def test_a_clipped_top_does_not_lower_the_peak():
     rng = np.random.default_rng(5)
-    from catseye.geometry.search_pattern import raster
+    from catseye.geometry.mirror.search_pattern import raster
 
     scan = raster(TRUE, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), 0.25 * RADIUS, HEAD.azimuth_limits)
     clean = returned(scan.counts, TRUE, real=False)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.keep_out import TOUCH, Box, servo_margin
-from catseye.geometry.pointing import counts, ray
-from catseye.geometry.slew import straight, trapezoid
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.clearance.keep_out import TOUCH, Box, servo_margin
+from catseye.geometry.mirror.pointing import counts, ray
+from catseye.geometry.mirror.slew import straight, trapezoid
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.files.reading import read_record
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.site import Location
@@ -275,7 +275,7 @@ def test_a_guard_by_its_records(night_01):
 
 
 def test_the_margin_covers_the_beam_of_an_imperfect_mirror(night_01):
-    from catseye.geometry import imperfect
+    from catseye.geometry.mirror import imperfect
     from catseye.reduction.site.stations import imperfections_of, station_of
 
     mirror = night_01.mirror_of("ZY101").model_copy(

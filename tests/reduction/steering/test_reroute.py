@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.keep_out import Box
-from catseye.geometry.pointing import counts
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.clearance.keep_out import Box
+from catseye.geometry.mirror.pointing import counts
+from catseye.geometry.mirror.slew import trapezoid
 from catseye.reduction.steering.reroute import RouteStatus, route
 from sun_scene import DEGREE, MORNING, PACE, STATION, STOPS, ZEROS, apart, astropy_sun, beam, boxes, guard, profile
 

@@ -6,15 +6,15 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.antenna import (
+from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
     alidade_from_elevation,
     ground_from_alidade,
     ground_from_reflector,
 )
-from catseye.geometry.pointing import Station, counts, ray
-from catseye.geometry.time_tag import TimeTag
-from catseye.geometry.track import apparent_motion, count_motion, line_bound, line_estimate
+from catseye.geometry.mirror.pointing import Station, counts, ray
+from catseye.geometry.mirror.track import apparent_motion, count_motion, line_bound, line_estimate
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.tracking import (
     AZIMUTH_SLEW,

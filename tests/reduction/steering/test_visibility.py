@@ -5,9 +5,9 @@ import pytest
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.geometry.frame import Transform
-from catseye.geometry.rotation import from_vector
-from catseye.optics.prism import clear_share
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.frames.rotation import from_vector
+from catseye.optics.retroreflector.prism import clear_share
 from catseye.records.site.solids import Solids, read_solids
 from catseye.reduction.site.places import places_of
 from catseye.reduction.steering.visibility import (

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.antenna import ground_from_reflector_at
-from catseye.geometry.deformation import Posture
-from catseye.geometry.rotation import rx, rz
+from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.frames import ground_from_reflector_at
+from catseye.geometry.frames.rotation import rx, rz
 from catseye.records.site.structural_model import read_structural_model
 from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
 from repository import ROOT

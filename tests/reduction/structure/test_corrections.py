@@ -12,7 +12,7 @@ import pytest
 
 from catseye.constants import ARCSECOND
 from catseye.errors import EstimationError, InputError
-from catseye.geometry.deformation import Posture
+from catseye.geometry.antenna.deformation import Posture
 from catseye.records.site.structural_model import StructuralModel, read_structural_model, structural_model_toml
 from catseye.reduction.structure.antenna import UNITS, antenna_of
 from catseye.reduction.structure.corrections import Measured, correct_posture, frame_motion, measured_of
@@ -173,7 +173,7 @@ def campaign(antenna, rng, count, noise=True):
 
 
 def coefficients(fit, antenna):
-    from catseye.geometry.deformation import COMPONENTS
+    from catseye.geometry.antenna.deformation import COMPONENTS
 
     return np.concatenate([fit.coefficients[name][COMPONENTS.index(c)] for name, c in fit.free])
 

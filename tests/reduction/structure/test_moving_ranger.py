@@ -7,17 +7,17 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.deformation import Posture
-from catseye.geometry.frame import Transform
-from catseye.geometry.pointing import Station, counts
-from catseye.geometry.rotation import from_vector, to_vector
+from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.frames.rotation import from_vector, to_vector
+from catseye.geometry.mirror.pointing import Station, counts
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import read_structural_model
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
 from catseye.reduction.structure.moving_ranger import Driven, Known, moving_ranger, projected, tracked, vibrating
-from catseye.signal.vibration import Mode, follow, start
+from catseye.signal.vibration.filter import Mode, follow, start
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"

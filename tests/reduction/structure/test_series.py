@@ -6,8 +6,8 @@ import pytest
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.series import Spread
-from catseye.geometry.deformation import Posture
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.frames.rotation import from_vector
 from catseye.reduction.structure.check import left_out
 from catseye.reduction.structure.series import GroupSeries, SeriesModel, fit_structure
 

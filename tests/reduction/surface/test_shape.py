@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 from catseye.optics.zernike import Term
 from catseye.reduction.surface.change import change_between
 from catseye.reduction.surface.shape import Prisms, ShapeSettings, mean_square, shape_of

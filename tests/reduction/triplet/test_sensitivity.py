@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import DEGREE, TWO_PI
-from catseye.optics.prism import obliquity_slope
+from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.triplet.sensitivity import Departures, calibration_error, telescope_error, triplet_sensitivities
 from catseye.reduction.triplet.tolerances import across_effect, along_effect, spacing_effect
 

@@ -12,7 +12,7 @@ from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations import Coordinates, Distances
 from catseye.estimation.observations.unit_direction import across
-from catseye.optics.prism import obliquity_correction
+from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.triplet.ties import (
     BALL,
     COUNT,

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.atmosphere.air import group_refractivity
+from catseye.atmosphere.index.air import group_refractivity
 from catseye.errors import ValidityError
-from catseye.optics import glass, prism
+from catseye.optics import glass
+from catseye.optics.retroreflector import prism
 from catseye.reduction.triplet import tolerances as t
 from repository import TESTS
 

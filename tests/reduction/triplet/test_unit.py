@@ -12,7 +12,7 @@ from catseye.gateways.triplet.figure import triplet_figure
 from catseye.gateways.triplet.objects import triplet_object
 from catseye.gateways.triplet.sheet import text_sheet
 from catseye.gateways.writers.objects import plain
-from catseye.optics import cats_eye, prism
+from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import half_wavelengths

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import DEGREE, SPEED_OF_LIGHT
 from catseye.errors import InputError, ValidityError
-from catseye.geometry import visibility
-from catseye.optics.prism import obliquity_correction
+from catseye.geometry.clearance import visibility
+from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.memo import median_series
 from catseye.reduction.triplet.use import (

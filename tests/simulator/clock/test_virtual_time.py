@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from catseye.errors import CatseyeError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 
 

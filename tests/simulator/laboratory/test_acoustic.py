@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from catseye.atmosphere.sound import sound
-from catseye.signal.waveform import pulse
+from catseye.atmosphere.sound.speed import sound
+from catseye.signal.delay.waveform import pulse
 from catseye.simulator.laboratory.acoustic import Recorder, SoundPath, sound_speed
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.line import TICK_NS, parse_reply
 from catseye.records.night.live import LiveWeather
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 from catseye.ranger.head import Sampling
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 from catseye.ranger.ranger import Ranger

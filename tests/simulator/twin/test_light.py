@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import DEGREE
-from catseye.optics import cats_eye, prism
+from catseye.optics.retroreflector import cats_eye, prism
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
 from catseye.simulator.twin.light import Electronics, acceptance, glass_way, path_waves, prism_way

@@ -11,7 +11,7 @@ import pytest
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import InputError
-from catseye.geometry.mirror_path import beam_angles, path_change
+from catseye.geometry.mirror.mirror_path import beam_angles, path_change
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
 from catseye.simulator.night.air import group_refractivity_ppm

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.geometry.imperfect import Imperfections, imperfect_counts, imperfect_ray
-from catseye.geometry.pointing import Station as Ideal
-from catseye.geometry.pointing import counts as ideal_counts
-from catseye.geometry.pointing import ray as ideal_ray
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts, imperfect_ray
+from catseye.geometry.mirror.pointing import Station as Ideal
+from catseye.geometry.mirror.pointing import counts as ideal_counts
+from catseye.geometry.mirror.pointing import ray as ideal_ray
 from catseye.ranger.initialisation import mount_from_reflector
 from catseye.reduction.site.stations import station_of
 from catseye.simulator.twin.conditions import STILL

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.geometry.antenna import ground_from_reflector
+from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.simulator.twin.conditions import LIVING_NIGHT, STILL, LivingConditions
 from catseye.simulator.twin.telescope import ARM_FOOT, ARM_LENGTH, low_orders, turning
 from simulator.living_scene import only, rms, twin

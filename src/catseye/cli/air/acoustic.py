@@ -10,7 +10,8 @@ from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
 from catseye.errors import InputError
 
-SOUND_MODELS = "real_gas|cramer1993|parker2004"  # as in catseye.atmosphere.sound, whose import --help spares itself
+# as in catseye.atmosphere.sound.speed, whose import --help spares itself
+SOUND_MODELS = "real_gas|cramer1993|parker2004"
 
 
 def _known_sound(name: str) -> str:

@@ -7,12 +7,13 @@ import typer
 from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.terminal import say, wrapped
 
-SOUND_MODELS = "parker2004|cramer1993|real_gas"  # as in catseye.atmosphere.sound, whose import --help spares itself
+# as in catseye.atmosphere.sound.speed, whose import --help spares itself
+SOUND_MODELS = "parker2004|cramer1993|real_gas"
 U = {"callback": uncertainty}
 
 
 def _known(name: str) -> str:
-    from catseye.atmosphere.sound import MODELS as known
+    from catseye.atmosphere.sound.speed import MODELS as known
 
     if name not in known:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)}.")
@@ -46,7 +47,7 @@ def sound(
     json: Json = False,
 ) -> None:
     """Speed of sound in air, its sensitivities and its uncertainty, by the notes' formula and today's."""
-    from catseye.atmosphere.sound import sound as sound_of
+    from catseye.atmosphere.sound.speed import sound as sound_of
     from catseye.gateways.air.sound_objects import sound_object, sound_rows
     from catseye.gateways.writers.objects import json_line
 

@@ -72,7 +72,7 @@ def _span(since: str | None, until: str | None) -> tuple[int, int] | None:
     """Ticks; None for all."""
     if since is None and until is None:
         return None
-    from catseye.geometry.time_tag import mjd_of
+    from catseye.geometry.sky.time_tag import mjd_of
     from catseye.records.night.live import TICKS_PER_DAY
 
     low = 0 if since is None else round(mjd_of(since) * TICKS_PER_DAY)

@@ -48,7 +48,7 @@ def within(low: float, high: float, unit: str) -> Callable[[float | None], float
 def time_of(text: str | None) -> str | None:
     """As given, if it is a time."""
     if text is not None:
-        from catseye.geometry.time_tag import mjd_of
+        from catseye.geometry.sky.time_tag import mjd_of
 
         try:
             mjd = mjd_of(text)
@@ -155,13 +155,13 @@ def site_of(name: str) -> "SiteFolder":
 
 def mjd_start(text: str | None, usual: float | None = None) -> float:
     """MJD of --start; without it the usual one, or now."""
-    from catseye.geometry.time_tag import mjd_of
+    from catseye.geometry.sky.time_tag import mjd_of
 
     if text is not None:
         return mjd_of(text)
     if usual is not None:
         return usual
-    from catseye.geometry.time_tag import PER_DAY
+    from catseye.geometry.sky.time_tag import PER_DAY
     from catseye.simulator.clock.world_clock import SystemClock
 
     return SystemClock().now_ns() / PER_DAY

@@ -7,7 +7,7 @@ import typer
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say, wrapped
 
-EDITIONS = "iec2014|ansi2014"  # as in catseye.optics.safety_limits, whose import --help spares itself
+EDITIONS = "iec2014|ansi2014"  # as in catseye.optics.safety.limits, whose import --help spares itself
 
 
 def _known_edition(name: str) -> str:
@@ -57,7 +57,7 @@ def safety(
     """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
     from catseye.gateways.optics.safety_objects import Question, safety_object, safety_passages, safety_table
     from catseye.gateways.writers.objects import json_line
-    from catseye.optics.safety import LaserBeam
+    from catseye.optics.safety.hazard import LaserBeam
 
     if scan_period_s is not None and scan_rad_per_s is None:
         raise typer.BadParameter("needs --scan-rad-per-s.", param_hint="'--scan-period-s'")

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from catseye.gateways.pose.pointing_series_objects import Observed
     from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 
-TERMS = "IA,IE,CA,NPAE,AW,AN,HZCZ,HZSZ"  # as in catseye.geometry.pointing_series, whose import --help spares itself
+# as in catseye.geometry.antenna.pointing_series, whose import --help spares itself
+TERMS = "IA,IE,CA,NPAE,AW,AN,HZCZ,HZSZ"
 ZENITH = 89.999  # degrees: nearer, azimuth is not defined
 
 pointing = typer.Typer(

@@ -18,9 +18,9 @@ from catseye.coordinator.plan.candidates import leaves
 from catseye.coordinator.visibility.surroundings import PERHAPS, SUN, KeepClear, Surroundings, instants, later
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between, vantages_of
 from catseye.errors import CatseyeError, InputError
-from catseye.geometry.encoder import BEAM_PER_COUNT, within
-from catseye.geometry.slew import trapezoid
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT, within
+from catseye.geometry.mirror.slew import trapezoid
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.line import Reply, Request, stamp_text
 from catseye.ranger.values import Value

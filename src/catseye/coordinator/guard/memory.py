@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.vantage import Vantage
 from catseye.errors import InputError
-from catseye.geometry.encoder import COUNTS_PER_TURN
-from catseye.geometry.pointing import Station
-from catseye.geometry.slew import Pace
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
+from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
 from catseye.ranger.motion_units import acceleration_counts, velocity_counts

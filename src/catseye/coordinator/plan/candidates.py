@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.surroundings import BOX, FREE, PERHAPS, SUN, Surroundings
-from catseye.geometry.encoder import HALF_TURN
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.mirror.encoder import HALF_TURN
+from catseye.geometry.mirror.slew import trapezoid
 
 Array = NDArray[np.float64]
 AZIMUTH, ELEVATION = 1, 2

@@ -10,7 +10,7 @@ from catseye.constants import MILLIMETRE
 from catseye.coordinator.parts import PlannedShot, SiteState
 from catseye.coordinator.visibility.surroundings import later
 from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture
-from catseye.geometry.antenna import ground_from_reflector_at
+from catseye.geometry.antenna.frames import ground_from_reflector_at
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import REFERENCE, SiteFolder
 

@@ -22,7 +22,7 @@ from catseye.coordinator.visibility.sights import Sights
 from catseye.coordinator.visibility.surroundings import FREE, PERHAPS, KeepClear, Surroundings, instants, later
 from catseye.coordinator.visibility.vantage import Retro, Vantage, retros_of, vantages_of
 from catseye.errors import InputError
-from catseye.geometry.keep_out import servo_margin
+from catseye.geometry.clearance.keep_out import servo_margin
 from catseye.ranger.sun_watch import LARGEST_STEP
 from catseye.records.night.live import TICK_SECONDS
 from catseye.records.site.folder import REFERENCE, SiteFolder

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.surroundings import FREE, Surroundings
 from catseye.coordinator.visibility.vantage import Retro, Vantage
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.mirror.slew import trapezoid
 
 Array = NDArray[np.float64]
 BAND = 400.0  # counts of elevation in which a pass goes along the azimuth: 5.8 deg of the beam

@@ -14,9 +14,9 @@ from catseye.constants import DEGREE
 from catseye.coordinator.visibility.sweep import chords, nearest
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between
 from catseye.errors import InputError
-from catseye.geometry.frame import Transform
-from catseye.geometry.keep_out import Box
-from catseye.geometry.slew import trapezoid
+from catseye.geometry.clearance.keep_out import Box
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.mirror.slew import trapezoid
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.keep_out import KeepOut

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.antenna import ground_from_reflector
-from catseye.geometry.encoder import prime_counts, turned_within, within
-from catseye.geometry.frame import Transform
-from catseye.geometry.pointing import Station, counts
-from catseye.geometry.slew import Pace
+from catseye.geometry.antenna.frames import ground_from_reflector
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.mirror.encoder import prime_counts, turned_within, within
+from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.initialisation import frame_of, own_station
 from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
 from catseye.ranger.state import AxisSettings

@@ -13,7 +13,8 @@ from scipy import special
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
-from catseye.estimation.network.datum import MOTIONS, to_datum
+from catseye.estimation.network.datum import to_datum
+from catseye.estimation.shapes.motions import MOTIONS
 from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
 
 DATUMS: dict[str, tuple[int, ...]] = {

@@ -14,7 +14,7 @@ from catseye.estimation.deformation.congruence import (
     differences,
     global_test,
 )
-from catseye.estimation.network.datum import MOTIONS
+from catseye.estimation.shapes.motions import MOTIONS
 from catseye.estimation.shapes.rigid_body import motion_columns
 
 

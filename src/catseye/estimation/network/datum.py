@@ -13,35 +13,9 @@ from scipy.linalg import qr
 from catseye.estimation.least_squares.covariance import Covariance, Transformed
 from catseye.estimation.least_squares.normal import FLOATS
 from catseye.estimation.least_squares.rows import Rows
+from catseye.estimation.shapes.motions import MOTIONS, figure_size, motions
 
-MOTIONS = ("shift along x", "shift along y", "shift along z", "turn about x", "turn about y", "turn about z", "scale")
 UNHELD = 1e-7  # share of a unit motion in the datum's coordinates, below which they do not hold it
-
-
-def motions(xyz: np.ndarray, centre: np.ndarray | None = None, size: float | None = None) -> np.ndarray:
-    """The seven motions of points (n, 3): (3 n, 7), none moving the points by more than metres.
-
-    centre   (3,) m, about which points are turned and scaled; their mean if None
-    size     m, by which turns and scale are divided; their root mean square distance from the mean if None
-
-    Order as MOTIONS.
-
-    >>> motions(np.array([[0.0, 0, 0], [2.0, 0, 0]]))[:, 6].tolist()
-    [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
-    """
-    n = len(xyz)
-    arm = xyz - (xyz.mean(axis=0) if centre is None else centre)
-    arm = arm / (_size(arm) if size is None else size)
-    result = np.zeros((n, 3, 7))
-    result[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    for axis in range(3):
-        result[:, :, 3 + axis] = np.cross(np.eye(3)[axis], arm)
-    result[:, :, 6] = arm
-    return result.reshape(3 * n, 7)
-
-
-def _size(arm: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.sum(arm**2, axis=1)))) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +67,7 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     linear = [(r, *_row_form(r, x)) for r in rows]
     norms = sum((np.bincount(at.ravel(), (j**2).ravel(), n) for _, at, j in linear), np.zeros(n))
     centre = xyz.mean(axis=0)
-    size = _size(xyz - centre)
+    size = figure_size(xyz - centre)
     h, allowed = motions(xyz, centre, size), np.eye(7)
     still = ~free[:coordinates]
     if still.any():  # a held coordinate must not move

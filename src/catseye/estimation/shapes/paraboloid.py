@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.geometry.frame import Transform
-from catseye.geometry.rotation import from_vector, skew
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.frames.rotation import from_vector, skew
 
 Free = Literal["vertex", "axis", "focal-length"]
 Measure = Literal["normal", "half-path"]

@@ -22,7 +22,7 @@ from catseye.estimation.shapes.rigid_body import (
     motion_columns,
     turned_covariance,
 )
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("translation", "rotation") for axis in "xyz")
 METHODS = ("l1", "huber", "igg3", "biweight")

@@ -12,7 +12,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import best_linear_estimate
-from catseye.estimation.network.datum import motions
+from catseye.estimation.shapes.motions import motions
 
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step moved a point by {step:.2g} m after {iterations} iterations"

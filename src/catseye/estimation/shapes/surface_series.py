@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import PARAMETERS, POSE, Measure, fit_paraboloid, ordered
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 CONVERGED, TOO_FEW, UNHELD, UNSETTLED = 0, 1, 2, 3
 STATUS = {

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.atmosphere.air import MODELS, Air, air
-from catseye.atmosphere.humidity import vapour_pressure_hpa
-from catseye.atmosphere.model import Limit, Model
+from catseye.atmosphere.index.air import MODELS, Air, air
+from catseye.atmosphere.index.model import Model
+from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import PPM
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 

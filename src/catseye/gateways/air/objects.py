@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from catseye.atmosphere.air import Air
+    from catseye.atmosphere.index.air import Air
 
 
 def air_object(air: "Air", wavelength_um: float, u: Any) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
-from catseye.signal.cycles import CycleStatus
+from catseye.signal.cycles.whole import CycleStatus
 
 if TYPE_CHECKING:
     from catseye.reduction.air.refractometer_calibration import PathCalibration

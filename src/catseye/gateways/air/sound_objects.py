@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from catseye.atmosphere import sound_parker2004
-from catseye.atmosphere.sound import MODELS, Sound, sound
-from catseye.atmosphere.sound_dispersion import dispersion
+from catseye.atmosphere.sound import parker2004 as sound_parker2004
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.speed import MODELS, Sound, sound
 from catseye.errors import ValidityError
 
 FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give

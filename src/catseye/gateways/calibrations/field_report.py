@@ -20,7 +20,7 @@ from catseye.gateways.calibrations.field_report_fields import (
     written_value,
 )
 from catseye.gateways.writers.page import page
-from catseye.geometry.mount import gamma, lambda_
+from catseye.geometry.mirror.mount import gamma, lambda_
 
 SERVO_ROWS = 9  # an axis's position at the cube and its eight chip settings
 MATRIX_CELLS = 9

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.calibrations.certificate import rounded
-from catseye.geometry.mount import gamma, lambda_
+from catseye.geometry.mirror.mount import gamma, lambda_
 from catseye.records.files.reading import Folder
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry

@@ -8,7 +8,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.reduction.epoch.epoch import Reduction
-from catseye.signal.cycles import unwrapped_length
+from catseye.signal.cycles.whole import unwrapped_length
 
 RANGES = [
     "shot",

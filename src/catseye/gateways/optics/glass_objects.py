@@ -2,10 +2,9 @@
 
 from typing import Any
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
-from catseye.optics import prism
 from catseye.optics.glass import (
     GLASSES,
     absolute_index,
@@ -18,6 +17,7 @@ from catseye.optics.glass import (
     slopes,
     temperature_slopes,
 )
+from catseye.optics.retroreflector import prism
 
 MODULATION_HZ = 1.5e9  # the GBT's
 AIR = (20.0, 933.0, 50.0)  # °C, hPa, %: of the notes' example, [PARKER04] eq. 1.49, by their model

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.optics.coating import index
-from catseye.optics.corner_polarization import (
+from catseye.optics.glass import phase_index
+from catseye.optics.polarization import ellipse, linear, retarder
+from catseye.optics.retroreflector.corner_polarization import (
     EDGES,
     ORDERS,
     Corner,
@@ -18,8 +20,6 @@ from catseye.optics.corner_polarization import (
     solid_corner,
     through_plate,
 )
-from catseye.optics.glass import phase_index
-from catseye.optics.polarization import ellipse, linear, retarder
 
 AZIMUTHS = np.linspace(0.0, np.pi, 73)
 TILTS = np.radians(np.linspace(0.0, 20.0, 21))  # total reflection ends at 20.3 deg towards an edge

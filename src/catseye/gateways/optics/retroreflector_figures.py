@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.optics import prism
-from catseye.optics.cats_eye import BallCatsEye, focal_radius
 from catseye.optics.glass import index_over_air
-from catseye.optics.hollow_cube import HollowCube
-from catseye.optics.retroreflector import Retroreflector
-from catseye.optics.solid_prism import SolidPrism
+from catseye.optics.retroreflector import prism
+from catseye.optics.retroreflector.cats_eye import BallCatsEye, focal_radius
+from catseye.optics.retroreflector.hollow_cube import HollowCube
+from catseye.optics.retroreflector.kinds import Retroreflector
+from catseye.optics.retroreflector.solid_prism import SolidPrism
 
 WIDTH, HEIGHT = 9.4, 4.6  # inches
 POINTS = 361

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from catseye.optics.safety import (
+from catseye.optics.safety.hazard import (
     AVERSION,
     BINOCULARS,
     NAKED,
@@ -14,8 +14,8 @@ from catseye.optics.safety import (
     hazard_zone,
     returned_power,
 )
-from catseye.optics.safety_limits import ALPHA_MIN, EDITIONS, PUPIL, eye_limits, eye_mpe, factors, skin_limit
-from catseye.optics.safety_sweep import sweep_hazard_distance
+from catseye.optics.safety.limits import ALPHA_MIN, EDITIONS, PUPIL, eye_limits, eye_mpe, factors, skin_limit
+from catseye.optics.safety.sweep import sweep_hazard_distance
 
 DURATIONS = (AVERSION, 10.0, 100.0, 3e4)  # s, of the table
 

@@ -11,7 +11,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.pose.objects import FORMAT as POSE
-from catseye.geometry.pointing_series import PointingSeries, published
+from catseye.geometry.antenna.pointing_series import PointingSeries, published
 from catseye.records.files.reading import Folder, read_record
 from catseye.records.laboratory.star_offsets import StarOffsets, read_star_offsets
 from catseye.records.site.pointing_model import PointingModel, Term

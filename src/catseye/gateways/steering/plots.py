@@ -7,7 +7,7 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.gateways.steering.servo_figures import move_figure
 from catseye.gateways.steering.sky_figures import sky_figure
-from catseye.geometry.slew import Pace
+from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, pace_of, velocity_integer
 from catseye.records.files.reading import read_record
 from catseye.records.site.keep_out import KeepOut

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.stations import Pointings
 from catseye.reduction.steering.guard import Verdict
 from catseye.reduction.steering.sighting import Sighting

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.geometry.encoder import COUNTS_PER_TURN
-from catseye.geometry.keep_out import TOUCH
-from catseye.geometry.pointing import ray
-from catseye.geometry.slew import Slew, trapezoid
-from catseye.geometry.sun import altitude_azimuth
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.clearance.keep_out import TOUCH
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
+from catseye.geometry.mirror.pointing import ray
+from catseye.geometry.mirror.slew import Slew, trapezoid
+from catseye.geometry.sky.sun import altitude_azimuth
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.earth_rotation import Place, sun_at
 from catseye.reduction.steering.guard import Guard
 from catseye.reduction.steering.reroute import Route

@@ -3,7 +3,7 @@
 import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
-from catseye.geometry.search_pattern import count_size
+from catseye.geometry.mirror.search_pattern import count_size
 from catseye.reduction.steering.spot_fit import Spot
 from catseye.reduction.steering.tracking import Following, Track
 from catseye.reduction.steering.visibility import Sight, Visibility

@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
-from catseye.geometry.deformation import COMPONENTS
+from catseye.geometry.antenna.deformation import COMPONENTS
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration

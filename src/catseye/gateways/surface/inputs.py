@@ -9,8 +9,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna import ground_from_reflector
-from catseye.geometry.frame import Transform
+from catseye.geometry.antenna.frames import ground_from_reflector
+from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import Columns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Generator
 
 from catseye.errors import InputError
-from catseye.geometry.encoder import COUNTS_PER_TURN
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger import motion_units
 from catseye.ranger.state import RangerState, Values, Work
 from catseye.ranger.values import Value

@@ -17,8 +17,8 @@ from catseye.ranger.line import TICK_NS, Reply, nanoseconds_of, nanoseconds_to_t
 from catseye.ranger.ranging import distance_mm, group_index
 from catseye.ranger.state import Measured, Outgoing, RangerState, Stream, Values, Work
 from catseye.ranger.values import Value
-from catseye.signal.cycles import fraction
-from catseye.signal.phase import detect, phasors
+from catseye.signal.cycles.whole import fraction
+from catseye.signal.detection.phase import detect, phasors
 
 SLACK = 2.0  # s that a buffer may come late
 CONVERTER_END = 32_767  # code

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.handlers.axes import Handler
 from catseye.ranger.state import RangerState, Values
 from catseye.ranger.sun_watch import HALF_ANGLE, nearest_sun, way_out

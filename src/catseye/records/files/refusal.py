@@ -143,3 +143,7 @@ def all_keys(kind: Any) -> list[str]:
     schema = kind.model_json_schema()
     tables = [schema, *schema.get("$defs", {}).values()]
     return sorted({key for table in tables for key in table.get("properties", {})})
+
+
+def in_row(file: str, row: int, problem: str) -> InputError:
+    return refusal(file, f"row {row}, {problem}")

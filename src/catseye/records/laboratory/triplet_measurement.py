@@ -12,7 +12,7 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_va
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from catseye.constants import TWO_PI
-from catseye.optics import cats_eye, prism
+from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.record import (
     Certificate,
     Name,

@@ -26,7 +26,7 @@ from catseye.estimation.observations import (
     RigidBodies,
     Tilts,
 )
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.frames.rotation import from_vector
 from catseye.records.files.refusal import shown
 from catseye.records.files.toml_fields import ANGLE, LENGTH, Fields
 from catseye.records.network.draft import NetworkDraft

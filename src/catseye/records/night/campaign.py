@@ -9,9 +9,9 @@ import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.reading import Folder
-from catseye.records.files.refusal import refusal, shown
+from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
-from catseye.records.night.shot import Shot, Shots, in_row, read_buffers, refuse_shots, shot_columns
+from catseye.records.night.shot import Shot, Shots, read_buffers, refuse_shots, shot_columns
 from catseye.records.night.weather import Weather, WeatherSample, weather_columns
 from catseye.records.site.folder import (
     REFERENCE,

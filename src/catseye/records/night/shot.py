@@ -10,10 +10,9 @@ from typing import Annotated, BinaryIO
 import numpy as np
 from pydantic import model_validator
 
-from catseye.errors import InputError
 from catseye.records.files.reading import Folder, column
 from catseye.records.files.record import Mjd, Name, Record, Within, broken_rule
-from catseye.records.files.refusal import refusal, shown, unreadable
+from catseye.records.files.refusal import in_row, refusal, shown, unreadable
 from catseye.records.site.site import MOST_SAMPLES, too_many_samples
 
 MAGIC = b"\x93NUMPY"
@@ -143,7 +142,3 @@ def refuse_shots(file: str, shots: Sequence[Shot], buffers: np.memmap) -> None:
             again = f"mjd_utc = {shot.mjd_utc!r} is the time of {shot.ranger}'s last shot too"
             raise in_row(file, row, f"{again} (expected a later time)")
         latest[shot.ranger] = previous = shot.mjd_utc
-
-
-def in_row(file: str, row: int, problem: str) -> InputError:
-    return refusal(file, f"row {row}, {problem}")

@@ -13,9 +13,8 @@ from typing import Any, Protocol, TypeVar
 from catseye.errors import InputError
 from catseye.records.files.reading import Folder
 from catseye.records.files.record import Record
-from catseye.records.files.refusal import refusal, shown
+from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.files.toml_text import record_toml
-from catseye.records.night.shot import in_row
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.monument import Monument
 from catseye.records.site.site import Site

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.keep_out import Box
+from catseye.geometry.clearance.keep_out import Box
 from catseye.records.files.record import Certificate, Name, Record, Vector, Version, Within, broken_rule
 
 SMALLEST_MM, LARGEST_MM = 50.0, 1e6  # of a box: a sandwich in mm, a mountain in mm; neither can be metres

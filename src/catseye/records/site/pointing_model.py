@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from catseye.constants import ARCSECOND
-from catseye.geometry.pointing_series import TERMS, PointingSeries
+from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries
 from catseye.records.files.record import Certificate, Within, broken_rule
 
 FORMAT = "catseye-pointing-series-1"

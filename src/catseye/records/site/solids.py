@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry import solids
+from catseye.geometry.clearance import solids
 from catseye.records.files.reading import read_record
 from catseye.records.files.record import Certificate, Pair, Record, Vector, Version, Within, broken_rule
 

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
-from catseye.geometry.deformation import factors
+from catseye.geometry.antenna.deformation import factors
 from catseye.records.files.reading import read_record
 from catseye.records.files.record import Certificate, Length, Name, Record, Vector, Version, Within, broken_rule
 from catseye.records.files.toml_text import toml_value

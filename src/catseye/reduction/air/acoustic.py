@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere import humidity
-from catseye.atmosphere.air import Air, air
-from catseye.atmosphere.model import Limit, check_spreads
-from catseye.atmosphere.sound import MODELS, THERMOMETRY, model_named, sound, temperatures_c
-from catseye.atmosphere.sound_dispersion import dispersion
-from catseye.atmosphere.sound_path import WIND, bent_ray_excess, pair, straight_line_speed
+from catseye.atmosphere.index.air import Air, air
+from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.path import WIND, bent_ray_excess, pair, straight_line_speed
+from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, model_named, sound, temperatures_c
+from catseye.atmosphere.weather import humidity
 from catseye.errors import ValidityError
 
 USED = "used"

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere.air import air
-from catseye.atmosphere.model import Limit, check_spreads
-from catseye.atmosphere.sound import THERMOMETRY, model_named, sound, temperatures_c
-from catseye.atmosphere.sound_dispersion import dispersion
+from catseye.atmosphere.index.air import air
+from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.speed import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
 from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED

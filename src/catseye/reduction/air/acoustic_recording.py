@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.atmosphere.sound import THERMOMETRY, sound
+from catseye.atmosphere.sound.speed import THERMOMETRY, sound
 from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import InputError, ValidityError
 from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
 from catseye.reduction.air.acoustic import USED, PathTemperatures, path_temperatures
-from catseye.signal.delay import DelayPlan, DelayStatus
-from catseye.signal.waveform import sampled
+from catseye.signal.delay.arrival import DelayPlan, DelayStatus
+from catseye.signal.delay.waveform import sampled
 
 WARMER_C, WINDIER = 15.0, 15.0  # °C and m/s off the prediction that the default window allows for
 LOOP_WINDOW = 5e-3  # s, about the emission

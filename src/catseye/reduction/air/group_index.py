@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from catseye.atmosphere.air import MODELS
-from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.atmosphere.index.air import MODELS
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.reduction.epoch.air import AirField
-from catseye.signal.cycles import CycleStatus, decision, fraction, unwrapped_length
+from catseye.signal.cycles.whole import CycleStatus, decision, fraction, unwrapped_length
 
 if TYPE_CHECKING:
     from catseye.records.site.target import Benchmark

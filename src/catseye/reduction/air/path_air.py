@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.air_profile import AirProfile, PathIndex, WeatherReadings
-from catseye.atmosphere.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, Prior
-from catseye.atmosphere.suspect_readings import suspect_readings
+from catseye.atmosphere.path.air_profile import AirProfile, PathIndex, WeatherReadings
+from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, Prior
+from catseye.atmosphere.path.suspect_readings import suspect_readings
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.records.night.weather import Weather

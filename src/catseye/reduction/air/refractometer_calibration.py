@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, group_refractivity
+from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
 from catseye.reduction.air.refractometer_fit import PathFit
@@ -25,7 +25,7 @@ from catseye.reduction.air.refractometer_night import (
     follow_phase,
     path_weather,
 )
-from catseye.signal.cycles import CycleStatus
+from catseye.signal.cycles.whole import CycleStatus
 
 AGREES = 3.0  # standard uncertainties within which slopes agree
 UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one

@@ -5,8 +5,8 @@ See `refractometer_calibration`, which says what is observed and what is unknown
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS
-from catseye.atmosphere.humidity import vapour_pressure_hpa
+from catseye.atmosphere.index.air import MODELS
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError
 from catseye.reduction.air.group_index import phase_slope

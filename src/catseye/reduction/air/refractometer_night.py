@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, ValidationError
 
-from catseye.atmosphere.air import MODELS, air
+from catseye.atmosphere.index.air import MODELS, air
 from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 from catseye.records.files.columns import Columns, columns_of

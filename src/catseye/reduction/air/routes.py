@@ -8,10 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from catseye.atmosphere import barometer, humidity, hygrometer
-from catseye.atmosphere.air import MODELS, Air, air, air_of_vapour, group_partials
-from catseye.atmosphere.condensation import Condensation, condensation
-from catseye.atmosphere.model import Limit
+from catseye.atmosphere.index import hygrometer
+from catseye.atmosphere.index.air import MODELS, Air, air, air_of_vapour, group_partials
+from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.weather import barometer, humidity
+from catseye.atmosphere.weather.condensation import Condensation, condensation
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.air import air
-from catseye.atmosphere.velocity import (
+from catseye.atmosphere.index.air import air
+from catseye.atmosphere.sound.velocity import (
     EARTH_RADIUS,
     REFRACTION,
     arc_to_chord_correction,

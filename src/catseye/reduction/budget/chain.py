@@ -6,14 +6,14 @@ reference shots and the target's, and the interpolation is applied to it.
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, air, group_refractivity
-from catseye.atmosphere.humidity import vapour_pressure_hpa
-from catseye.atmosphere.path import mean_over_height, pressure_at
+from catseye.atmosphere.index.air import MODELS, air, group_refractivity
+from catseye.atmosphere.path.mean import mean_over_height, pressure_at
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.quality.propagation import Draw, Model, draw_inputs
-from catseye.geometry.encoder import azimuth_angle, elevation_angle
-from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
-from catseye.optics.prism import range_constant
+from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
+from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
+from catseye.optics.retroreflector.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
 from catseye.reduction.budget.scene import Scene, walk_of
 from catseye.reduction.epoch.head import mounted, only_prime

@@ -17,7 +17,7 @@ from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
 from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.places import Place, places_of
-from catseye.signal.cycles import Decision, decision, unwrapped_length
+from catseye.signal.cycles.whole import Decision, decision, unwrapped_length
 
 CHECKED = 0.05  # redundancy below which the other shots do not say where a target is
 UNDECIDED = "not adjusted"  # status of a usable shot where the campaign cannot be adjusted

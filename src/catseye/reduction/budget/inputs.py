@@ -19,17 +19,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, air
-from catseye.atmosphere.humidity import saturation, vapour_pressure_hpa
-from catseye.atmosphere.path import mean_over_height, pressure_at
+from catseye.atmosphere.index.air import MODELS, air
+from catseye.atmosphere.path.mean import mean_over_height, pressure_at
+from catseye.atmosphere.weather.humidity import saturation, vapour_pressure_hpa
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.quality.propagation import STUDENT, Input
-from catseye.optics.prism import obliquity_slope
+from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, Scene, head_columns
 from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
-from catseye.signal.buffers import inspect_buffers
-from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES
-from catseye.signal.cyclic import cyclic_slope
+from catseye.signal.detection.buffers import inspect_buffers
+from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES
+from catseye.signal.systematics.cyclic import cyclic_slope
 
 NAMED = 0.01  # weight of a reference beyond which it has a line of its own
 DITHERED = 0.5  # codes of rms noise above which a converter's steps are averaged like noise

@@ -13,8 +13,8 @@ from catseye.reduction.epoch.head import head_corrections, head_unknowns
 from catseye.reduction.epoch.ranges import Phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.places import Place
-from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
-from catseye.signal.drift import drift_at
+from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
+from catseye.signal.drift.reference import drift_at
 
 FELT = 1e-6  # weight of a reference below which a shot does not feel it
 
@@ -167,7 +167,7 @@ def scene_of(
 
     Raises InputError where the target's face looks away from the ranger: it cannot have returned the light.
     """
-    from catseye.optics.prism import obliquity_correction
+    from catseye.optics.retroreflector.prism import obliquity_correction
 
     shots = campaign.shots
     ranger, target = shots.ranger[row], shots.target[row]

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from catseye.atmosphere.air import MODELS, group_refractivity
-from catseye.atmosphere.humidity import vapour_pressure_hpa
-from catseye.atmosphere.path import mean_over_height, pressure_at
+from catseye.atmosphere.index.air import MODELS, group_refractivity
+from catseye.atmosphere.path.mean import mean_over_height, pressure_at
+from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.campaign import Campaign
 from catseye.records.night.path_temperature import PathTemperatureTable

@@ -8,7 +8,7 @@ from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located, locate
 from catseye.estimation.least_squares.adjustment import Solution
 from catseye.estimation.least_squares.rows import full_jacobian
-from catseye.optics.prism import obliquity_slope
+from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, other_ends, shot_group
 from catseye.reduction.epoch.unknowns import Network
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.condensation import Condensation, condensation
+from catseye.atmosphere.weather.condensation import Condensation, condensation
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.night.campaign import Campaign
 
 LONGEST_GAP = 900.0  # s between two readings of a surface that are joined, and two samples at risk of one spell

@@ -18,15 +18,15 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
-from catseye.geometry.mirror_path import beam_angles, direction_angles, path_change
-from catseye.geometry.pointing import Station
+from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
+from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
+from catseye.geometry.mirror.pointing import Station
 from catseye.records.files.refusal import refusal
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.site.stations import AXES, station_in
-from catseye.signal.amplitude import amplitude_by_coefficient, amplitude_phase
-from catseye.signal.cyclic import cyclic_design, cyclic_range
+from catseye.signal.systematics.amplitude import amplitude_by_coefficient, amplitude_phase
+from catseye.signal.systematics.cyclic import cyclic_design, cyclic_range
 
 UNSAID_ORDERS = 2  # of a cyclic deviation of which the sheet says the uncertainty alone
 

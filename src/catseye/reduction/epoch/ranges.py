@@ -11,12 +11,12 @@ from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.settings import Settings
-from catseye.signal.buffers import BufferStatus, inspect_buffers
-from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
-from catseye.signal.cycles import fraction
-from catseye.signal.drift import drift_at, reference_surprise
-from catseye.signal.leakage import subtract_leakage
-from catseye.signal.walk import estimate_walk, walk_test
+from catseye.signal.cycles.whole import fraction
+from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
+from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
+from catseye.signal.drift.reference import drift_at, reference_surprise
+from catseye.signal.drift.walk import estimate_walk, walk_test
+from catseye.signal.systematics.leakage import subtract_leakage
 
 Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
 

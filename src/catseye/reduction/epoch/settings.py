@@ -9,8 +9,8 @@ from catseye.constants import DEGREE
 class Settings:
     """Assumptions of a reduction; the defaults are those of the campaign layout's README.
 
-    air_model               name in `catseye.atmosphere.air.MODELS`; version 1 of the layout prescribes the notes' model
-                            (ciddor_hill1999 moves night-01's feed arm by 12 um)
+    air_model               name in `catseye.atmosphere.index.air.MODELS`; version 1 of the layout prescribes
+                            the notes' model (ciddor_hill1999 moves night-01's feed arm by 12 um)
     critical                |w| above which a shot is rejected; 3.5 rejects one good shot in 2000
     smallest_return         amplitude over its own standard uncertainty below which a shot counts as blocked
     u_thermometer_c         °C, offset of a station thermometer that was not compared with a standard

@@ -7,12 +7,12 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.observations import Distances, MovingDistances
-from catseye.optics.prism import obliquity_correction, obliquity_slope
+from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.ranges import Electronics
 from catseye.reduction.epoch.unknowns import AIR, Network, path_of
 from catseye.reduction.site.places import unit
-from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
+from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
 ShotGroup = Distances | MovingDistances
 

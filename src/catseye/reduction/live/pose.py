@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.network.datum import motions
-from catseye.geometry.beam_deviation import aperture, prime_focus_tilt
+from catseye.estimation.shapes.motions import motions
+from catseye.geometry.antenna.beam_deviation import aperture, prime_focus_tilt
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.state import REFERENCE_EPOCH, XYZ, Carried
 

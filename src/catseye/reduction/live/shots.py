@@ -21,8 +21,8 @@ from catseye.records.site.mirror import Mirror
 from catseye.records.site.site import Adc
 from catseye.reduction.epoch.ranges import Detected, Phases, why_not
 from catseye.reduction.epoch.settings import Settings
-from catseye.signal.buffers import shortest_run
-from catseye.signal.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
+from catseye.signal.detection.buffers import shortest_run
+from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
 
 USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
 U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
@@ -151,7 +151,7 @@ class _Seen:
 
 def _detect(shot: LiveShot, samples: NDArray[np.int16], into: _Seen, bits: int, run: float, leaked: complex) -> None:
     """A buffer, compiled; what is wrong with it in words, by the plain form."""
-    from catseye.signal import buffer_kernel as kernel
+    from catseye.signal.detection import buffer_kernel as kernel
 
     n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
     ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)

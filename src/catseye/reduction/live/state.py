@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 
 Array = NDArray[np.float64]
 REFERENCE_EPOCH = "@0"  # after a point's name: where it was in the reference epoch, in its frame

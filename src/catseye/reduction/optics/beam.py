@@ -18,7 +18,7 @@ from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
 from catseye.records.site.beam import BeamTrain, Element, Laser
-from catseye.signal.feedback import fringe_contrast
+from catseye.signal.systematics.feedback import fringe_contrast
 
 Array = NDArray[np.float64]
 WIDE = 5.0  # beam radii: what a missing aperture stands for

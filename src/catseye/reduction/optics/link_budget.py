@@ -7,10 +7,10 @@ import numpy as np
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import radius, returned_share, share_within
-from catseye.optics.prism import clear_share
 from catseye.optics.receiver import noise_density, signal_current, u_phase
+from catseye.optics.retroreflector.prism import clear_share
 from catseye.reduction.optics.link import Link, Reflector
-from catseye.signal.leakage import worst_range_error
+from catseye.signal.systematics.leakage import worst_range_error
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Solution, adjust
 from catseye.estimation.quality.reliability import checked, single_level, w_critical
-from catseye.geometry.panel_surface import axes
+from catseye.geometry.antenna.panel_surface import axes
 from catseye.records.panels.instrument import PanelInstrument
 from catseye.records.panels.layout import PanelLayout
 from catseye.records.panels.readings import PanelReadings, PanelSurvey

@@ -22,8 +22,8 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.observations.kind import Kind
-from catseye.geometry.panel_surface import axes, cosine_of_slope, panels_under, warps
-from catseye.geometry.panel_tool import turned
+from catseye.geometry.antenna.panel_surface import axes, cosine_of_slope, panels_under, warps
+from catseye.geometry.antenna.panel_tool import turned
 from catseye.records.files.refusal import refusal
 from catseye.records.panels.instrument import PanelInstrument
 from catseye.records.panels.layout import PanelLayout

@@ -13,7 +13,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
-from catseye.geometry.pointing_series import TERMS, PointingSeries, columns, design
+from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, columns, design
 
 LIMIT = 4.0  # |w| of a star's coordinate beyond which `reject` leaves the star out
 PART = 0.2  # of the largest part of a combination: smaller parts are not named

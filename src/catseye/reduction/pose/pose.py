@@ -19,8 +19,8 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.shapes.pose import Pose, fit_pose
 from catseye.estimation.shapes.rigid_body import turned_covariance
-from catseye.geometry.antenna import ground_from_alidade
-from catseye.geometry.frame import Transform
+from catseye.geometry.antenna.frames import ground_from_alidade
+from catseye.geometry.frames.frame import Transform
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.settings import Settings

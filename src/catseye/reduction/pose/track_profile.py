@@ -18,8 +18,8 @@ import numpy as np
 from catseye.constants import ARCSECOND
 from catseye.errors import EstimationError, FrameError
 from catseye.estimation.least_squares.singular import best_linear_estimate
-from catseye.geometry.pointing_series import axis_terms
-from catseye.geometry.rotation import from_vector, rz
+from catseye.geometry.antenna.pointing_series import axis_terms
+from catseye.geometry.frames.rotation import from_vector, rz
 from catseye.records.laboratory.tilts import Tilts
 from catseye.reduction.pose.pose import GroupPose
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.errors import ValidityError
-from catseye.geometry.sun import EARLIEST_MJD, LATEST_MJD, refracted, sun_direction
+from catseye.geometry.sky.sun import EARLIEST_MJD, LATEST_MJD, refracted, sun_direction
 from catseye.records.site.site import Location
 
 KNOT = 300.0 / SECONDS_PER_DAY  # days

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
-from catseye.geometry.antenna import ground_from_alidade_at, ground_from_reflector_at
-from catseye.geometry.frame import Transforms
+from catseye.geometry.antenna.frames import ground_from_alidade_at, ground_from_reflector_at
+from catseye.geometry.frames.frame import Transforms
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 

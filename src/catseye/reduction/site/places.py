@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.geometry.antenna import ground_from_alidade, ground_from_reflector
-from catseye.geometry.frame import Transform
-from catseye.geometry.mount import gamma, scan_point
-from catseye.optics import cats_eye, prism
+from catseye.geometry.antenna.frames import ground_from_alidade, ground_from_reflector
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.mirror.mount import gamma, scan_point
+from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.site.folder import SiteFolder
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain

@@ -6,21 +6,21 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.encoder import (
+from catseye.geometry.frames.frame import Transform
+from catseye.geometry.mirror.encoder import (
     COUNTS_PER_TURN,
     autocollimation_counts,
     back_retro_counts,
     prime_counts,
     within,
 )
-from catseye.geometry.frame import Transform
-from catseye.geometry.imperfect import (
+from catseye.geometry.mirror.imperfect import (
     Imperfections,
     imperfect_back_counts,
     imperfect_counts,
     imperfect_face_counts,
 )
-from catseye.geometry.pointing import Aim, Station, aim, counts_covariance
+from catseye.geometry.mirror.pointing import Aim, Station, aim, counts_covariance
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry

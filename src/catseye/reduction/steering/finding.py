@@ -14,16 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
-from catseye.geometry.pointing import Station, ray, ray_jacobian
-from catseye.geometry.search_pattern import (
-    LEAST_REACH,
-    Pattern,
-    count_size,
-    offsets_of_counts,
-    raster,
-    spiral,
-)
-from catseye.geometry.time_tag import TimeTag
+from catseye.geometry.mirror.pointing import Station, ray, ray_jacobian
+from catseye.geometry.mirror.search_pattern import LEAST_REACH, Pattern, count_size, offsets_of_counts, raster, spiral
+from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import reach
 from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
 

@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import COUNTS_PER_TURN, within
-from catseye.geometry.keep_out import (
+from catseye.geometry.clearance.keep_out import (
     TOUCH,
     Box,
     Cone,
@@ -34,10 +33,11 @@ from catseye.geometry.keep_out import (
     first_entry,
     servo_margin,
 )
-from catseye.geometry.pointing import Station, ray
-from catseye.geometry.slew import Pace, Slew, straight, trapezoid
-from catseye.geometry.sun import SUN_RATE
-from catseye.geometry.time_tag import utc_text
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, within
+from catseye.geometry.mirror.pointing import Station, ray
+from catseye.geometry.mirror.slew import Pace, Slew, straight, trapezoid
+from catseye.geometry.sky.sun import SUN_RATE
+from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.reduction.site.earth_rotation import Place, sun_at

@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import BEAM_PER_COUNT, COUNTS_PER_TURN, prime_counts
-from catseye.geometry.keep_out import TOUCH
-from catseye.geometry.slew import trapezoid
-from catseye.geometry.sun import SUN_RATE
+from catseye.geometry.clearance.keep_out import TOUCH
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT, COUNTS_PER_TURN, prime_counts
+from catseye.geometry.mirror.slew import trapezoid
+from catseye.geometry.sky.sun import SUN_RATE
 from catseye.reduction.steering.guard import Guard
 
 STEP = (300.0, 150.0)  # counts between nodes: the beam turns by 1.1 degrees in each

@@ -6,10 +6,10 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.geometry.imperfect import imperfect_ray
-from catseye.geometry.pointing import Station, ray
-from catseye.geometry.slew import Pace
-from catseye.geometry.sun import altitude_azimuth
+from catseye.geometry.mirror.imperfect import imperfect_ray
+from catseye.geometry.mirror.pointing import Station, ray
+from catseye.geometry.mirror.slew import Pace
+from catseye.geometry.sky.sun import altitude_azimuth
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry

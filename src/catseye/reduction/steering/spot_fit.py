@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
-from catseye.geometry.search_pattern import count_size, counts_of_offsets, offsets_of_counts
+from catseye.geometry.mirror.search_pattern import count_size, counts_of_offsets, offsets_of_counts
 from catseye.optics.spot import gaussian_spot
 
 Array = NDArray[np.float64]

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.antenna import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
-from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN, within
-from catseye.geometry.pointing import Station, counts, in_mirror_axes
-from catseye.geometry.rotation import rx, rz
-from catseye.geometry.time_tag import PER_SECOND, TimeTag
-from catseye.geometry.track import CountLine, longest_interval, miss
+from catseye.geometry.antenna.frames import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
+from catseye.geometry.frames.rotation import rx, rz
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN, within
+from catseye.geometry.mirror.pointing import Station, counts, in_mirror_axes
+from catseye.geometry.mirror.track import CountLine, longest_interval, miss
+from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 
 Array = NDArray[np.float64]
 

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE
-from catseye.geometry.antenna import (
+from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
     alidade_from_elevation,
     ground_from_alidade,
     ground_from_reflector,
 )
-from catseye.geometry.frame import Transform
-from catseye.geometry.visibility import first_obstruction, incidence, ranges
-from catseye.optics.prism import clear_share
+from catseye.geometry.clearance.visibility import first_obstruction, incidence, ranges
+from catseye.geometry.frames.frame import Transform
+from catseye.optics.retroreflector.prism import clear_share
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.solids import Solids
 from catseye.reduction.site.places import places_of

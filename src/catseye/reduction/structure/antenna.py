@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna import alidade_from_elevation_at, ground_from_alidade_at
-from catseye.geometry.deformation import (
+from catseye.geometry.antenna.deformation import (
     Motion,
     Posture,
     Table,
@@ -25,8 +24,9 @@ from catseye.geometry.deformation import (
     carried_jacobian,
     left_jacobian,
 )
-from catseye.geometry.frame import Transforms
-from catseye.geometry.subreflector import turned
+from catseye.geometry.antenna.frames import alidade_from_elevation_at, ground_from_alidade_at
+from catseye.geometry.antenna.subreflector import turned
+from catseye.geometry.frames.frame import Transforms
 from catseye.records.site.structural_model import (
     KEYS,
     ROOT,

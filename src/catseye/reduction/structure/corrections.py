@@ -15,9 +15,9 @@ import numpy as np
 
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.shapes.rigid_body import fit_transformation
-from catseye.geometry.deformation import Posture
-from catseye.geometry.frame import Transforms
-from catseye.geometry.rotation import to_vector
+from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.frames.frame import Transforms
+from catseye.geometry.frames.rotation import to_vector
 from catseye.reduction.structure.antenna import Added, Antenna, SubreflectorPosition
 
 ITERATIONS = 20  # of Gauss and Newton; two or three are taken

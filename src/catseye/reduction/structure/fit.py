@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from catseye.errors import EstimationError, InputError
-from catseye.geometry.deformation import COMPONENTS
+from catseye.geometry.antenna.deformation import COMPONENTS
 from catseye.records.site.structural_model import KEYS, MotionRecord, StructuralModel
 from catseye.reduction.structure.antenna import UNITS, Antenna
 from catseye.reduction.structure.corrections import (

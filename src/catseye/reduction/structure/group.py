@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.estimation.harmonic.series import Spread
-from catseye.geometry.antenna import (
+from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
     REFLECTOR_TO_ELEVATION,
     ground_from_alidade_at,
     ground_from_reflector_at,
 )
-from catseye.geometry.deformation import Posture
-from catseye.geometry.frame import Transforms
+from catseye.geometry.frames.frame import Transforms
 from catseye.reduction.structure.series import GroupSeries
 
 Array = NDArray[np.float64]

@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna import ground_from_alidade_at
-from catseye.geometry.deformation import Posture, carried_jacobian
-from catseye.geometry.frame import Transform, Transforms
-from catseye.geometry.pointing import Station, counts_jacobian
-from catseye.geometry.rotation import skew
+from catseye.geometry.antenna.deformation import Posture, carried_jacobian
+from catseye.geometry.antenna.frames import ground_from_alidade_at
+from catseye.geometry.frames.frame import Transform, Transforms
+from catseye.geometry.frames.rotation import skew
+from catseye.geometry.mirror.pointing import Station, counts_jacobian
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import StructuralModel
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import Antenna, SubreflectorPosition
 from catseye.reduction.structure.corrections import group_of
-from catseye.signal.vibration import State
+from catseye.signal.vibration.filter import State
 
 FEED_ARM = "feed_arm"
 

@@ -20,7 +20,7 @@ from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
 from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
-from catseye.geometry.deformation import Posture, Terms
+from catseye.geometry.antenna.deformation import Posture, Terms
 
 Array = NDArray[np.float64]
 Own = Literal["place", "each"]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import CatseyeError, InputError
-from catseye.signal.spectrum import Peak, Shape, Spectrum, aliases, likely_alias, peaks, shape_at, spectrum
-from catseye.signal.vibration import Mode
-from catseye.signal.vibration_modes import find_modes
+from catseye.signal.vibration.filter import Mode
+from catseye.signal.vibration.modes import find_modes
+from catseye.signal.vibration.spectrum import Peak, Shape, Spectrum, aliases, likely_alias, peaks, shape_at, spectrum
 
 Array = NDArray[np.float64]
 LEAST = 64  # samples of a series: 8 s at full rate

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import cosine
-from catseye.geometry.rotation import from_vector, skew, to_vector
+from catseye.geometry.frames.rotation import from_vector, skew, to_vector
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import zernike
 from catseye.reduction.surface.shape import (

@@ -7,7 +7,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
-from catseye.geometry.frame import Transform
+from catseye.geometry.frames.frame import Transform
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
 from catseye.records.site.site import Paraboloid

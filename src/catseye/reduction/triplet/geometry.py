@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
-from catseye.optics import prism
-from catseye.signal.cycles import whole_cycles
+from catseye.optics.retroreflector import prism
+from catseye.signal.cycles.whole import whole_cycles
 
 Array = NDArray[np.float64]
 

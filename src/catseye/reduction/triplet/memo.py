@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import TWO_PI
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings, half_wavelengths
-from catseye.signal.cycles import memo_whole_cycles
+from catseye.signal.cycles.whole import memo_whole_cycles
 
 Array = NDArray[np.float64]
 

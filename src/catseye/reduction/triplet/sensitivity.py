@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, SPEED_OF_LIGHT, TWO_PI
-from catseye.optics.prism import obliquity_correction
+from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.triplet.geometry import TripletReadings, triplet_cycles, triplet_lengths
 from catseye.reduction.triplet.tolerances import D_12, RATIO, TOLERANCE, ratio_change
 from catseye.reduction.triplet.use import ball_distance, median

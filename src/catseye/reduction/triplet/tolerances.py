@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]

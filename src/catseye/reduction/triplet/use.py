@@ -30,8 +30,8 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
 from catseye.estimation.least_squares.adjustment import Solution, adjust
 from catseye.estimation.observations import Coordinates, Distances
-from catseye.geometry.frame import Transform
-from catseye.optics.prism import obliquity_correction, obliquity_slope
+from catseye.geometry.frames.frame import Transform
+from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.records.site.triplet import Triplet
 
 Array = NDArray[np.float64]

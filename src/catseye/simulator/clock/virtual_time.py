@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from catseye.errors import CatseyeError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 
 RESOLUTION = 5e-10  # s
 P = TypeVar("P", bound=asyncio.BaseProtocol)

@@ -4,7 +4,7 @@ import time
 from typing import Protocol
 
 from catseye.constants import SECONDS_PER_DAY
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 
 UNIX_EPOCH_DAY = 40_587  # MJD of 1970-01-01
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-from catseye.geometry.encoder import COUNTS_PER_TURN
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
 from catseye.ranger.motion_units import SAMPLE_TIME
 
 MOST_EVENTS = 4  # standstills within one sample: a constant drive allows one, ripple between cuts a second

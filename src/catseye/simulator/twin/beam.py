@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.frames.rotation import from_vector
 from catseye.records.site.site import Paraboloid
 
 Array = NDArray[np.float64]

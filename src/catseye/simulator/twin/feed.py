@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import Listener, Network, Sockets
 from catseye.records.night.live import LiveWeather

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND, TimeTag
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer, Homing, Sampling
 from catseye.ranger.motion_units import CLOCK_HZ, CLOCKS_PER_SAMPLE, SAMPLE_TIME
 from catseye.simulator.clock.world_clock import Clock

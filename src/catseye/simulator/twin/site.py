@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
-from catseye.geometry.time_tag import PER_DAY, PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.head import Sampling
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder

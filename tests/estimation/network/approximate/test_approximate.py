@@ -27,7 +27,7 @@ from catseye.estimation.observations import (
     Vectors,
     ZenithAngles,
 )
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.any_file import read_network
 from repository import TESTS
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError, InputError
-from catseye.geometry.mirror_path import path_change
+from catseye.geometry.mirror.mirror_path import path_change
 from catseye.reduction.calibrations.mirror.alignment import RECIPE, effect
 from lab_scene import PER_RADIAN, found_at, pointed, range_to, spots, table
 

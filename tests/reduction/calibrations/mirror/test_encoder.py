@@ -23,8 +23,8 @@ def test_a_polygon_gives_back_the_waves_in_the_records_keys():
 
 
 def test_the_record_is_read_by_the_pointing_as_what_the_encoder_reads_too_high():
-    from catseye.geometry.imperfect import Imperfections, imperfect_ray
-    from catseye.geometry.pointing import Station, ray
+    from catseye.geometry.mirror.imperfect import Imperfections, imperfect_ray
+    from catseye.geometry.mirror.pointing import Station, ray
 
     found = calibrated(*polygon(TRUTH)).record
     psi = 1.1

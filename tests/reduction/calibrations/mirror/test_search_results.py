@@ -85,7 +85,7 @@ def test_prime_pointings_and_whole_turns_serve_as_well():
 
 
 def test_the_covariance_of_a_linear_adjustment_by_hand():
-    from catseye.geometry.pointing import Station, counts_jacobian
+    from catseye.geometry.mirror.pointing import Station, counts_jacobian
 
     truth, u = station_truth()
     found = calibrated(truth, u_counts=0.5, u_target_mm=3.0)

@@ -83,7 +83,7 @@ def test_the_table_of_an_adjustment_is_read_as_it_stands(tmp_path):
 
 
 def test_propagation_agrees_with_drawn_places(table):
-    from catseye.geometry.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
+    from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
 
     frame = LocalFrame(PINTLE_LATITUDE, PINTLE_LONGITUDE, HEIGHT, 1e-5, -1e-5, -31.0)
     plane = frame.state_plane(WHERE[0])

@@ -6,7 +6,7 @@ import pytest
 from calibration_scene import RUNS
 from catseye.errors import EstimationError
 from catseye.reduction.calibrations.ranging.amplitude import LAYOUT, calibrate_amplitude
-from catseye.signal.amplitude import fit_amplitude_phase
+from catseye.signal.systematics.amplitude import fit_amplitude_phase
 
 BASE = {"reference_amplitude_volt": 5.0, "u_leakage_volt": 0.0}
 LEVELS = np.repeat(np.geomspace(0.15, 5.0, 8), 3)

@@ -6,7 +6,7 @@ import pytest
 from calibration_scene import RUNS
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.calibrations.ranging import leakage, leakage_lit
-from catseye.signal.leakage import blocked_leakage, circle_leakage, rail_leakage
+from catseye.signal.systematics.leakage import blocked_leakage, circle_leakage, rail_leakage
 
 TRUE = 0.031 * np.exp(4.3574j)
 POLAR = np.array([0.031, 4.3574])

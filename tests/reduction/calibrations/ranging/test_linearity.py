@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from calibration_scene import HALF, RUNS, WEATHER
-from catseye.atmosphere.air import phase_refractivity
+from catseye.atmosphere.index.air import phase_refractivity
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.calibrations.ranging.air import phase_air
 from catseye.reduction.calibrations.ranging.linearity import LAYOUT, calibrate_linearity
 from catseye.reduction.calibrations.ranging.spectrum import spectrum
-from catseye.signal.cyclic import cyclic_range
+from catseye.signal.systematics.cyclic import cyclic_range
 
 D0 = 0.180685
 BASE = {**WEATHER, "d0_mm": D0 * 1e3, "u_interferometer_ppm": 0.0, "u_abbe_mm": 0.0}

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibration_scene import HALF, RUNS, WEATHER
-from catseye.atmosphere.air import MODELS
+from catseye.atmosphere.index.air import MODELS
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.reduction.calibrations.ranging.reference_distance import LAYOUT, calibrate_reference_distance

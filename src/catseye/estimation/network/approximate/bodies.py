@@ -9,7 +9,7 @@ from catseye.estimation.network.model import Network
 from catseye.estimation.observations import FramePoints, RigidBodies
 from catseye.estimation.observations.kind import value
 from catseye.estimation.shapes.rigid_body import closed_form
-from catseye.geometry.rotation import to_vector
+from catseye.geometry.frames.rotation import to_vector
 
 
 def bodies_of(network: Network, values: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:

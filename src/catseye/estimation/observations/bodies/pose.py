@@ -9,7 +9,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.sight import triples
-from catseye.geometry.rotation import from_vector, skew
+from catseye.geometry.frames.rotation import from_vector, skew
 
 SERIES_BELOW = 0.3  # rad: there (t - sin t) / t^3 by its series and by its formula are both good to 1e-14
 

@@ -21,10 +21,10 @@ import numpy as np
 from pydantic import Field
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.encoder import HALF_TURN, azimuth_angle
-from catseye.geometry.imperfect import Imperfections, imperfect_counts, imperfect_ray
-from catseye.geometry.mount import gamma
-from catseye.geometry.pointing import Station, aim
+from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts, imperfect_ray
+from catseye.geometry.mirror.mount import gamma
+from catseye.geometry.mirror.pointing import Station, aim
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration

@@ -18,8 +18,8 @@ from typing import Annotated, Literal
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.geometry.autocollimator import face_normal, flat_reading, mirror_reading
-from catseye.geometry.encoder import azimuth_angle, elevation_angle
+from catseye.geometry.mirror.autocollimator import face_normal, flat_reading, mirror_reading
+from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal

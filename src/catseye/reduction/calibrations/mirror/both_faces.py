@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.mirror_path import path_change
+from catseye.geometry.mirror.mirror_path import path_change
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal

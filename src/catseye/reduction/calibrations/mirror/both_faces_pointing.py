@@ -16,11 +16,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.geometry.encoder import COUNTS_PER_RADIAN, HALF_TURN, azimuth_angle, elevation_angle
-from catseye.geometry.imperfect import Imperfections, imperfect_counts
-from catseye.geometry.mount import gamma
-from catseye.geometry.pointing import Station
-from catseye.geometry.rotation import from_vector
+from catseye.geometry.frames.rotation import from_vector
+from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, HALF_TURN, azimuth_angle, elevation_angle
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
+from catseye.geometry.mirror.mount import gamma
+from catseye.geometry.mirror.pointing import Station
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, TWO_PI
-from catseye.geometry.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
+from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal

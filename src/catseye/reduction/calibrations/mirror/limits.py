@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal

@@ -18,9 +18,9 @@ from pydantic import Field, field_serializer
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import global_test, single_level, w_critical
-from catseye.geometry.encoder import COUNTS_PER_TURN, HALF_TURN
-from catseye.geometry.imperfect import Imperfections, imperfect_counts
-from catseye.geometry.pointing import PARAMETERS, Station
+from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
+from catseye.geometry.mirror.pointing import PARAMETERS, Station
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal

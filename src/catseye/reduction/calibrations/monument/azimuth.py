@@ -43,7 +43,7 @@ def calibrate_azimuth(readings: Readings, reject: bool = False) -> Calibration:
     EstimationError where nothing in the field tells the azimuth.
 
     Source: [PARKER04] sections 2.2.1 and 2.5, eq. 2.6 (its example turns x^ to 32° 11' 50", z^ looks 90° further);
-    [JCGM100] 5.1.3 (propagation); geometry/plumb.py (convergence and Laplace's equation), geometry/star.py.
+    [JCGM100] 5.1.3 (propagation); geometry/frames/plumb.py (convergence and Laplace's equation), geometry/sky/star.py.
     """
     sights = sights_of(readings)
     tied = _tied(sights)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
-from catseye.geometry.mount import gamma
-from catseye.geometry.plumb import astronomic, axis_lean_error, azimuth, plumb_from_ground, zenith_angle
-from catseye.geometry.star import POLARIS, Star, star_place
+from catseye.geometry.frames.plumb import astronomic, axis_lean_error, azimuth, plumb_from_ground, zenith_angle
+from catseye.geometry.mirror.mount import gamma
+from catseye.geometry.sky.star import POLARIS, Star, star_place
 from catseye.records.files.readings import TIME, Readings
 from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.monument.frame_sheet import frame_of

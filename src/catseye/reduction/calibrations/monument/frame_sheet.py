@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.geometry.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
+from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
 from catseye.records.files.readings import Sheet
 from catseye.records.files.record import Coordinate, Elevation, Latitude, Within
 

@@ -284,7 +284,8 @@ def _told(
         notes=(
             prior_note,
             "heights are along the plumb line (NAVD88 where the held mark is); z of the ground frame falls below them "
-            "by the curvature of the earth, 1.1 mm at 120 m, and the deflection: geometry/local_frame.py turns them",
+            "by the curvature of the earth, 1.1 mm at 120 m, and the deflection: "
+            "geometry/frames/local_frame.py turns them",
             *(f"loop of set-ups {names}: {w / micro:+.1f} um, u {u / micro:.1f} um" for names, w, u in loops),
             *scatter_notes(fit, "µm", micro),
         ),

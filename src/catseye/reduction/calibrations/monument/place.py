@@ -13,7 +13,7 @@ from pydantic import Field
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.local_frame import LocalFrame, elevation_factor, grid
+from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, grid
 from catseye.records.files.readings import TEXT, Layout, Readings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown

@@ -4,7 +4,7 @@ The plate lies on three equal balls in the mount. `orientation_deg` is where the
 from above from the mount's x^: 0 along x^, 90 along z^ (the v-block), 180 along -x^. `reading_arcsec` is above zero
 when the + end is high. With the tilts p of x^ and q of z^ above the level's horizon
 
-    reading = zero + p cos(o) + q sin(o) + wedge of the plate        alpha2' = p, alpha3' = -q   (geometry/plumb.py)
+    reading = zero + p cos(o) + q sin(o) + wedge of the plate    alpha2' = p, alpha3' = -q   (geometry/frames/plumb.py)
 
 Turning the level by 180° takes out its zero; turning the plate too (`plate_deg`, where its mark points, counted like
 the orientation) takes out its wedge. Unequal balls tilt the plate in the mount's own axes: nothing but other balls
@@ -16,8 +16,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.geometry.mount import gamma
-from catseye.geometry.plumb import lean, mount_angles, plumb_from_ground
+from catseye.geometry.frames.plumb import lean, mount_angles, plumb_from_ground
+from catseye.geometry.mirror.mount import gamma
 from catseye.records.files.readings import Layout, Readings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
@@ -63,7 +63,7 @@ def calibrate_plate(readings: Readings, reject: bool = False) -> Calibration:
 
     Raises EstimationError where the orientations do not tell both tilts from the level's zero.
 
-    Source: [PARKER04] section 2.2.1, step 2; eq. 2.5; curvature and deflection as in geometry/plumb.py.
+    Source: [PARKER04] section 2.2.1, step 2; eq. 2.5; curvature and deflection as in geometry/frames/plumb.py.
     """
     sheet, m = readings.sheet, len(readings)
     observed = readings.get("reading_arcsec") * ARCSECOND

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from catseye.atmosphere.air import air
+from catseye.atmosphere.index.air import air
 from catseye.constants import PPM, SPEED_OF_LIGHT
 from catseye.records.files.readings import Readings, Sheet
 from catseye.records.files.record import Within

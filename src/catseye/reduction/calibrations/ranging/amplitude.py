@@ -15,7 +15,7 @@ from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
-from catseye.signal.amplitude import amplitude_by_coefficient
+from catseye.signal.systematics.amplitude import amplitude_by_coefficient
 
 KIND = "amplitude-to-phase"
 MILLIRADIAN = 1e-3  # rad

@@ -4,7 +4,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.reduction.calibrations.fit import Effect
-from catseye.signal.cyclic import cyclic_design
+from catseye.signal.systematics.cyclic import cyclic_design
 
 UNCORRECTED = 2  # orders: leakage and crosstalk make the first, imbalance of the quadratures the second
 

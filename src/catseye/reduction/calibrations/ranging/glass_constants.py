@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
-from catseye.optics import cats_eye, prism
+from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration

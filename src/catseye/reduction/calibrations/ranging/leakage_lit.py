@@ -18,7 +18,7 @@ from catseye.reduction.calibrations.calibration import Calibration, Decision
 from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
 from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
-from catseye.signal.leakage import circle_leakage
+from catseye.signal.systematics.leakage import circle_leakage
 
 KIND = "leakage-lit"
 SCATTER = "scatter of one quadrature"

@@ -5,7 +5,7 @@ import numpy as np
 from catseye.records.files.readings import Readings
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.fit import Effect
-from catseye.signal.leakage import phase_by_leakage
+from catseye.signal.systematics.leakage import phase_by_leakage
 
 NAMES = ("leakage left over, real part, V", "leakage left over, imaginary part, V")
 

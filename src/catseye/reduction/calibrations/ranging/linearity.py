@@ -19,7 +19,7 @@ from catseye.reduction.calibrations.kind import Kind, provenance, quantities, sc
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.rail import KIND, LAYOUT, LinearitySheet, Rail, rail_of
 from catseye.reduction.calibrations.ranging.spectrum import spectrum
-from catseye.signal.cyclic import cyclic_design, separable_orders
+from catseye.signal.systematics.cyclic import cyclic_design, separable_orders
 
 ORDER_LEVEL = 0.05  # chance that any order is taken where there is none
 

@@ -12,8 +12,8 @@ from catseye.records.files.readings import Layout, Readings, Sheet
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
 from catseye.reduction.calibrations.kind import Kind, provenance
-from catseye.signal.allan import allan_deviation
-from catseye.signal.noise import FEWEST, NoiseSpectrum, noise_spectrum
+from catseye.signal.drift.allan import allan_deviation
+from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
 KIND = "oscillator"
 SHOWN = 5  # spurs listed

@@ -11,8 +11,8 @@ from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Quantity
 from catseye.reduction.calibrations.fit import Fit
 from catseye.reduction.calibrations.kind import quantities
-from catseye.signal.cycles import fraction
-from catseye.signal.leakage import polar_covariance
+from catseye.signal.cycles.whole import fraction
+from catseye.signal.systematics.leakage import polar_covariance
 
 VOLT, PART = Within(0, 20), Within(-20, 20)
 CARTESIAN, POLAR = ("real_volt", "imaginary_volt"), ("amplitude_volt", "phase_rad")

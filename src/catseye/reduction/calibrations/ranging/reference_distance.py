@@ -19,7 +19,7 @@ from catseye.reduction.calibrations.kind import Kind, provenance, quantities, sc
 from catseye.reduction.calibrations.ranging.air import WEATHER, AirSheet, group_air, half_wavelength, ranger_effects
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
-from catseye.signal.cycles import fraction, unwrapped_length, whole_cycles
+from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
 KIND = "reference-distance"
 DISTANCE, CONSTANT = Within(0.05, 10_000), Within(-2000, 0)

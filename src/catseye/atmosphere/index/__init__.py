@@ -1,0 +1,1 @@
+"""The index of air: models, kernels, wavelength."""

@@ -1,0 +1,31 @@
+"""The formula of Barrell and Sears as geodesists resolved upon it in 1960 and 1963: what older instruments carry.
+
+Its form is (n_L - 1) = (n_g - 1)/(1 + a t) p/760 - 5.5e-8 e/(1 + a t), p and e in mm Hg. The resolution's a is
+0.003661 = 1/273.15; 1/273.16, also seen, is 6e-6 of the refractivity or less (2e-9 of the index).
+"""
+
+from catseye.atmosphere.index.ideal_gas import densities, density_slopes, limits
+from catseye.atmosphere.index.model import Dispersion, Gases, Model
+from catseye.constants import ZERO_CELSIUS_K
+
+# [BARRELL39] as [RUEGER90] gives the resolution: phase refractivity, ppm, of dry air with 300 ppm of carbon dioxide at
+# 0 °C and 760 mm Hg, in 1, s, s²; group 287.604, 4.8864, 0.0680
+PHASE_POWERS = (287.604, 1.6288, 0.0136)
+STANDARD_HPA = 1013.25  # 760 mm Hg
+VAPOUR_PER_MMHG = -5.5e-8  # at 0 °C, at all wavelengths
+
+MODEL = Model(
+    name="barrell_sears1963",
+    source="[BARRELL39], [RUEGER90]",
+    dispersion=Gases(
+        Dispersion(powers=PHASE_POWERS, scale=1e-6 * ZERO_CELSIUS_K / STANDARD_HPA),
+        Dispersion(powers=(VAPOUR_PER_MMHG * ZERO_CELSIUS_K * 760.0 / STANDARD_HPA,)),
+    ),
+    densities=densities,
+    density_slopes=density_slopes,
+    vapour_formula="buck",
+    # 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers; 3.1e-7 at most
+    standard_uncertainty=1e-7,
+    limits=limits("[RUEGER90]"),
+    co2_ppm=300.0,
+)

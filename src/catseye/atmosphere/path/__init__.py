@@ -1,0 +1,1 @@
+"""The air along a path: profiles, means, bent rays."""

@@ -1,0 +1,98 @@
+"""What a model of the speed of sound in air is: a formula, its derivatives, where it holds, and how good it is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catseye.atmosphere.limit import Limit
+
+
+class SoundPartials(NamedTuple):
+    """Derivatives of the speed of sound with vapour pressure held, the others held too.
+
+    temperature_c         m/s per °C
+    pressure_hpa          m/s per hPa of total pressure
+    vapour_pressure_hpa   m/s per hPa of vapour pressure
+    co2_ppm               m/s per ppm of carbon dioxide; zero in a model whose carbon dioxide is fixed
+    """
+
+    temperature_c: Any
+    pressure_hpa: Any
+    vapour_pressure_hpa: Any
+    co2_ppm: Any
+
+    def with_humidity_held(self, saturation, humidity_percent) -> "SoundSensitivity":
+        """The chain rule from vapour pressure to relative humidity, by a `humidity.Saturation` and its slopes."""
+        fraction = np.asarray(humidity_percent, float) / 100.0
+        return SoundSensitivity(
+            self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
+            self.pressure_hpa + self.vapour_pressure_hpa * fraction * saturation.per_hpa,
+            self.vapour_pressure_hpa * saturation.pressure_hpa / 100.0,
+            self.vapour_pressure_hpa,
+            self.co2_ppm,
+        )
+
+
+class SoundSensitivity(NamedTuple):
+    """Derivatives of the speed of sound; relative humidity held, but for that by the vapour pressure.
+
+    temperature_c         m/s per °C
+    pressure_hpa          m/s per hPa
+    humidity_percent      m/s per % of relative humidity
+    vapour_pressure_hpa   m/s per hPa of vapour pressure, temperature and total pressure held
+    co2_ppm               m/s per ppm of carbon dioxide
+    """
+
+    temperature_c: Any
+    pressure_hpa: Any
+    humidity_percent: Any
+    vapour_pressure_hpa: Any
+    co2_ppm: Any
+
+
+@dataclass(frozen=True)
+class SoundModel:
+    """One model of the speed of sound at zero frequency; its functions take (temperature_c, pressure_hpa,
+    vapour_pressure_hpa, co2_ppm), nothing checked.
+
+    name                   as users write it
+    source                 the bibliography's keys
+    speed                  function giving m/s
+    partials               function giving SoundPartials
+    vapour_formula         the saturation formula it goes with, a name in `humidity.FORMULAS`
+    standard_uncertainty   of the formula itself, m/s, perfect weather given
+    limits                 argument's name -> Limit
+    has_co2                whether carbon dioxide enters
+    """
+
+    name: str
+    source: str
+    speed: Callable[..., Any]
+    partials: Callable[..., SoundPartials]
+    vapour_formula: str
+    standard_uncertainty: float
+    limits: dict[str, Limit]
+    has_co2: bool
+
+    def check(self, **arguments) -> None:
+        """Raise ValidityError for the first argument outside its limit."""
+        for argument, value in arguments.items():
+            self.limits[argument].check(value)
+
+
+def limits(
+    source: str,
+    *,
+    temperature_c: tuple[float, float],
+    pressure_hpa: tuple[float, float],
+    co2_ppm: tuple[float, float] = (0.0, 2000.0),
+) -> dict[str, Limit]:
+    """The limits of a model, each given as (least, greatest)."""
+    return {
+        "temperature_c": Limit("temperature", "C", *temperature_c, source),
+        "pressure_hpa": Limit("pressure", "hPa", *pressure_hpa, source),
+        "humidity_percent": Limit("relative humidity", "%", 0.0, 100.0, source),
+        "co2_ppm": Limit("carbon dioxide", "ppm", *co2_ppm, source),
+    }

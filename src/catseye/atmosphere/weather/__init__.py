@@ -1,0 +1,1 @@
+"""Humidity, pressure, dew: from what instruments show to what formulas need."""

@@ -1,0 +1,417 @@
+"""Water vapour in air: saturation over water and over ice, vapour pressure, relative humidity, dew and frost point.
+
+Relative humidity is over liquid water at all temperatures (the meteorologists' convention); ice is never chosen
+silently. Three formulas for moist air saturated over water are registered by name: `buck` (the notes'), `ciddor` (the
+one that reproduces Ciddor's tables) and `iapws` (today's reference for pure water, with Ciddor's enhancement factor).
+They agree within 0.1 % from -20 to 50 °C, which is 2e-9 in the index of saturated air at 30 °C. Over ice there are
+`buck` (the notes') and `iapws` (today's sublimation pressure with Greenspan's enhancement factor for ice), within
+0.1 % of each other from -40 to 0 °C.
+
+Below 0 °C the same vapour has a dew point and, nearer to the air's temperature, a frost point: at a dew point of
+-10 °C the frost point is -8.9 °C. Which of them an instrument shows is not in its reading (see `hygrometer`).
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from catseye.atmosphere.limit import Limit
+from catseye.constants import ZERO_CELSIUS_K
+from catseye.errors import ValidityError
+
+PA_PER_HPA = 100.0
+MELTING_C = 0.01  # the triple point: no ice above it
+DRY_BELOW_HPA = 1e-9  # air with less vapour (a dew point below -135 °C) counts as perfectly dry
+
+# [PARKER04] eq. 1.3, over liquid water: hPa, 1, 1/hPa, 1, °C
+BUCK_E0, BUCK_F0, BUCK_FP, BUCK_A, BUCK_B = 6.1121, 1.0007, 3.46e-6, 17.502, 240.97
+# [PARKER04] eq. 1.4, over ice
+ICE_E0, ICE_F0, ICE_FP, ICE_A, ICE_B = 6.1115, 1.0003, 4.18e-6, 22.452, 272.55
+# [CIDDOR96] appendix A, saturation over liquid water in Pa: K^-2, K^-1, 1, K
+CIDDOR_A, CIDDOR_B, CIDDOR_C, CIDDOR_D = 1.2378847e-5, -1.9121316e-2, 33.93711047, -6.3431645e3
+# [CIDDOR96] appendix A, enhancement of saturation by air: 1, 1/Pa, °C^-2
+ENHANCEMENT_0, ENHANCEMENT_P, ENHANCEMENT_T2 = 1.00062, 3.14e-8, 5.6e-7
+# [IAPWS97] table 34, n1 to n10, for eq. 30 in MPa and K
+IF97_N = (
+    0.11670521452767e4,
+    -0.72421316703206e6,
+    -0.17073846940092e2,
+    0.12020824702470e5,
+    -0.32325550322333e7,
+    0.14915108613530e2,
+    -0.48232657361591e4,
+    0.40511340542057e6,
+    -0.23855557567849,
+    0.65017534844798e3,
+)
+# [IAPWS11] eq. 6: ln(p/p_t) = (1/theta) sum a theta^b, theta = T/T_t
+SUBLIMATION = (
+    (-0.212144006e2, 0.333333333e-2),
+    (0.273203819e2, 0.120666667e1),
+    (-0.610598130e1, 0.170333333e1),
+)
+TRIPLE_K, TRIPLE_PA = 273.16, 611.657
+# [GREENSPAN76] over ice: polynomials in °C of alpha and of ln beta in ln f = alpha (1 - e/p) + beta (p/e - 1)
+GREENSPAN_ALPHA = (3.64449e-4, 2.93631e-5, 4.88635e-7, 4.36543e-9)
+GREENSPAN_LN_BETA = (-1.07271e1, 7.61989e-2, -1.74771e-4, 2.46721e-6)
+
+# a chilled mirror reads far below the air's own limits; formulas are extrapolated there, docstrings say how well
+PRESSURE = Limit("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]'s enhancement of saturation")
+DEW_POINT = Limit("dew point", "°C", -100.0, 100.0, "saturation over water")
+FROST_POINT = Limit("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
+OVER_ICE = Limit("temperature of ice", "°C", -100.0, MELTING_C, "ice", places=2)
+AIR_TEMPERATURE = Limit("temperature", "°C", -100.0, 100.0, "saturation over water")
+HUMIDITY = Limit("relative humidity", "%", 0.0, 100.0, "unsaturated air")
+OVER_ICE_HUMIDITY = Limit("relative humidity over ice", "%", 0.0, 300.0, "supersaturation over ice")  # 265 % at -100 °C
+VAPOUR_PRESSURE = Limit("vapour pressure", "hPa", 0.0, 1400.0, "the notion of a pressure")
+
+
+class Saturation(NamedTuple):
+    """Saturation vapour pressure of moist air and its slopes.
+
+    pressure_hpa   hPa
+    per_c          derivative by temperature, hPa/°C
+    per_hpa        derivative by total pressure, hPa/hPa
+    """
+
+    pressure_hpa: Any
+    per_c: Any
+    per_hpa: Any
+
+
+def saturation_pressure_hpa(temperature_c, pressure_hpa):
+    """Saturation vapour pressure over liquid water, in hPa, by Buck's formula.
+
+    temperature_c   air temperature, -40 to 50 °C
+    pressure_hpa    total pressure, 500 to 1100 hPa (enters through the enhancement factor)
+
+    Raises ValidityError outside -100 to 100 °C and 100 to 1400 hPa.
+    Source: [RUEGER90] eq. 5.27 ([PARKER04] eq. 1.3). Good to 0.1 % from -20 to 50 °C, 0.8 % low at -40 °C.
+
+    >>> round(float(saturation_pressure_hpa(20.0, 933.0)), 4)
+    23.4646
+    """
+    AIR_TEMPERATURE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
+    return saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
+
+
+def ice_saturation_pressure_hpa(temperature_c, pressure_hpa):
+    """Saturation vapour pressure over ice, in hPa; never used unless asked for.
+
+    temperature_c   air temperature, -50 to 0 °C
+    pressure_hpa    total pressure, 500 to 1100 hPa
+
+    Raises ValidityError outside -100 to 0.01 °C and 100 to 1400 hPa.
+    Source: [RUEGER90] eq. 5.28 ([PARKER04] eq. 1.4). Good to 0.3 %.
+
+    >>> round(float(ice_saturation_pressure_hpa(-10.0, 933.0)), 4)
+    2.6096
+    """
+    return ice_saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
+
+
+def iapws_saturation_pressure_hpa(temperature_c):
+    """Saturation pressure of pure water over its liquid, no air present, in hPa.
+
+    temperature_c   temperature, 0 to 370 °C; extrapolated to supercooled water down to -40 °C
+
+    Source: [IAPWS97] eq. 30. Good to 0.025 % above 0 °C; below, 0.04 % above [MURPHY05] at -20 °C and 0.24 % at -40 °C.
+
+    >>> round(float(iapws_saturation_pressure_hpa(300.0 - 273.15)), 5)
+    35.36589
+    """
+    return _if97(np.asarray(temperature_c, float) + ZERO_CELSIUS_K)[0] / PA_PER_HPA
+
+
+def sublimation_pressure_hpa(temperature_c):
+    """Saturation pressure of pure water vapour over ice, no air present, in hPa.
+
+    temperature_c   temperature of the ice, -223 to 0.01 °C
+
+    Source: [IAPWS11] eq. 6. Within 0.024 % of [MURPHY05] eq. 7 above -40 °C, 0.064 % at -80 °C.
+
+    >>> round(float(sublimation_pressure_hpa(230.0 - 273.15)), 7)
+    0.0894735
+    """
+    return _sublimation(np.asarray(temperature_c, float) + ZERO_CELSIUS_K)[0] / PA_PER_HPA
+
+
+def enhancement_factor(temperature_c, pressure_hpa):
+    """Saturation pressure in moist air over that of pure water, dimensionless.
+
+    temperature_c   air temperature, -40 to 100 °C
+    pressure_hpa    total pressure, 100 to 1400 hPa
+
+    Source: [CIDDOR96] appendix A (f = alpha + beta p + gamma t²). Good to 1e-4 from 0 to 30 °C near 1000 hPa.
+
+    >>> round(float(enhancement_factor(20.0, 1013.25)), 6)
+    1.004026
+    """
+    t, p = np.asarray(temperature_c, float), np.asarray(pressure_hpa, float)
+    return ENHANCEMENT_0 + ENHANCEMENT_P * PA_PER_HPA * p + ENHANCEMENT_T2 * t**2
+
+
+def saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
+    """Saturation vapour pressure of moist air over liquid water with its slopes, by a named formula.
+
+    temperature_c   air temperature, -40 to 50 °C (`ciddor` and `iapws`: to 100 °C)
+    pressure_hpa    total pressure, 500 to 1100 hPa
+    formula         `buck`, `ciddor` or `iapws`
+
+    Nothing is checked but the formula's name: solvers pass here on their way.
+    Source: [RUEGER90] eq. 5.27; [CIDDOR96] appendix A; [IAPWS97] eq. 30. Good to 0.1 %; the slopes are analytic.
+
+    >>> round(float(saturation(20.0, 1013.25, "ciddor").pressure_hpa), 4)
+    23.4858
+    """
+    _known(formula, FORMULAS)
+    return FORMULAS[formula](np.asarray(temperature_c, float), np.asarray(pressure_hpa, float))
+
+
+def ice_saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
+    """Saturation vapour pressure of moist air over ice with its slopes, by a named formula.
+
+    temperature_c   temperature of the ice, -100 to 0.01 °C
+    pressure_hpa    total pressure, 100 to 1400 hPa
+    formula         `buck` or `iapws` (Ciddor gives none over ice)
+
+    Raises ValidityError outside these limits: there is no ice above 0.01 °C.
+    Source: [RUEGER90] eq. 5.28; [IAPWS11] eq. 6 with the enhancement factor over ice of [GREENSPAN76]. `iapws` is good
+    to 0.06 % from -40 to 0 °C: the sublimation pressure lies within 0.024 % of [MURPHY05] eq. 7, the enhancement
+    factor 2e-4 (0 °C) to 6e-4 (-40 °C) below the one of the IAPWS virial coefficients of moist air. `buck` lies within
+    0.1 % of it from -40 to 0 °C and 1 % low at -80 °C. The slopes are analytic.
+
+    >>> round(float(ice_saturation(-10.0, 1013.25, "iapws").pressure_hpa), 4)
+    2.6092
+    """
+    _known(formula, ICE_FORMULAS, " over ice")
+    OVER_ICE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
+    return ICE_FORMULAS[formula](np.asarray(temperature_c, float), np.asarray(pressure_hpa, float))
+
+
+def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="buck", *, over_ice=False):
+    """Partial pressure of water vapour from relative humidity, over liquid water unless ice is asked for, in hPa.
+
+    temperature_c      air temperature, -40 to 50 °C
+    pressure_hpa       total pressure, 500 to 1100 hPa
+    humidity_percent   relative humidity, 0 to 100 %; air that clouds form in goes above 100 % over ice
+    formula            `buck`, `ciddor` or `iapws`; over ice `buck` or `iapws`
+    over_ice           the humidity is stated over ice, which few instruments and no weather service does
+
+    Raises ValidityError outside -100 to 100 °C (over ice, 0.01 °C), 100 to 1400 hPa, and 0 to 100 % (300 %).
+    Source: [RUEGER90] eq. 5.29 ([PARKER04] eq. 1.5). Good to 0.1 % of itself, the formula's part.
+
+    >>> round(float(vapour_pressure_hpa(20.0, 933.0, 50.0)), 4)
+    11.7323
+    """
+    AIR_TEMPERATURE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
+    (OVER_ICE_HUMIDITY if over_ice else HUMIDITY).check(humidity_percent)
+    saturated = (ice_saturation if over_ice else saturation)(temperature_c, pressure_hpa, formula)
+    return saturated.pressure_hpa * np.asarray(humidity_percent, float) / 100.0
+
+
+def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, formula="buck", *, over_ice=False):
+    """Relative humidity of air with this vapour, over liquid water unless ice is asked for, in %.
+
+    vapour_pressure_hpa   partial pressure of water vapour, 0 to 1400 hPa; above saturation the answer is above 100 %
+    temperature_c         air temperature, -100 to 100 °C
+    pressure_hpa          total pressure, 100 to 1400 hPa
+    formula               the one that gave the vapour pressure
+    over_ice              relative to saturation over ice, at most 0.01 °C
+
+    Raises ValidityError outside these limits.
+    Source: [RUEGER90] eq. 5.29, inverted. Exact.
+
+    >>> round(float(relative_humidity_percent(11.7323, 20.0, 933.0)), 3)
+    50.0
+    """
+    VAPOUR_PRESSURE.check(vapour_pressure_hpa)
+    AIR_TEMPERATURE.check(temperature_c)
+    PRESSURE.check(pressure_hpa)
+    saturated = (ice_saturation if over_ice else saturation)(temperature_c, pressure_hpa, formula)
+    return 100.0 * np.asarray(vapour_pressure_hpa, float) / saturated.pressure_hpa
+
+
+def vapour_pressure_of_dew_point_hpa(dew_point_c, pressure_hpa, formula="buck"):
+    """Partial pressure of water vapour from the dew point, over liquid water also below 0 °C, in hPa.
+
+    dew_point_c    dew point, -100 to 100 °C
+    pressure_hpa   total pressure, 100 to 1400 hPa
+    formula        `buck`, `ciddor` or `iapws`
+
+    Raises ValidityError outside these limits.
+    Source: [PARKER04] eq. 1.6. As good as `saturation`: 0.1 % above -20 °C, 1 % (`buck`) above -40 °C, below that an
+    extrapolation of supercooled water that no mirror shows.
+
+    >>> round(float(vapour_pressure_of_dew_point_hpa(9.267, 933.0)), 3)
+    11.732
+    """
+    DEW_POINT.check(dew_point_c)
+    PRESSURE.check(pressure_hpa)
+    return saturation(dew_point_c, pressure_hpa, formula).pressure_hpa
+
+
+def vapour_pressure_of_frost_point_hpa(frost_point_c, pressure_hpa, formula="buck"):
+    """Partial pressure of water vapour from the frost point, in hPa.
+
+    frost_point_c   frost point, -100 to 0.01 °C
+    pressure_hpa    total pressure, 100 to 1400 hPa
+    formula         `buck` or `iapws`
+
+    Raises ValidityError outside these limits.
+    Source: [PARKER04] eq. 1.6 over ice. As good as `ice_saturation`.
+
+    >>> round(float(vapour_pressure_of_frost_point_hpa(-10.0, 933.0)), 4)
+    2.6096
+    """
+    FROST_POINT.check(frost_point_c)
+    return ice_saturation(frost_point_c, pressure_hpa, formula).pressure_hpa
+
+
+def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
+    """Temperature at which this air, cooled at constant pressure, is saturated over liquid water, in °C.
+
+    vapour_pressure_hpa   partial pressure of water vapour, 1e-9 to 1000 hPa; drier air has no dew point: nan
+    pressure_hpa          total pressure, 500 to 1100 hPa
+    formula               the one that gave the vapour pressure: then saturated air's dew point is its temperature
+
+    Raises ValidityError for a vapour pressure outside 0 to 1400 hPa or a pressure outside 100 to 1400 hPa.
+    Source: [PARKER04] eq. 1.7 for `buck`; the others are inverted by Newton's method in 1/T from there, at most
+    eight steps, nan where a step still exceeds 1e-9 of T (`iapws` below -100 °C). The inversion is exact to 1e-9 °C.
+
+    >>> round(float(dew_point_c(11.7323, 933.0)), 3)
+    9.267
+    """
+    _known(formula, FORMULAS)
+    VAPOUR_PRESSURE.check(vapour_pressure_hpa)
+    PRESSURE.check(pressure_hpa)
+    e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
+    buck = _buck_inverse(np.log(e / (BUCK_E0 * (BUCK_F0 + BUCK_FP * p))), BUCK_A, BUCK_B)
+    return buck if formula == "buck" else _newton_c(e, p, FORMULAS[formula], buck)
+
+
+def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
+    """Temperature at which this air, cooled at constant pressure, is saturated over ice, in °C.
+
+    vapour_pressure_hpa   partial pressure of water vapour, hPa; nan where it has no frost point: drier than 1e-9 hPa,
+                          or so moist (6.14 hPa) that dew forms above 0.01 °C
+    pressure_hpa          total pressure, 500 to 1100 hPa
+    formula               `buck` or `iapws`, the one that gave the vapour pressure
+
+    Raises ValidityError as `dew_point_c`.
+    Source: [PARKER04] eqs. 1.4, 1.6 solved as 1.7 is; `iapws` by Newton's method from there, at most eight steps, nan
+    where a step still exceeds 1e-9 of T. The inversion is exact to 1e-9 °C.
+
+    >>> round(float(frost_point_c(2.6096, 933.0)), 3)
+    -10.0
+    """
+    _known(formula, ICE_FORMULAS, " over ice")
+    VAPOUR_PRESSURE.check(vapour_pressure_hpa)
+    PRESSURE.check(pressure_hpa)
+    e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
+    buck = _buck_inverse(np.log(e / (ICE_E0 * (ICE_F0 + ICE_FP * p))), ICE_A, ICE_B)
+    frost = buck if formula == "buck" else _newton_c(e, p, ICE_FORMULAS[formula], buck)
+    return np.where(frost <= MELTING_C + 1e-9, frost, np.nan)[()]
+
+
+def _known(formula, formulas, where=""):
+    if formula not in formulas:
+        raise ValidityError(f"saturation formula {formula!r} is unknown{where}; choose one of {', '.join(formulas)}")
+
+
+def _with_vapour(vapour_pressure_hpa):
+    e = np.asarray(vapour_pressure_hpa, float)
+    return np.where(e >= DRY_BELOW_HPA, e, np.nan)
+
+
+def _buck_inverse(log_ratio, a, b):
+    return b * log_ratio / (a - log_ratio)
+
+
+def _newton_c(e, p, saturated, start_c):
+    kelvin, step = start_c + ZERO_CELSIUS_K, np.inf
+    for _ in range(8):
+        at = saturated(kelvin - ZERO_CELSIUS_K, p)
+        # ln E is nearly straight in 1/T, so that Newton's step is taken there
+        step = np.log(e / at.pressure_hpa) * at.pressure_hpa / (at.per_c * kelvin)
+        kelvin = kelvin / (1.0 - step)
+    return np.where(np.abs(step) < 1e-9, kelvin - ZERO_CELSIUS_K, np.nan)[()]
+
+
+def _buck(t, p) -> Saturation:
+    factor = BUCK_F0 + BUCK_FP * p
+    e = BUCK_E0 * factor * np.exp(BUCK_A * t / (BUCK_B + t))
+    return Saturation(e, e * BUCK_A * BUCK_B / (BUCK_B + t) ** 2, e * BUCK_FP / factor)
+
+
+def _buck_ice(t, p) -> Saturation:
+    factor = ICE_F0 + ICE_FP * p
+    e = ICE_E0 * factor * np.exp(ICE_A * t / (ICE_B + t))
+    return Saturation(e, e * ICE_A * ICE_B / (ICE_B + t) ** 2, e * ICE_FP / factor)
+
+
+def _ciddor(t, p) -> Saturation:
+    kelvin = t + ZERO_CELSIUS_K
+    pure = np.exp(CIDDOR_A * kelvin**2 + CIDDOR_B * kelvin + CIDDOR_C + CIDDOR_D / kelvin)
+    return _enhanced(t, p, pure, pure * (2.0 * CIDDOR_A * kelvin + CIDDOR_B - CIDDOR_D / kelvin**2))
+
+
+def _iapws(t, p) -> Saturation:
+    return _enhanced(t, p, *_if97(t + ZERO_CELSIUS_K))
+
+
+def _iapws_ice(t, p) -> Saturation:
+    """Sublimation pressure times Greenspan's factor f: ln f = alpha (1 - e/p) + beta (p/e - 1), e that of pure ice."""
+    e, e_t = (value / PA_PER_HPA for value in _sublimation(t + ZERO_CELSIUS_K))
+    alpha, alpha_t = _polynomial(GREENSPAN_ALPHA, t)
+    ln_beta, ln_beta_t = _polynomial(GREENSPAN_LN_BETA, t)
+    beta = np.exp(ln_beta)
+    factor = np.exp(alpha * (1.0 - e / p) + beta * (p / e - 1.0))
+    by_e = -alpha / p - beta * p / e**2
+    ln_f_t = alpha_t * (1.0 - e / p) + beta * ln_beta_t * (p / e - 1.0) + by_e * e_t
+    ln_f_p = alpha * e / p**2 + beta / e
+    return Saturation(factor * e, factor * (e_t + e * ln_f_t), factor * e * ln_f_p)
+
+
+def _sublimation(kelvin):
+    """[IAPWS11] eq. 6 in Pa and its slope in Pa/K: each term of ln(p/p_t) is a theta^(b - 1)."""
+    theta = kelvin / TRIPLE_K
+    pressure = TRIPLE_PA * np.exp(sum(a * theta ** (b - 1.0) for a, b in SUBLIMATION))
+    return pressure, pressure * sum(a * (b - 1.0) * theta ** (b - 2.0) for a, b in SUBLIMATION) / TRIPLE_K
+
+
+def _polynomial(coefficients, t):
+    value = sum(c * t**i for i, c in enumerate(coefficients))
+    return value, sum(i * c * t ** (i - 1) for i, c in enumerate(coefficients) if i)
+
+
+def _enhanced(t, p, pure_pa, pure_pa_per_c) -> Saturation:
+    """Moist-air saturation from that of pure water: both Ciddor's and IAPWS's carry the same factor."""
+    factor = enhancement_factor(t, p)
+    pure, slope = pure_pa / PA_PER_HPA, pure_pa_per_c / PA_PER_HPA
+    return Saturation(
+        factor * pure, factor * slope + 2.0 * ENHANCEMENT_T2 * t * pure, ENHANCEMENT_P * PA_PER_HPA * pure
+    )
+
+
+def _if97(kelvin):
+    """[IAPWS97] eq. 30 in Pa and its slope in Pa/K; the paper's theta, A, B, C."""
+    n = IF97_N
+    theta = kelvin + n[8] / (kelvin - n[9])
+    theta_t = 1.0 - n[8] / (kelvin - n[9]) ** 2
+    a, a_t = (theta + n[0]) * theta + n[1], (2.0 * theta + n[0]) * theta_t
+    b, b_t = (n[2] * theta + n[3]) * theta + n[4], (2.0 * n[2] * theta + n[3]) * theta_t
+    c, c_t = (n[5] * theta + n[6]) * theta + n[7], (2.0 * n[5] * theta + n[6]) * theta_t
+    root = np.sqrt(b**2 - 4.0 * a * c)
+    below = root - b
+    below_t = (b * b_t - 2.0 * (a_t * c + a * c_t)) / root - b_t
+    q = 2.0 * c / below
+    return 1e6 * q**4, 4e6 * q**3 * 2.0 * (c_t * below - c * below_t) / below**2
+
+
+FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck, "ciddor": _ciddor, "iapws": _iapws}
+ICE_FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck_ice, "iapws": _iapws_ice}

@@ -1,0 +1,1 @@
+"""The telescope: frames, paraboloid, subreflector, alidade, panels."""

@@ -1,0 +1,1 @@
+"""Axis systems: rotations, frames, local and plumb."""

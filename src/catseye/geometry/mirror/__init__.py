@@ -1,0 +1,1 @@
+"""A steered mirror: pointing, encoders, slews, tracks."""

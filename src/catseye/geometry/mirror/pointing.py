@@ -1,0 +1,394 @@
+"""The six transformations: from a point in the ground frame to encoder counts, and from counts to a ray.
+
+    1  R - R_i            off the Kelvin mount's fixed point
+    2  gamma              into the mount's axes
+    3  - (dx, dy, dz)     off the scan point, where the mirror's axes meet
+    4  lambda             into the mirror's axes
+    5  range, Theta, Phi  spherical
+    6  N_a, N_e           encoder counts
+
+1 to 4 are mirror = lambda gamma (R - S) with the scan point S = R_i + gamma^T (dx, dy, dz): one turn and one shift, in
+which no digits are lost for points near by. This is the mirror as it should be; `imperfect` has what real ones add.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.frames.rotation import rx, rz
+from catseye.geometry.mirror.encoder import (
+    COUNTS_PER_RADIAN,
+    azimuth_angle,
+    azimuth_counts,
+    elevation_angle,
+    elevation_counts,
+)
+from catseye.geometry.mirror.mirror_path import direction_angles
+from catseye.geometry.mirror.mount import gamma, lambda_, mount_angles, scan_point
+
+PARAMETERS = ("x", "y", "z", "alpha1", "alpha2", "alpha3", "dx", "dy", "dz", "beta1", "beta2", "na0", "ne0")
+SIZES = {"fixed_point": 3, "alpha": 3, "offset": 3, "beta": 2, "zeros": 2}
+COMPILED_FROM = 1_000_000  # points: loading numba takes longer than the plain form for these
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """One or many mirrors on their monuments: 13 numbers each, `PARAMETERS` in this order.
+
+    fixed_point    (..., 3), m, ground: centre of the Kelvin mount's tooling ball
+    alpha          (..., 3), rad: alpha1, alpha2, alpha3
+    offset         (..., 3), m, mount axes: dx, dy, dz from the fixed point to the scan point
+    beta           (..., 2), rad: beta1, beta2
+    zeros          (..., 2), counts: na0, ne0
+
+    Its batch shape broadcasts against that of points and counts: `station[:, None]` of 18 and 1000 points make 18 x
+    1000.
+    Raises ValidityError for a shape that does not end so, or a number that is not finite.
+
+    Source: [PARKER04] section 2.2.
+
+    >>> zy3 = Station([5.5862, 20.8500, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [0.0, 0.25, 0.0], [0.0, 0.0], [0, 0])
+    >>> zy3.gamma[0].round(5).tolist(), zy3.scan_point.round(3).tolist()
+    ([0.53284, 0.84622, -2e-05], [5.586, 20.85, 0.244])
+    """
+
+    fixed_point: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    beta: NDArray[np.float64]
+    zeros: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name, size in SIZES.items():
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape[-1:] != (size,):
+                raise ValidityError(f"{name} has shape {array.shape}, expected (..., {size})")
+            if not np.isfinite(array).all():
+                raise ValidityError(f"{name} of a station holds a number that is not finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_matrix(
+        cls, point: ArrayLike, gamma_matrix: ArrayLike, *, offset: ArrayLike, beta: ArrayLike, zeros: ArrayLike
+    ) -> "Station":
+        """Of the scan point (..., 3), m, and gamma (..., 3, 3) of a mount turned anyhow, as on the feed arm."""
+        g = np.asarray(gamma_matrix, dtype=float)
+        away = np.einsum("...ji,...j->...i", g, np.asarray(offset, dtype=float))
+        return cls(
+            np.asarray(point, dtype=float) - away,
+            np.stack(mount_angles(g), axis=-1),
+            np.asarray(offset, dtype=float),
+            np.asarray(beta, dtype=float),
+            np.asarray(zeros, dtype=float),
+        )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Batch shape."""
+        return np.broadcast_shapes(*(getattr(self, name).shape[:-1] for name in SIZES))
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """(..., 13) in the order of `PARAMETERS`."""
+        parts = [np.broadcast_to(getattr(self, name), (*self.shape, size)) for name, size in SIZES.items()]
+        return np.concatenate(parts, axis=-1)
+
+    @classmethod
+    def of_parameters(cls, parameters: ArrayLike) -> "Station":
+        """The station whose `parameters` (..., 13) these are."""
+        values = np.asarray(parameters, dtype=float)
+        if values.shape[-1:] != (len(PARAMETERS),):
+            raise ValidityError(f"parameters of a station have shape {values.shape}, expected (..., {len(PARAMETERS)})")
+        return cls(*np.split(values, np.cumsum(list(SIZES.values()))[:-1], axis=-1))
+
+    def __getitem__(self, index: object) -> "Station":
+        """Stations of the batch, or new axes in it, as numpy's indices do it."""
+        whole = self.parameters
+        return Station.of_parameters(whole[(*index, slice(None)) if isinstance(index, tuple) else (index, slice(None))])
+
+    @cached_property
+    def gamma(self) -> NDArray[np.float64]:
+        """(..., 3, 3): mount coordinates of ground vectors."""
+        return gamma(*np.moveaxis(self.alpha, -1, 0))
+
+    @cached_property
+    def lambda_(self) -> NDArray[np.float64]:
+        """(..., 3, 3): mirror coordinates of mount vectors."""
+        return lambda_(*np.moveaxis(self.beta, -1, 0))
+
+    @cached_property
+    def mirror_from_ground(self) -> NDArray[np.float64]:
+        """(..., 3, 3): mirror coordinates of ground vectors, eq. 2.47."""
+        return self.lambda_ @ self.gamma
+
+    @cached_property
+    def scan_point(self) -> NDArray[np.float64]:
+        """(..., 3), m, ground."""
+        return scan_point(self.fixed_point, self.gamma, self.offset)
+
+
+class Aim(NamedTuple):
+    """Where a mirror looks for a point, each (...): m from the scan point, rad, rad, counts, counts."""
+
+    range: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    phi: NDArray[np.float64]
+    azimuth_counts: NDArray[np.float64]
+    elevation_counts: NDArray[np.float64]
+
+
+class Ray(NamedTuple):
+    """A beam: the scan point (..., 3), m, and its unit direction (..., 3), both ground."""
+
+    origin: NDArray[np.float64]
+    direction: NDArray[np.float64]
+
+
+def in_mirror_axes(station: Station, points: ArrayLike) -> NDArray[np.float64]:
+    """Points (..., 3), m, ground, in the mirror's axes, from the scan point.
+
+    Source: [PARKER04] eq. 2.12. Exact.
+    """
+    at = np.asarray(points, dtype=float)
+    _refuse_points(at)
+    return np.einsum("...ij,...j->...i", station.mirror_from_ground, at - station.scan_point)
+
+
+def aim(station: Station, points: ArrayLike) -> Aim:
+    """Range, beam angles and encoder counts for points, in the direct pointing.
+
+    station    of batch shape that broadcasts with the points'
+    points     (..., 3), m, ground
+
+    A point in the scan point itself has no direction: NaN. On the azimuth axis Theta is 0.
+
+    Source: [PARKER04] eq. 2.12 to 2.22. Good to 1e-15 rad.
+
+    >>> zy3 = Station([5.5862, 20.85, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [-7.5e-5, 0.247459, -7.62e-4],
+    ...               [-7.27e-4, 1.21e-4], [-4195, -4935])
+    >>> [round(float(v), 4) for v in aim(zy3, [0.0, 100.0, 20.0])]
+    [81.7696, 0.2998, 2.1814, 576.8106, 12423.7397]
+    """
+    mirror = in_mirror_axes(station, points)
+    distance = np.linalg.norm(mirror, axis=-1)
+    theta, phi = direction_angles(mirror)
+    nowhere = np.where(distance > 0.0, 0.0, np.nan)
+    theta, phi = theta + nowhere, phi + nowhere
+    na0, ne0 = np.moveaxis(station.zeros, -1, 0)
+    return Aim(distance, theta, phi, azimuth_counts(theta, na0), elevation_counts(phi, ne0))
+
+
+def counts(
+    station: Station,
+    points: ArrayLike,
+    *,
+    compiled: bool | None = None,
+    out: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Encoder counts (..., 2), azimuth and elevation, for points in the direct pointing, as `aim` gives them.
+
+    station, points    as for `aim`
+    compiled           by the kernel, equal within 1e-9 counts; None for a million or more, every station to every point
+    out                (..., 2), where to put them and what is returned; new memory if None
+
+    Raises ValidityError where the kernel is asked for stations and points that go in pairs, and for an `out` of another
+    shape or kind.
+    """
+    at = np.asarray(points, dtype=float)
+    shape = (*np.broadcast_shapes(station.shape, at.shape[:-1]), 2)
+    each = _stations_by_points(station.shape, at.shape[:-1])
+    if compiled and not each:
+        raise ValidityError(
+            f"stations {station.shape} and points {at.shape} go in pairs, which the kernel does not do (expected every "
+            "station to every point, stations in front)"
+        )
+    if out is not None and (out.shape != shape or out.dtype != float or not out.flags.c_contiguous):
+        raise ValidityError(f"out has shape {out.shape} and type {out.dtype}, expected {shape}, float64, contiguous")
+    answer = np.empty(shape) if out is None else out
+    if each and (compiled or (compiled is None and answer.size // 2 >= COMPILED_FROM)):
+        from catseye.geometry.mirror.pointing_kernel import stations_by_points
+
+        _refuse_points(at)
+        table = np.ascontiguousarray(at.reshape(-1, 3))
+        stations_by_points(
+            _table(station.mirror_from_ground, station.shape, (3, 3)),
+            _table(station.scan_point, station.shape, (3,)),
+            _table(station.zeros, station.shape, (2,)),
+            table,
+            answer.reshape(-1, len(table), 2),
+        )
+        return answer
+    found = aim(station, at)
+    answer[..., 0], answer[..., 1] = found.azimuth_counts, found.elevation_counts
+    return answer
+
+
+def _table(part: NDArray[np.float64], batch: tuple[int, ...], tail: tuple[int, ...]) -> NDArray[np.float64]:
+    """One row a station, in memory."""
+    return np.ascontiguousarray(np.broadcast_to(part, (*batch, *tail)).reshape(-1, *tail))
+
+
+def _refuse_points(at: NDArray[np.float64]) -> None:
+    if at.shape[-1:] != (3,):
+        raise ValidityError(f"points have shape {at.shape}, expected (..., 3)")
+
+
+def _stations_by_points(stations: tuple[int, ...], points: tuple[int, ...]) -> bool:
+    """Whether every station meets every point, stations in the outer axes."""
+    depth = max(len(stations), len(points))
+    s, p = ((1,) * (depth - len(shape)) + shape for shape in (stations, points))
+    outer = [i for i in range(depth) if s[i] != 1]
+    inner = [i for i in range(depth) if p[i] != 1]
+    return not outer or not inner or outer[-1] < inner[0]
+
+
+def ray(station: Station, at_counts: ArrayLike) -> Ray:
+    """The beam at encoder counts, direct or prime pointing.
+
+    station      of batch shape that broadcasts with the counts'
+    at_counts    (..., 2), azimuth and elevation; any turn
+
+    Source: [PARKER04] eq. 2.21, 2.22, 2.16 to 2.18 and 2.12 solved for R. Good to 1e-15 rad.
+
+    >>> flat = Station([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0], [0.0, 0.0])
+    >>> (ray(flat, [25_000.0, 12_500.0]).direction.round(9) + 0.0).tolist()  # y of the mirror is up
+    [0.0, 0.0, 1.0]
+    """
+    u = beam(station, at_counts)
+    direction = np.einsum("...ji,...j->...i", station.mirror_from_ground, u)
+    return Ray(np.broadcast_to(station.scan_point, direction.shape), direction)
+
+
+def beam(station: Station, at_counts: ArrayLike) -> NDArray[np.float64]:
+    """Unit direction (..., 3) of the beam in mirror axes at encoder counts (..., 2); eq. 2.16 to 2.18."""
+    n = np.asarray(at_counts, dtype=float)
+    if n.shape[-1:] != (2,):
+        raise ValidityError(f"counts have shape {n.shape}, expected (..., 2)")
+    theta = azimuth_angle(n[..., 0], station.zeros[..., 0])
+    phi = elevation_angle(n[..., 1], station.zeros[..., 1])
+    sine = np.sin(phi)
+    return np.stack([sine * np.cos(theta), sine * np.sin(theta), np.cos(phi) + 0.0 * theta], axis=-1)
+
+
+def counts_jacobian(station: Station, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Derivatives of the counts by the points (..., 2, 3), counts/m, and by the stations' parameters (..., 2, 13).
+
+    station, points    as for `aim`
+
+    On the azimuth axis (Phi = 0 or pi) the azimuth has no derivative: infinite or NaN.
+
+    Source: [PARKER04] eq. 2.12 to 2.22 differentiated: a turn of axes about e moves coordinates g by -e x g.
+
+    >>> by_point, _ = counts_jacobian(Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0, 0]), [120.0, 0.0, 0.0])
+    >>> by_point.round(2).tolist()  # one count is 7.5 mm in azimuth, 15 mm in elevation
+    [[0.0, 0.0, 132.63], [0.0, 66.31, 0.0]]
+    """
+    mirror = in_mirror_axes(station, points)
+    x, y, z = np.moveaxis(mirror, -1, 0)
+    across, square = x**2 + y**2, np.sum(mirror**2, axis=-1)
+    zero = np.zeros_like(x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(across)
+        theta = np.stack([-y / across, x / across, zero], axis=-1)
+        phi = np.stack([x * z / (root * square), y * z / (root * square), -root / square], axis=-1)
+        slope = np.stack([COUNTS_PER_RADIAN * theta, 0.5 * COUNTS_PER_RADIAN * phi], axis=-2)
+        by_point = slope @ station.mirror_from_ground
+        lambda_slope = slope @ station.lambda_
+        mount = np.einsum("...ji,...j->...i", station.lambda_, mirror) + station.offset
+        about_mount, about_mirror = _turning_axes(station)
+        by_alpha = -lambda_slope @ np.swapaxes(np.cross(about_mount, mount[..., None, :]), -1, -2)
+        by_beta = -slope @ np.swapaxes(np.cross(about_mirror, mirror[..., None, :]), -1, -2)
+        by_zeros = np.broadcast_to(np.eye(2), (*by_point.shape[:-1], 2))
+    return by_point, np.concatenate([-by_point, by_alpha, -lambda_slope, by_beta, by_zeros], axis=-1)
+
+
+def ray_jacobian(
+    station: Station, at_counts: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Derivatives of a beam's direction by counts (..., 3, 2) and by parameters (..., 3, 13), of its origin by these.
+
+    station, at_counts    as for `ray`
+
+    Source: [PARKER04] eq. 2.12 solved for R, differentiated: a turn of axes about e moves a fixed direction u of them
+    by e x u.
+    """
+    n = np.asarray(at_counts, dtype=float)
+    u = beam(station, n)
+    theta = azimuth_angle(n[..., 0], station.zeros[..., 0])
+    phi = elevation_angle(n[..., 1], station.zeros[..., 1])
+    sine, cosine, along, aside = np.sin(phi), np.cos(phi), np.cos(theta), np.sin(theta)
+    by_azimuth = np.stack([-sine * aside, sine * along, 0.0 * theta + 0.0 * sine], axis=-1) / COUNTS_PER_RADIAN
+    by_elevation = np.stack([cosine * along, cosine * aside, -sine + 0.0 * theta], axis=-1) * 2.0 / COUNTS_PER_RADIAN
+    to_ground = np.swapaxes(station.mirror_from_ground, -1, -2)
+    mount_to_ground = np.swapaxes(station.gamma, -1, -2)
+    by_counts = to_ground @ np.stack([by_azimuth, by_elevation], axis=-1)
+    about_mount, about_mirror = _turning_axes(station)
+    in_mount = np.einsum("...ji,...j->...i", station.lambda_, u)
+    by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, in_mount[..., None, :]), -1, -2)
+    by_beta = to_ground @ np.swapaxes(np.cross(about_mirror, u[..., None, :]), -1, -2)
+    nothing = np.zeros((*by_counts.shape[:-1], 3))
+    direction = np.concatenate([nothing, by_alpha, nothing, by_beta, -by_counts], axis=-1)
+    origin_by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, station.offset[..., None, :]), -1, -2)
+    shape = direction.shape[:-2]
+    parts = (np.eye(3), origin_by_alpha, mount_to_ground, np.zeros((3, 4)))
+    origin = np.concatenate([np.broadcast_to(p, (*shape, *p.shape[-2:])) for p in parts], axis=-1)
+    return by_counts, direction, origin
+
+
+def counts_covariance(
+    station: Station, points: ArrayLike, *, of_station: ArrayLike, of_points: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Covariance (..., 2, 2), counts^2, of the counts for points.
+
+    station, points   as for `aim`
+    of_station        (..., 13, 13), of `PARAMETERS`, in their units
+    of_points         (..., 3, 3), m^2, independent of it; none if None
+
+    Source: [JCGM102] eq. 3, first order, with `counts_jacobian`.
+    """
+    by_point, by_station = counts_jacobian(station, points)
+    answer = by_station @ np.asarray(of_station, dtype=float) @ np.swapaxes(by_station, -1, -2)
+    if of_points is not None:
+        answer = answer + by_point @ np.asarray(of_points, dtype=float) @ np.swapaxes(by_point, -1, -2)
+    return answer
+
+
+def ray_covariance(
+    station: Station, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Covariance (..., 6, 6) of a beam's origin, m, and of its direction, rad, ground axes, in this order.
+
+    station, at_counts   as for `ray`
+    of_station           (..., 13, 13), of `PARAMETERS`, in their units
+    of_counts            (..., 2, 2), counts^2, independent of it; none if None
+
+    The direction's part is of rank two: it stays a unit vector. Source: [JCGM102] eq. 3, first order, `ray_jacobian`.
+    """
+    by_counts, direction, origin = ray_jacobian(station, at_counts)
+    slopes = np.concatenate([origin, direction], axis=-2)
+    answer = slopes @ np.asarray(of_station, dtype=float) @ np.swapaxes(slopes, -1, -2)
+    if of_counts is not None:
+        nothing = np.zeros_like(by_counts)
+        read = np.concatenate([nothing, by_counts], axis=-2)
+        answer = answer + read @ np.asarray(of_counts, dtype=float) @ np.swapaxes(read, -1, -2)
+    return answer
+
+
+def _turning_axes(station: Station) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Axes, a row each, about which alpha1..3 turn the mount's axes (..., 3, 3) and beta1, 2 the mirror's (..., 2, 3).
+
+    gamma = Rx(alpha3) Rz(alpha2) Ry(alpha1) P: a factor's own axis, turned by the factors that come after it.
+    """
+    tip = rx(station.alpha[..., 2])
+    first = (tip @ rz(station.alpha[..., 1]))[..., :, 1]
+    last = np.broadcast_to([1.0, 0.0, 0.0], first.shape)
+    about_mirror = rx(station.beta[..., 0])[..., :, 1]
+    return (
+        np.stack([first, tip[..., :, 2], last], axis=-2),
+        np.stack([np.broadcast_to([1.0, 0.0, 0.0], about_mirror.shape), about_mirror], axis=-2),
+    )

@@ -1,0 +1,164 @@
+"""How a mirror's two axes go from counts to counts: where they are at any time, and how fast the beam turns at most.
+
+Each axis ramps up at constant acceleration, runs, and ramps down (a trapezoid of speed, a triangle where the way is
+short). The axes start together, and each takes the time it needs: the way is not straight in counts. Coordinated axes
+share one trapezoid and end together: straight in counts. Tracking, eq. 2.45 and 2.46, is a ramp of no length.
+
+The beam u = (sin Phi cos Theta, sin Phi sin Theta, cos Phi) turns at sqrt(Theta'^2 sin^2 Phi + Phi'^2), primes for
+rates: never faster than sqrt(Theta'^2 + Phi'^2), which `beam_rate` is. Theta' is the rate of the azimuth axis, Phi'
+twice that of the elevation axis.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What the axes may do: speed (azimuth, elevation), counts/s, and acceleration, counts/s^2, all above 0.
+
+    coordinated    both axes share one profile, straight in counts; else each has its own
+    start_skew     s, 0 or more: by how much one axis may start after the other; a guard widens its margin by it
+
+    Raises ValidityError otherwise.
+    """
+
+    velocity: tuple[float, float]
+    acceleration: tuple[float, float]
+    coordinated: bool = False
+    start_skew: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.start_skew < np.inf:
+            raise ValidityError(f"start_skew = {self.start_skew} s is not 0 or more and finite")
+        for name in ("velocity", "acceleration"):
+            value = tuple(float(v) for v in getattr(self, name))
+            if len(value) != 2 or not all(0.0 < v < np.inf for v in value):
+                unit = "counts/s" if name == "velocity" else "counts/s^2"
+                raise ValidityError(f"{name} = {value} is not two numbers above 0 (azimuth, elevation, {unit})")
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Slew:
+    """Moves of both axes, a batch (...) of them; `trapezoid` and `straight` make them.
+
+    start, end    (..., 2), counts, azimuth and elevation
+    ramp          (..., 2), s, length of the ramp up and of the ramp down of each axis
+    duration      (..., 2), s, from the common start to each axis' end
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    ramp: NDArray[np.float64]
+    duration: NDArray[np.float64]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Batch shape."""
+        return self.start.shape[:-1]
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """(...), s, until both axes stand."""
+        return np.max(self.duration, axis=-1)
+
+    @property
+    def top_speed(self) -> NDArray[np.float64]:
+        """(..., 2), counts/s with its sign, between the ramps; 0 where an axis does not move."""
+        running = self.duration - self.ramp
+        return (self.end - self.start) / np.where(running > 0.0, running, np.inf)
+
+    def __getitem__(self, index: Any) -> "Slew":
+        """Some of the batch."""
+        return Slew(self.start[index], self.end[index], self.ramp[index], self.duration[index])
+
+    def position(self, time: ArrayLike) -> NDArray[np.float64]:
+        """Counts (..., 2) at times (...) s from the start; before it the start, after the end the end."""
+        full = np.broadcast_to(self.duration, np.broadcast_shapes(self.duration.shape, (*np.shape(time), 2)))
+        t = np.clip(np.asarray(time, dtype=float)[..., None], 0.0, full)
+        left, ramp = full - t, np.where(self.ramp > 0.0, self.ramp, 1.0)
+        half = 0.5 * self.ramp
+        way_up = np.where(t < self.ramp, 0.5 * t**2 / ramp, t - half)
+        way_down = np.where(left < self.ramp, 0.5 * left**2 / ramp, left - half)
+        # Each half from its own end: both ends are met exactly.
+        return np.where(t < left, self.start + self.top_speed * way_up, self.end - self.top_speed * way_down)
+
+    def beam_rate(self, after: ArrayLike = 0.0) -> NDArray[np.float64]:
+        """What the beam's turning rate (...), rad/s, never exceeds from a time (...) s on."""
+        left = np.clip(self.duration - np.asarray(after, dtype=float)[..., None], 0.0, None)
+        slowed = np.where(left < self.ramp, left / np.where(self.ramp > 0.0, self.ramp, 1.0), 1.0 * (left > 0.0))
+        rate = self.top_speed * slowed * BEAM_PER_COUNT
+        return np.hypot(rate[..., 0], rate[..., 1])
+
+
+def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> Slew:
+    """The quickest moves between counts that stand at both ends.
+
+    start, end    (..., 2), counts
+    pace          of the axes
+
+    Source: the trapezoidal profile of the motion chip, [TEXAS13]; duration d/v + v/a, or 2 sqrt(d/a) where d < v^2/a.
+
+    >>> move = trapezoid([0.0, 0.0], [10_000.0, 400.0], Pace((5000.0, 5000.0), (10_000.0, 10_000.0)))
+    >>> move.duration.tolist(), move.position(0.4).round(9).tolist()
+    ([2.5, 0.4], [800.0, 400.0])
+    """
+    a, b = _pairs(start, end)
+    way = np.abs(b - a)
+    velocity, acceleration = np.array(pace.velocity), np.array(pace.acceleration)
+    if pace.coordinated:
+        # The share of the way done, 0 to 1, is one trapezoid that neither axis finds too fast.
+        each, moves = np.where(way > 0.0, way, 1.0), np.any(way > 0.0, axis=-1)
+        limits = (np.where(way > 0.0, v / each, np.inf) for v in (velocity, acceleration))
+        fast, steep = (np.where(moves, np.min(v, axis=-1), 1.0) for v in limits)
+        ramp, full = (np.where(moves, v, 0.0)[..., None] for v in _times(1.0, fast, steep))
+        return Slew(a, b, np.broadcast_to(ramp, a.shape), np.broadcast_to(full, a.shape))
+    ramp, full = _times(way, velocity, acceleration)
+    return Slew(a, b, ramp, full)
+
+
+def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> Slew:
+    """Moves at constant rates, as a track between two time tags.
+
+    start, end    (..., 2), counts
+    duration      (...), s, 0 or above; 0 only where start and end agree
+
+    Raises ValidityError otherwise.
+
+    Source: [PARKER04] eq. 2.45 and 2.46. Exact.
+
+    >>> straight([0.0, 0.0], [10.0, -4.0], 2.0).position(0.5).tolist()
+    [2.5, -1.0]
+    """
+    a, b = _pairs(start, end)
+    seconds = np.broadcast_to(np.asarray(duration, dtype=float), a.shape[:-1])
+    jump = ~((seconds > 0.0) | ((seconds == 0.0) & np.all(a == b, axis=-1)))
+    if np.any(jump):
+        raise ValidityError(f"duration {float(seconds[jump].flat[0])} s of a move is not above 0")
+    full = np.broadcast_to(seconds[..., None], a.shape)
+    return Slew(a, b, np.zeros_like(full), full)
+
+
+def _times(way: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Length of a ramp and of the whole move, s."""
+    way, velocity, acceleration = np.broadcast_arrays(way, velocity, acceleration)
+    short = way < velocity**2 / acceleration
+    ramp = np.where(short, np.sqrt(way / acceleration), np.where(way > 0.0, velocity / acceleration, 0.0))
+    return ramp, np.where(short, 2.0 * ramp, way / velocity + ramp)
+
+
+def _pairs(start: ArrayLike, end: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both as floats of one shape (..., 2), refused where they are not, or not finite."""
+    a, b = np.broadcast_arrays(np.asarray(start, dtype=float), np.asarray(end, dtype=float))
+    if a.shape[-1:] != (2,):
+        raise ValidityError(f"counts of a slew have shape {a.shape}, expected (..., 2)")
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise ValidityError("counts of a slew hold a number that is not finite")
+    return a, b

@@ -1,0 +1,1 @@
+"""Laser safety: exposure limits, classes, hazard distances."""

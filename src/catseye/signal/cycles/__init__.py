@@ -1,0 +1,1 @@
+"""Whole cycles: coarse lengths, several frequencies."""

@@ -1,0 +1,227 @@
+"""The compiled form of `delay_peak`: one pass a recording, its lines turned by a recurrence instead of exponentials."""
+
+import numpy as np
+from numba import njit
+
+from catseye.signal.delay.peak import (
+    AUDIBLE,
+    CERTAIN,
+    CLIPPED_FROM,
+    FINE,
+    NEWTON_STEPS,
+    RIVAL,
+    SECOND,
+    SETTLED,
+    TOLD_APART,
+    DelayStatus,
+    Search,
+    cross_spectrum,
+    transformed,
+)
+
+GOOD, ECHO, THRESHOLD, AMBIGUOUS = (
+    int(s) for s in (DelayStatus.GOOD, DelayStatus.ECHO, DelayStatus.THRESHOLD, DelayStatus.AMBIGUOUS)
+)
+EDGE, CLIPPED, SILENT, NOT_FINITE = (
+    int(s) for s in (DelayStatus.EDGE, DelayStatus.CLIPPED, DelayStatus.SILENT, DelayStatus.NOT_FINITE)
+)
+
+_compiled = njit(cache=True, error_model="numpy", nogil=True)
+_inlined = njit(error_model="numpy")  # kept with their caller
+
+
+def find(piece, low, search: Search, ends):
+    """As `delay_peak.find`, its plain form."""
+    found, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
+    spectrum, scale = transformed(piece, search)
+    padded = np.zeros((len(piece), search.stretch // 2 + 1), np.complex128)
+    if search.phases:
+        cross, weights = cross_spectrum(spectrum, search)
+        padded[:, search.first : search.first + cross.shape[1]] = cross
+    else:
+        weights = search.weight[None]
+        _weigh(spectrum, search.template, search.weight, padded, search.first)
+    correlation = np.fft.irfft(padded, search.stretch)
+    _rows(piece, ends[0], ends[1], spectrum, padded, correlation, low, weights, search, scale, found, status)
+    return found, status
+
+
+@_compiled
+def _weigh(spectrum, template, weight, padded, first):
+    for b in range(len(spectrum)):
+        for k in range(len(template)):
+            padded[b, first + k] = spectrum[b, k] * template[k].conjugate() * weight[k]
+
+
+@_inlined
+def _damage(samples, bottom, top):
+    high, low, count = samples[0], samples[0], 0
+    finite = True
+    for x in samples:
+        high, low = max(high, x), min(low, x)
+        finite &= abs(float(x)) < np.inf
+        count += (x >= top) | (x <= bottom)
+    if not finite:
+        return NOT_FINITE
+    if high == low:
+        return SILENT
+    return CLIPPED if count >= CLIPPED_FROM else GOOD
+
+
+@_inlined
+def _judged(lag, snr, apart, other, least_snr):
+    if np.isnan(lag):
+        return EDGE
+    echo = other > AUDIBLE and other**2 * snr > CERTAIN**2
+    if not snr >= least_snr:
+        return THRESHOLD
+    if apart < TOLD_APART or (echo and other > SECOND):
+        return AMBIGUOUS
+    return ECHO if echo else GOOD
+
+
+@_inlined
+def _sums(cross, tau, omega, step):
+    """J, its slope and its bend at a lag, samples."""
+    turn, on = complex(np.cos(omega * tau), np.sin(omega * tau)), complex(np.cos(step * tau), np.sin(step * tau))
+    height, slope, bend = 0.0, 0.0, 0.0
+    for k in range(len(cross)):
+        z = cross[k] * turn
+        w = omega + k * step
+        height += z.real
+        slope -= w * z.imag
+        bend -= w * w * z.real
+        turn *= on
+    return height, slope, bend
+
+
+@_inlined
+def _refined(cross, lag, omega, step):
+    """Lag and height of the peak near a whole one; NaN where Newton's steps lead away by more than a sample."""
+    tau = float(lag)
+    for _ in range(NEWTON_STEPS):
+        _, slope, bend = _sums(cross, tau, omega, step)
+        if not bend < 0.0:
+            return np.nan, np.nan
+        move = -slope / bend
+        tau += move
+        if not abs(tau - lag) <= 1.0:
+            return np.nan, np.nan
+        if abs(move) <= SETTLED:
+            break
+    return tau, _sums(cross, tau, omega, step)[0]
+
+
+@_inlined
+def _two_peaks(c):
+    """Places of the highest and of the second highest peak, and the second's height over the first's."""
+    at = 0
+    for i in range(len(c)):
+        if c[i] > c[at]:
+            at = i
+    best, second, second_at = c[at], -np.inf, 1
+    for i in range(1, len(c) - 1):
+        if c[i] >= c[i - 1] and c[i] > c[i + 1]:
+            height = c[i] - 0.125 * (c[i - 1] - c[i + 1]) ** 2 / (c[i - 1] - 2.0 * c[i] + c[i + 1])
+            if i == at:
+                best = height
+            elif height > second:
+                second, second_at = height, i
+    if second == -np.inf:
+        return at, 1, 0.0
+    return at, second_at, max(second / best, 0.0)
+
+
+@_inlined
+def _own(own, lag):
+    place = min(max(lag * FINE + len(own) // 2, 0.0), len(own) - 1.001)
+    whole = int(place)
+    return own[whole] + (own[whole + 1] - own[whole]) * (place - whole)
+
+
+@_inlined
+def _noise(spectrum, tau, amplitude, template, weight, omega, step, scale):
+    """Sums of W^2 |S|^2 N, plain and by omega squared: N of the residual under a Hann window, edges repeated."""
+    turn, on = complex(np.cos(omega * tau), np.sin(omega * tau)), complex(np.cos(step * tau), np.sin(step * tau))
+    count = len(template)
+    here = spectrum[0] * turn - amplitude * template[0]
+    before = here
+    plain, squared = 0.0, 0.0
+    for k in range(count):
+        after = here
+        if k + 1 < count:
+            turn *= on
+            after = spectrum[k + 1] * turn - amplitude * template[k + 1]
+        r = 0.5 * here - 0.25 * (before + after)
+        s = template[k]
+        each = weight[k] ** 2 * (s.real**2 + s.imag**2) * scale * (r.real**2 + r.imag**2)
+        w = omega + k * step
+        plain += each
+        squared += each * w * w
+        before, here = here, after
+    return plain, squared
+
+
+@_inlined
+def _amplitude(spectrum, tau, template, used, omega, step):
+    turn, on = complex(np.cos(omega * tau), np.sin(omega * tau)), complex(np.cos(step * tau), np.sin(step * tau))
+    product, power = 0.0, 0.0
+    for k in range(len(template)):
+        if used[k] > 0.0:
+            x, s = spectrum[k] * turn, template[k]
+            product += x.real * s.real + x.imag * s.imag
+            power += s.real**2 + s.imag**2
+        turn *= on
+    return product / power
+
+
+@_inlined
+def _strongest_other(c, own, start, height):
+    """Amplitude of the strongest other arrival: what is left of J without the signal's own correlation."""
+    place = start * FINE + len(own) // 2
+    whole = int(place)
+    share, other = place - whole, 0.0
+    for i in range(len(c)):
+        j = whole + i * FINE
+        other = max(other, abs(c[i] / height - own[j] - (own[j + 1] - own[j]) * share))
+    return other
+
+
+@_compiled
+def _rows(piece, bottom, top, spectrum, padded, correlation, low, weights, search, scale, found, status):
+    omega, step, lines = (
+        search.omega[0],
+        search.omega[1] - search.omega[0],
+        slice(search.first, search.first + len(search.omega)),
+    )
+    template, own = search.template, search.own
+    for b in range(len(spectrum)):
+        cross = padded[b, lines]
+        c = correlation[b, low[b] : low[b] + 2 * search.half + 1] * (0.5 * search.stretch)
+        at, second_at, second = _two_peaks(c)
+        lag, height = _refined(cross, at + low[b], omega, step)
+        if second > RIVAL and not np.isnan(lag):
+            again, taller = _refined(cross, second_at + low[b], omega, step)
+            if taller > height:
+                lag, second_at = again, at
+        inside = lag if not np.isnan(lag) else float(at + low[b])
+        height, _, bend = _sums(cross, inside, omega, step)
+        amplitude = _amplitude(spectrum[b], inside, template, search.weight, omega, step)
+        plain, squared = _noise(spectrum[b], inside, amplitude, template, weights[b % len(weights)], omega, step, scale)
+        snr = height**2 / (0.5 * plain)
+        second = second * c[at] / height
+        apart = np.inf
+        if second > 0.0:
+            rho = _own(own, second_at + low[b] - inside)
+            apart = np.sqrt(snr) * (1.0 - second) / np.sqrt(2.0 * max(1.0 - rho, 1e-12))
+        other = _strongest_other(c, own, low[b] - inside, height)
+        damage = _damage(piece[b], bottom, top)
+        status[b] = max(damage, _judged(lag, snr, apart, other, search.least_snr))
+        rival = second if apart < TOLD_APART and second > other else other
+        found[b, 0], found[b, 1], found[b, 2], found[b, 3], found[b, 4] = (
+            lag,
+            0.5 * squared / bend**2,
+            amplitude,
+            snr,
+            rival,
+        )

@@ -1,0 +1,1 @@
+"""Samples to phase: synchronous detection, spectra, zero crossings, kernels."""

@@ -1,0 +1,1 @@
+"""Electronics that drift: reference shots, noise, random walks."""

@@ -1,0 +1,156 @@
+"""Noise against averaging time: the overlapping Allan deviation of a series, what each kind of noise makes of it.
+
+The series y is the reading itself (phase a cycle, range a buffer), equally spaced; averaging m of them, white noise
+falls as m^(-1/2), flicker stays, a random walk grows as m^(1/2). Clocks people call the same thing the deviation of
+fractional frequency, and y is their frequency.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.errors import ValidityError
+
+KINDS = ("white", "flicker", "random walk")
+SLOPES = {"white": -1.0, "flicker": 0.0, "random walk": 1.0}  # of the variance against m, in logarithms
+
+
+@dataclass(frozen=True, eq=False)
+class AllanDeviation:
+    """One element an averaging length.
+
+    size       m, readings averaged
+    deviation  in the unit of the series
+    degrees    equivalent degrees of freedom of its square
+    kind       noise that prevails there, one of KINDS, from the slope about it
+    """
+
+    size: NDArray[np.int64]
+    deviation: NDArray[np.float64]
+    degrees: NDArray[np.float64]
+    kind: tuple[str, ...]
+
+    def interval(self, probability: float = 0.95) -> NDArray[np.float64]:
+        """(sizes, 2): limits that hold the true deviation with that probability, chi-square with `degrees`."""
+        from scipy.stats import chi2
+
+        tail = 0.5 * (1.0 - probability)
+        quantiles = chi2.ppf(np.array([1.0 - tail, tail]), self.degrees[:, None])
+        return self.deviation[:, None] * np.sqrt(self.degrees[:, None] / quantiles)
+
+
+def octaves(count: int) -> NDArray[np.int64]:
+    """Averaging lengths 1, 2, 4, ... of which a series of `count` readings holds at least four.
+
+    >>> octaves(40).tolist()
+    [1, 2, 4, 8]
+    """
+    if count < 4:
+        raise ValidityError(f"{count} readings show no noise against averaging (expected at least 4)")
+    return 2 ** np.arange(int(np.log2(count // 4)) + 1)
+
+
+def allan_deviation(series: ArrayLike, sizes: ArrayLike | None = None) -> AllanDeviation:
+    """Overlapping Allan deviation: rms difference of neighbouring averages of m readings, over the square root of 2.
+
+    series   (n,) readings at equal intervals, any unit, none missing, n at least 4; phases unwrapped
+    sizes    m, whole numbers of 1 to n/2 (default `octaves(n)`)
+
+    Raises ValidityError for a series that is too short or has gaps, or a size that does not fit.
+
+    Source: [RILEY08] eq. 11 (overlapping form) and table 5 (degrees of freedom, by the kind of noise that prevails,
+    good to some 10 %). Exact for the deviation but for rounding.
+
+    >>> float(allan_deviation([1.0, 0.0, 1.0, 0.0, 1.0], [1]).deviation[0]).__round__(6)
+    0.707107
+    """
+    y = np.asarray(series, dtype=float)
+    if y.ndim != 1 or y.size < 4:
+        raise ValidityError(f"a series of shape {y.shape} has no Allan deviation (expected at least 4 readings)")
+    if not np.all(np.isfinite(y)):
+        where = int(np.flatnonzero(~np.isfinite(y))[0])
+        raise ValidityError(f"reading {where} of the series is {y[where]} (expected numbers at equal intervals)")
+    m = octaves(y.size) if sizes is None else np.atleast_1d(np.asarray(sizes))
+    if np.any(m != np.rint(m)) or np.any(m < 1) or np.any(2 * m > y.size):
+        raise ValidityError(f"averaging lengths {m.tolist()} are not whole numbers of 1 to {y.size // 2}")
+    m = m.astype(np.int64)
+    sums = np.concatenate([[0.0], np.cumsum(y - y.mean())])  # the mean does not matter, but its digits would
+    variance = np.array([_variance(sums, int(size)) for size in m])
+    kind = _prevailing(m, variance)
+    degrees = np.array([_degrees(k, y.size + 1, int(size)) for k, size in zip(kind, m, strict=True)])
+    return AllanDeviation(m, np.sqrt(variance), degrees, kind)
+
+
+def expected_variance(size: ArrayLike, *, white: float = 0.0, flicker: float = 0.0, walk: float = 0.0) -> NDArray:
+    """Allan variance that a mixture of noises makes of averages of m readings.
+
+    size      m, readings averaged
+    white     standard deviation of a reading
+    flicker   square root of the coefficient h of a one-sided density h/f; f any unit
+    walk      standard deviation of a step from one reading to the next
+
+    Source: [RILEY08] table 3: white^2/m + 2 ln 2 flicker^2 + walk^2 m/3 for large m. Here exact for readings that are
+    points: a walk in steps gives walk^2 (2 m^2 + 1)/(6 m), and flicker of the density pi h / sin(pi v) (see
+    `catseye.signal.drift.noise`) 2 h at m = 1, within 2 % of 2 ln 2 h from m = 8 on; its integral by quadrature.
+
+    >>> float(expected_variance(1, walk=1.0)), round(float(expected_variance(1, flicker=1.0)), 9)
+    (0.5, 2.0)
+    """
+    m = np.asarray(size, dtype=float)
+    return white**2 / m + flicker**2 * _flicker_variance(m) + walk**2 * (2.0 * m**2 + 1.0) / (6.0 * m)
+
+
+def _flicker_variance(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integral of (pi / sin x) 2 sin(m x)^4 / (m sin x)^2 over frequency, x = pi v up to a right angle."""
+    x, w = np.polynomial.legendre.leggauss(16)
+    found = np.empty(sizes.shape)
+    for k, m in np.ndenumerate(sizes):
+        edges = np.linspace(0.0, 0.5, int(m) + 1)  # half a wave of sin(m x) to a piece
+        v = (edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + x)).ravel()
+        weight = np.tile(0.25 * w / m, int(m))
+        found[k] = np.sum(weight * 2.0 * np.pi * np.sin(m * np.pi * v) ** 4 / (m**2 * np.sin(np.pi * v) ** 3))
+    return found
+
+
+def spur_variance(size: ArrayLike, *, amplitude: float, cycles_per_reading: float) -> NDArray:
+    """Allan variance that a sine makes of averages of m readings.
+
+    size                 m, readings averaged
+    amplitude            of the sine, unit of the series
+    cycles_per_reading   its frequency times the interval, 0 to 0.5
+
+    Source: [RILEY08] 6.2 has A^2 sin^4(x)/x^2 with x = pi f m tau; here the readings are points, not averages
+    themselves, so that x becomes m sin(pi f tau). Exact for a long series.
+
+    >>> round(float(spur_variance(1, amplitude=1.0, cycles_per_reading=0.5)), 6)
+    1.0
+    """
+    turn = np.pi * cycles_per_reading
+    m = np.asarray(size, dtype=float)
+    return (amplitude * np.sin(m * turn) ** 2 / (m * np.sin(turn))) ** 2
+
+
+def _variance(sums: NDArray[np.float64], m: int) -> float:
+    second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+    return float(np.mean(second**2) / (2.0 * m**2))
+
+
+def _prevailing(m: NDArray[np.int64], variance: NDArray[np.float64]) -> tuple[str, ...]:
+    """The kind of noise whose slope is nearest to that of the variance about each length."""
+    if len(m) < 2 or np.any(variance <= 0.0):
+        return ("white",) * len(m)
+    slope = np.gradient(np.log(variance), np.log(m.astype(float)))
+    return tuple(min(KINDS, key=lambda kind: abs(SLOPES[kind] - s)) for s in slope)
+
+
+def _degrees(kind: str, points: int, m: int) -> float:
+    """Equivalent degrees of freedom of an overlapping variance; `points` is one more than the readings."""
+    n = float(points)
+    if kind == "white":
+        found = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
+    elif kind == "flicker":
+        found = 2.0 * (n - 2.0) ** 2 / (2.3 * n - 4.9) if m == 1 else 5.0 * n**2 / (4.0 * m * (n + 3.0 * m))
+    else:
+        found = (n - 2.0) / m * ((n - 1.0) ** 2 - 3.0 * m * (n - 1.0) + 4.0 * m**2) / (n - 3.0) ** 2
+    return max(found, 1.0)

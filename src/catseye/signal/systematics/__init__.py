@@ -1,0 +1,1 @@
+"""Known ways in which a phase lies: leakage, cyclic terms, many paths, amplitude."""

@@ -1,0 +1,241 @@
+"""Cyclic deviation: what a range reads too long, as a wave of the phase itself; where it comes from; its estimation.
+
+x is the phase after the electronics', in radians, as measured. It falls by 2 pi for each half wavelength of distance.
+A phase read too high by d is a range read too long by -d wavelength/(4 pi).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from catseye.constants import TWO_PI
+from catseye.errors import EstimationError, ValidityError
+from catseye.signal.systematics.columns import Columns, fit_columns
+
+WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty against phases spread evenly over the circle
+
+Array = NDArray[np.float64]
+
+
+def cyclic_range(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> Array:
+    """Metres that a range reads too long: sum over k of cosine[k-1] cos(k x) + sine[k-1] sin(k x).
+
+    phase_fraction   (...) rad, x, phase after the electronics'; any turn
+    cosine, sine     (K,) m each, orders 1 to K; empty for none
+
+    Raises ValidityError where cosine and sine differ in length.
+
+    Source: a Fourier series; order 1 is what [RUEGER90] treats as the cyclic error of EDM. A definition: exact.
+
+    >>> round(float(cyclic_range(np.pi / 2, [0.0, 2e-6], [5e-6, 0.0])), 9)
+    3e-06
+    """
+    c, s = _coefficients(cosine, sine)
+    return cyclic_design(phase_fraction, len(c)) @ np.concatenate([c, s])
+
+
+def cyclic_slope(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> Array:
+    """Derivative of `cyclic_range` by x, in metres a radian.
+
+    phase_fraction   (...) rad, x
+    cosine, sine     (K,) m each
+
+    Raises ValidityError where cosine and sine differ in length.
+
+    >>> float(cyclic_slope(0.0, [1e-6], [3e-6]))
+    3e-06
+    """
+    c, s = _coefficients(cosine, sine)
+    k = np.arange(1, len(c) + 1)
+    return cyclic_design(phase_fraction, len(c)) @ np.concatenate([k * s, -k * c])
+
+
+def cyclic_design(phase_fraction: ArrayLike, orders: int | Sequence[int]) -> Array:
+    """Derivatives of `cyclic_range` by its coefficients: cosines of all orders first, then sines; (..., 2K).
+
+    phase_fraction   (...) rad, x
+    orders           K for orders 1 to K, or the orders themselves, each at least 1
+
+    Raises ValidityError for an order that is not a whole number above 0.
+
+    >>> cyclic_design(0.0, 2).tolist()
+    [1.0, 1.0, 0.0, 0.0]
+    """
+    angle = np.asarray(phase_fraction, dtype=float)[..., None] * _orders(orders)
+    return np.concatenate([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def leakage_range(phase_fraction: ArrayLike, relative_leakage: ArrayLike, wavelength: ArrayLike) -> Array:
+    """Metres read too long because of a leakage that was not subtracted, as a wave of the measured phase.
+
+    phase_fraction     rad, x, of light and leakage together
+    relative_leakage   complex, leakage phasor over the light's amplitude, turned back by the electronics' phase;
+                       magnitude below 1
+    wavelength         m, the modulation's group wavelength in air
+
+    The sine rule in the triangle of light, leakage and their sum gives x - x_light = arcsin(r sin(a - x)), a the angle
+    of the leakage. It has odd orders only: 1 with r wavelength/(4 pi), 3 with r^3/24 in place of r. As a wave of the
+    light's own phase the same deviation has every order k with r^k/k. What the leakage does to the reference is one
+    constant, not contained here.
+
+    Raises ValidityError where the leakage is not smaller than the light.
+
+    Source: [PARKER04] sec. 5.2.1 asks for it; derived here. Exact.
+
+    >>> f"{float(leakage_range(0.0, 0.001j, 0.2)):.3e}"
+    '-1.592e-05'
+    """
+    leakage = np.asarray(relative_leakage, dtype=complex)
+    if np.any(np.abs(leakage) >= 1.0):
+        raise ValidityError(f"leakage of {np.abs(leakage).max():.3g} of the light is not below 1: it rules the phase")
+    turned = leakage * np.exp(-1j * np.asarray(phase_fraction, dtype=float))
+    return -np.arcsin(turned.imag) * np.asarray(wavelength, dtype=float) / (2.0 * TWO_PI)
+
+
+def imbalance_range(phase_fraction: ArrayLike, *, gain: ArrayLike, skew: ArrayLike, wavelength: ArrayLike) -> Array:
+    """Metres read too long where sine and cosine channel are not alike: cos x and (1 + gain) sin(x + skew).
+
+    phase_fraction   rad, x, as measured by these two channels
+    gain             of the sine channel over the cosine channel, less 1; above -1
+    skew             rad, departure from quadrature, magnitude below pi/2
+    wavelength       m, the modulation's group wavelength in air
+
+    To first order the phase reads (gain/2) sin 2x + (skew/2)(1 + cos 2x) too high: order 2, and a constant that the
+    reference shares. The notes' instrument takes both channels from one converter and has none of this; an analogue
+    detector of both quadratures, or an image frequency in the mixer, has.
+
+    Raises ValidityError outside these limits.
+
+    Source: derived here by solving both channels for x. Exact.
+
+    >>> f"{float(imbalance_range(np.pi / 4, gain=0.001, skew=0.0, wavelength=0.2)):.2e}"
+    '-7.95e-06'
+    """
+    g, e = np.asarray(gain, dtype=float), np.asarray(skew, dtype=float)
+    if np.any(g <= -1.0) or np.any(np.abs(e) >= np.pi / 2):
+        raise ValidityError(
+            f"gain {g.min():.3g} (above -1) or skew {np.abs(e).max():.3g} rad (below pi/2) is no channel"
+        )
+    x = np.asarray(phase_fraction, dtype=float)
+    true = np.arctan2(np.sin(x) / (1.0 + g) - np.cos(x) * np.sin(e), np.cos(x) * np.cos(e))
+    excess = np.angle(np.exp(1j * (x - true)))
+    return -excess * np.asarray(wavelength, dtype=float) / (2.0 * TWO_PI)
+
+
+def cyclic_orders(curve: ArrayLike, orders: int) -> tuple[float, Array, Array]:
+    """Mean, cosine and sine coefficients of a deviation given at x = 2 pi j/n, j = 0 to n - 1.
+
+    curve    (n,) m
+    orders   K, below n/2
+
+    Raises ValidityError where n points do not tell K orders.
+
+    >>> x = 2 * np.pi * np.arange(8) / 8
+    >>> mean, cosine, sine = cyclic_orders(1.0 + 3.0 * np.sin(2 * x), 2)
+    >>> round(float(sine[1]), 12)
+    3.0
+    """
+    y = np.asarray(curve, dtype=float)
+    if y.ndim != 1 or not 0 < orders < y.size / 2:
+        raise ValidityError(f"{y.size} points of a cycle do not tell {orders} orders (expected more than two an order)")
+    spectrum = np.fft.rfft(y)[: orders + 1] * (2.0 / y.size)
+    return 0.5 * float(spectrum[0].real), spectrum[1:].real, -spectrum[1:].imag
+
+
+@dataclass(frozen=True, eq=False)
+class Separability:
+    """Which orders given phases tell apart.
+
+    orders      those that can be estimated together, the lowest first
+    inflation   (K,) of orders 1 to K: standard uncertainty of the order's worse coefficient, with the orders before it,
+                over that of phases spread evenly, sigma sqrt(2/n); infinite where it is not defined, or not asked
+    condition   of the kept columns, each scaled to one length
+    """
+
+    orders: tuple[int, ...]
+    inflation: Array
+    condition: float
+
+
+def separable_orders(
+    phase_fraction: ArrayLike, orders: int, *, others: ArrayLike | None = None, worst: float = WORST_INFLATION
+) -> Separability:
+    """Orders that phases tell from each other and from what else is estimated with them.
+
+    phase_fraction   (n,) rad
+    orders           K, the highest order asked for
+    others           (n, q) columns estimated besides: by default one, the constant
+    worst            inflation of any coefficient's standard uncertainty beyond which an order is left out
+
+    Orders are added until any coefficient goes beyond `worst`; none is kept above one that is not, which would be taken
+    for it. A rail of less than a half wavelength does not tell order 1 from a constant; phases at 2 pi j/n do not tell
+    order k from n - k.
+
+    Raises ValidityError for orders below 0.
+
+    >>> separable_orders(np.arange(5) * 2 * np.pi / 5, 3).orders
+    (1, 2)
+    """
+    x = np.asarray(phase_fraction, dtype=float)
+    beside = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
+    kept: tuple[int, ...] = ()
+    inflation = np.full(len(_orders(orders)), np.inf)
+    for order in range(1, orders + 1):
+        trial = (*kept, order)
+        design = np.concatenate([cyclic_design(x, trial), beside], axis=1)
+        try:
+            u = fit_columns(design, np.zeros(len(x)), np.sqrt(len(x) / 2.0)).u
+        except EstimationError:
+            break
+        k = len(trial)
+        inflation[order - 1] = max(u[k - 1], u[2 * k - 1])
+        if max(u[: 2 * k]) > worst:
+            break
+        kept = trial
+    columns = np.concatenate([cyclic_design(x, kept) if kept else np.empty((len(x), 0)), beside], axis=1)
+    return Separability(kept, inflation, float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))))
+
+
+def fit_cyclic(
+    phase_fraction: ArrayLike,
+    deviation: ArrayLike,
+    spread: ArrayLike,
+    *,
+    orders: int,
+    others: ArrayLike | None = None,
+) -> tuple[Array, Array, Columns]:
+    """Cosine and sine coefficients (K,) of a range's deviation, and the whole fit: cosines, sines, then the others.
+
+    phase_fraction   (n,) rad, x
+    deviation        (n,) m, range less what is held for true
+    spread           m, standard uncertainty, one number or (n,); or the covariance (n, n), m^2
+    orders           K
+    others           (n, q) columns estimated besides: by default one, the constant
+
+    Raises EstimationError where the phases do not tell the orders apart: see `separable_orders`.
+
+    >>> x = np.linspace(0.0, 6.0, 20)
+    >>> cosine, sine, fit = fit_cyclic(x, cyclic_range(x, [4e-6], [1e-6]) + 1e-4, 1e-6, orders=1)
+    >>> f"{cosine[0]:.2e} {sine[0]:.2e} {fit.coefficient[2]:.2e}"
+    '4.00e-06 1.00e-06 1.00e-04'
+    """
+    x = np.asarray(phase_fraction, dtype=float)
+    beside = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
+    fit = fit_columns(np.concatenate([cyclic_design(x, orders), beside], axis=1), deviation, spread)
+    return fit.coefficient[:orders], fit.coefficient[orders : 2 * orders], fit
+
+
+def _coefficients(cosine: ArrayLike, sine: ArrayLike) -> tuple[Array, Array]:
+    c, s = np.atleast_1d(np.asarray(cosine, dtype=float)), np.atleast_1d(np.asarray(sine, dtype=float))
+    if c.shape != s.shape or c.ndim != 1:
+        raise ValidityError(f"{c.size} cosine and {s.size} sine coefficients do not pair (expected as many of each)")
+    return c, s
+
+
+def _orders(orders: int | Sequence[int]) -> NDArray[np.int64]:
+    given = np.arange(1, orders + 1) if isinstance(orders, int | np.integer) else np.asarray(orders, dtype=np.int64)
+    if np.any(given < 1) or (isinstance(orders, int | np.integer) and orders < 0):
+        raise ValidityError(f"orders {orders} of a cyclic deviation are not whole numbers of at least 1")
+    return given

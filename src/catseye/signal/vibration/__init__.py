@@ -1,0 +1,1 @@
+"""Shaking: spectra, modes, a filter that foretells."""

@@ -1,0 +1,125 @@
+"""Further paths against waveforms added up sample by sample, and against bounds."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from catseye.errors import ValidityError
+from catseye.signal.detection.phase import detect
+from catseye.signal.systematics.cyclic import cyclic_orders, cyclic_range
+from catseye.signal.systematics.multipath import (
+    cats_eye_cyclic,
+    cats_eye_error,
+    largest_share,
+    multipath_error,
+    share_a_pass,
+    two_retroreflectors,
+)
+
+WAVELENGTH = 0.199811  # m, 1500 MHz in air
+HALF = WAVELENGTH / 2
+SPEED, FREQUENCY = WAVELENGTH * 1.5e9, 1.5e9
+
+
+def measured(path, shares, excess):
+    """Range that the converter's samples of all returns together give, less path.
+
+    An oscillator above the carrier mixes them down to an intermediate frequency: the phase then falls with the delay.
+    """
+    n, m = 64, 2
+    t = np.arange(n * m) / n  # in cycles of the intermediate frequency
+    samples = np.zeros(n * m)
+    for share, detour in zip([1.0, *shares], [0.0, *excess], strict=True):
+        delay = (2 * path + detour) / SPEED
+        samples += share * np.cos(2 * np.pi * (t + FREQUENCY * delay))  # of (f + IF) - f, delayed at f
+    phase = float(detect(samples, n).phase)
+    cycles = np.round(path / HALF + phase / (2 * np.pi))
+    return (cycles - phase / (2 * np.pi)) * HALF - path
+
+
+@pytest.mark.parametrize("path", [0.18, 10.013, 100.0, 100.03])
+@pytest.mark.parametrize(
+    ("shares", "excess"), [([0.01], [0.05]), ([0.01], [0.31]), ([0.2, 0.1, 0.05], [0.02, 0.13, 7.7])]
+)
+def test_it_is_what_the_samples_of_all_returns_give(path, shares, excess):
+    # rounding of 1e9 cycles a second times microseconds: 1e-13 cycles of 0.1 m, and 100 m of path
+    assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(
+        measured(path, shares, excess), abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("path", [0.18, 60.02, 100.045])
+def test_the_cats_eye_is_a_series_of_rounds(path):
+    q = 0.1
+    shares, excess = q ** np.arange(1, 17), 2 * path * np.arange(1, 17)
+    expected = measured(path, shares, excess)
+    assert float(cats_eye_error(path, q, WAVELENGTH)) == pytest.approx(expected, abs=1e-12)
+    assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(expected, abs=1e-12)
+
+
+def test_light_that_comes_a_little_later_reads_longer_by_its_mean_delay():
+    # shares 0.1 and 0.2, detours 10 and 40 um: (1 + 8) um/1.3, halved; the next term has the detour's cube
+    assert float(multipath_error([0.1, 0.2], [10e-6, 40e-6], WAVELENGTH)) == pytest.approx(9e-6 / 2.6, rel=1e-6)
+
+
+@given(st.floats(0.0, 0.3), st.floats(-50.0, 50.0))
+def test_a_second_retroreflector_pulls_towards_itself_and_never_beyond_the_bound(share, separation):
+    got = float(two_retroreflectors(share, separation, WAVELENGTH))
+    assert abs(got) <= np.arcsin(share) * WAVELENGTH / (4 * np.pi) + 1e-15
+    away = np.sin(4 * np.pi * separation / WAVELENGTH)
+    assert got * away >= -1e-14  # the sign of the detour's sine: too long where it stands a little further
+    assert float(two_retroreflectors(share, -separation, WAVELENGTH)) == pytest.approx(-got, abs=1e-15)
+
+
+@given(st.floats(0.0, 0.9), st.floats(0.1, 200.0))
+def test_the_cats_eyes_error_repeats_with_half_a_wavelength_and_keeps_its_bound(q, path):
+    got = float(cats_eye_error(path, q, WAVELENGTH))
+    assert abs(got) <= np.arcsin(q) * WAVELENGTH / (4 * np.pi) + 1e-12
+    assert got == pytest.approx(float(cats_eye_error(path + HALF, q, WAVELENGTH)), abs=1e-9 * HALF)
+
+
+def test_the_bound_is_met():
+    path = np.linspace(0.0, HALF, 100_001)
+    worst = np.abs(cats_eye_error(path, 0.3, WAVELENGTH)).max()
+    assert worst == pytest.approx(np.arcsin(0.3) * WAVELENGTH / (4 * np.pi), rel=1e-8)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.02, 0.215])
+def test_the_cats_eye_is_cyclic_in_the_phase(beyond):
+    q, orders = 0.05, 10
+    x = 2 * np.pi * np.arange(64) / 64
+    counted = -x / (2 * np.pi) * HALF  # the phase falls as the distance grows
+    exact = cats_eye_error(5 * HALF + counted + beyond, q, WAVELENGTH)
+    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, beyond=beyond)
+    np.testing.assert_allclose(cyclic_range(x, cosine, sine), exact, rtol=0, atol=q**11 * 0.016)
+    _, c, s = cyclic_orders(exact, 4)
+    np.testing.assert_allclose(np.concatenate([c, s]), [*cosine[:4], *sine[:4]], rtol=0, atol=1e-15)
+
+
+def test_a_share_within_the_limit_keeps_ten_micrometres_and_ten_percent_more_does_not():
+    share = float(largest_share(10e-6, WAVELENGTH))
+    assert share == pytest.approx(4 * np.pi * 10e-6 / WAVELENGTH, rel=1e-6)
+    path = np.linspace(0.0, HALF, 10_001)
+    assert np.abs(cats_eye_error(path, share, WAVELENGTH)).max() <= 10e-6 * (1 + 1e-12)
+    assert np.abs(cats_eye_error(path, 1.1 * share, WAVELENGTH)).max() > 10e-6
+
+
+def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
+    reflectance = float(largest_share(10e-6, WAVELENGTH)) / (0.25 * 0.6 * 0.9)
+    assert float(share_a_pass(reflectance, 0.25, 0.6, 0.9)) == pytest.approx(6.289e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: multipath_error([0.6, 0.5], [0.1, 0.2], 0.2), "sum to 1 or more"),
+        (lambda: multipath_error([-0.1], [0.1], 0.2), "below 0"),
+        (lambda: cats_eye_error(1.0, 1.0, 0.2), "sum to 1 or more"),
+        (lambda: share_a_pass(0.1, 1.2, 0.5), r"recollected part 1\.2 is not within 0 to 1"),
+        (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth wavelength"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(call, message):
+    with pytest.raises(ValidityError, match=message):
+        call()
