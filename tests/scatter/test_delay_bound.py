@@ -1,7 +1,7 @@
 """Arrivals measured many times: at the Cramer-Rao bound where the signal allows it, claimed as they scatter.
 
-The bound is of Fisher's information, from the slope of the signal as a function of time; nothing of `signal.delay` is
-in it. `make test-all` runs 4000 recordings a level, `make test` 300.
+The bound is of Fisher's information, from the slope of the signal as a function of time; nothing of
+`signal.delay.arrival` is in it. `make test-all` runs 4000 recordings a level, `make test` 300.
 """
 
 import numpy as np

@@ -74,7 +74,7 @@ class SiteState:
 
 
 class Clock(Protocol):
-    """UTC, as `simulator.world_clock`."""
+    """UTC, as `simulator.clock.world_clock`."""
 
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
@@ -142,7 +142,7 @@ class EpochJob(Protocol):
 
 
 class LiveReduction(Protocol):
-    """`reduction.live.Live`: pure, and fed in one order."""
+    """`reduction.live.live.Live`: pure, and fed in one order."""
 
     @property
     def failed(self) -> str:

@@ -101,7 +101,7 @@ def steering_range(offset: ArrayLike, distance: ArrayLike) -> Array:
 
     A plane wave along u is at the target after u.R = R cos(offset/R): the range reads short by offset^2 / 2R.
 
-    Source: as for the beam aside in `geometry.mirror_path`. Exact for a plane wave.
+    Source: as for the beam aside in `geometry.mirror.mirror_path`. Exact for a plane wave.
 
     >>> round(float(steering_range(0.00843, 120.0)) * 1e6, 2)
     -0.3

@@ -122,7 +122,7 @@ def test_in_shells_n_r_cos_elevation_is_the_same_at_both_ends():
 
 @pytest.mark.parametrize("k", [0.13, 0.5, -1.0])
 def test_the_velocity_corrections_make_the_chord_of_what_the_ray_shows(k):
-    """`atmosphere.velocity`, index of the ends: its second correction and its arc to chord, against this ray."""
+    """`atmosphere.sound.velocity`, index of the ends: its second correction and its arc to chord, against this ray."""
     d = 20_000.0
     drop = EARTH_RADIUS - np.sqrt(EARTH_RADIUS**2 - d**2 / 4)  # ends on one level surface, the chord's middle below it
     ends = np.array([[-d / 2, 0.0, -drop], [d / 2, 0.0, -drop]])

@@ -62,7 +62,7 @@ def rows_of(entry: Any) -> Iterable[tuple[str, Row]]:
 
 
 def _of_solution(entry: Solution) -> Iterable[tuple[str, Row]]:
-    """Of an epoch's answer as `reduction.live` gives it; what it does not have is `none`."""
+    """Of an epoch's answer as `reduction.live.live` gives it; what it does not have is `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     names, places = answer.get("names") or [], answer.get("x") or []
     epoch = _number(answer.get("number"))

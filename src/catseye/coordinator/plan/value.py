@@ -1,9 +1,9 @@
 """What a range is worth: by how much it lowers the variances of the point that it leads to.
 
 A range of standard uncertainty s along the unit vector e to a point of covariance P lowers its trace by
-|P e|^2 / (s^2 + e'P e): the update of information, one range at a time, as `estimation.plan.schedule` does it for whole
-networks. The ranger's own covariance along e counts to s^2. Points are taken one by one, their correlations left out:
-a plan needs the order, not the figure.
+|P e|^2 / (s^2 + e'P e): the update of information, one range at a time, as `estimation.network.plan.schedule` does it
+for whole networks. The ranger's own covariance along e counts to s^2. Points are taken one by one, their correlations
+left out: a plan needs the order, not the figure.
 """
 
 from dataclasses import dataclass

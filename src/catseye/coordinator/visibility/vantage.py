@@ -86,8 +86,8 @@ class Vantage:
 
 @dataclass(frozen=True, eq=False)
 class Retro:
-    """A retroreflector: kind as in `reduction.visibility.ACCEPTANCE`; point (3,) m and outward axis (3,), NaN where
-    unknown, in its frame; u m of each coordinate; what it is `part` of.
+    """A retroreflector: kind as in `reduction.steering.visibility.ACCEPTANCE`; point (3,) m and outward axis (3,), NaN
+    where unknown, in its frame; u m of each coordinate; what it is `part` of.
     """
 
     name: str

@@ -53,7 +53,7 @@ def calibration_object(found: Calibration) -> dict[str, Any]:
 
 
 def calibration_toml(found: Calibration) -> str:
-    """A calibration as its record: RECORD.toml, which `records.calibration.CalibrationRecord` reads back."""
+    """A calibration as its record: RECORD.toml, which `records.laboratory.calibration.CalibrationRecord` reads back."""
     said = found.provenance
     head = {
         "kind": found.kind,

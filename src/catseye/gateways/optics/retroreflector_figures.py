@@ -60,7 +60,8 @@ def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, An
 
     dimensions   of the targets; the GBT's if None
 
-    Source: `optics.hollow_cube`, `solid_prism`, `cats_eye`. Raises ValidityError for sizes that are none.
+    Source: `optics.retroreflector.hollow_cube`, `solid_prism`, `cats_eye`. Raises ValidityError for sizes that are
+    none.
     """
     given = Dimensions() if dimensions is None else dimensions
     hollow, solid, ball = given.targets()
@@ -104,7 +105,7 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
     dimensions    of the ball; the memo's if None
     beam_radius   m, above 0: at 1/e^2, of the beam at the ball
 
-    Source: `optics.cats_eye`, exact rays. Raises ValidityError for sizes that are none.
+    Source: `optics.retroreflector.cats_eye`, exact rays. Raises ValidityError for sizes that are none.
     """
     if not 0.0 < beam_radius < np.inf:
         raise ValidityError(f"beam_radius = {beam_radius:g} m is not above 0 and finite")

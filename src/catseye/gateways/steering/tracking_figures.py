@@ -24,7 +24,7 @@ def miss_figure(track: Track, misses: np.ndarray, shares: np.ndarray, limit: flo
     """SVG: how far the beams pass their targets, over the track; the worst pair, the median, and the limit.
 
     track     that was followed
-    misses    (s, k, r, p) m, of `reduction.tracking.misses`
+    misses    (s, k, r, p) m, of `reduction.steering.tracking.misses`
     shares    (k,) of each interval
     limit     m, drawn as a line
     """
@@ -50,7 +50,7 @@ def miss_figure(track: Track, misses: np.ndarray, shares: np.ndarray, limit: flo
 def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> str:
     """SVG: the places that a search looked at, in order, coloured by what came back, and the spot's centre if found.
 
-    spot     of `reduction.finding.find`
+    spot     of `reduction.steering.finding.find`
     zeros    (na0, ne0) counts, for the size of counts on the sky: the picture is as the sky is
     title    instead of the status
     """

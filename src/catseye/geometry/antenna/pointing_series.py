@@ -4,7 +4,7 @@
     dE       = -IE - AW sin A + AN cos A + HZCZ sin E + HZSZ cos E
 
 A and E are azimuth, clockwise from north, and elevation; (dA, dE) is what is added to a direction on the sky to give
-the encoders' (the correction that `reduction.live_pose` calls so), and minus the offset of the beam. With it
+the encoders' (the correction that `reduction.live.pose` calls so), and minus the offset of the beam. With it
 
     IA     the azimuth encoder reads too much                    IE     the elevation encoder reads too little
     CA     the beam lies to the left of square to the elevation axis

@@ -52,7 +52,7 @@ UMicroseconds = Annotated[float, Within(0, 1e5)]
 
 
 class Signal(Record):
-    """The known signal, as `signal.waveform` makes it.
+    """The known signal, as `signal.delay.waveform` makes it.
 
     kind                                      "chirp", "pulse" or "mls"
     start_hz, stop_hz, duration_s, taper      of a chirp
@@ -86,7 +86,7 @@ class Signal(Record):
 
     @property
     def values(self) -> dict[str, float]:
-        """What `signal.waveform.sampled` takes beside the kind."""
+        """What `signal.delay.waveform.sampled` takes beside the kind."""
         given = {"duration" if name == "duration_s" else name: value for name, value in self if name != "kind"}
         return {name: value for name, value in given.items() if value is not None}
 

@@ -40,7 +40,7 @@ class Laser(Record):
     quality_*                M^2
     polarization             along which axis the field lies; behind an isolator it is turned by 45 degrees
     back_reflection          share of the emitted power that comes back to the isolator, from all there is
-    regulation_rad           phase for each unit of relative change of the power; see `signal.feedback`
+    regulation_rad           phase for each unit of relative change of the power; see `signal.systematics.feedback`
     """
 
     power_mw: Annotated[float, Within(1e-6, 1e5)]

@@ -1,6 +1,6 @@
 """Temperature of the air along a path from travel times of sound, and the index of light along the same path.
 
-Two directions at once give the wind and take it out (`atmosphere.sound_path`); one needs a wind from elsewhere. What is
+Two directions at once give the wind and take it out (`atmosphere.sound.path`); one needs a wind from elsewhere. What is
 common to all measurements of a path is kept common: its length, the delay of loudspeaker and microphone, the station's
 pressure and humidity, the crosswind, the bend of the ray, the formula itself. Only times are noise.
 """
@@ -96,15 +96,15 @@ def path_temperatures(
     wind, u_wind         m/s along the path, positive from A to B: needed with one direction, refused with two
     speed_gradient       1/s across the path, with u_speed_gradient: rays bend and arrive early (`bent_ray_excess`)
     co2_ppm, u_co2_ppm   carbon dioxide
-    frequency_hz         of the sound: air's dispersion is taken off (`atmosphere.sound_dispersion`)
-    model                a name in `atmosphere.sound.MODELS`
+    frequency_hz         of the sound: air's dispersion is taken off (`atmosphere.sound.dispersion`)
+    model                a name in `atmosphere.sound.speed.MODELS`
     wavelength_um        of the light whose group refractivity is wanted
-    air_model            a name in `atmosphere.air.MODELS`
+    air_model            a name in `atmosphere.index.air.MODELS`
 
     Relative humidity is held where temperature is sought, and where its uncertainty is carried on: a humidity read 1 %
     too high at 20 °C lowers the temperature by 0.022 °C and so raises the index by more than it lowers it directly.
 
-    Source: [PARKER04] eqs. 4.6 and 4.7 with the erratum of `atmosphere.sound_parker2004`; [JCGM100] eq. 13.
+    Source: [PARKER04] eqs. 4.6 and 4.7 with the erratum of `atmosphere.sound.parker2004`; [JCGM100] eq. 13.
     Raises ValidityError for weather, lengths and uncertainties outside their limits; a bad time is a status.
 
     >>> found = path_temperatures(

@@ -1,9 +1,9 @@
 """Temperature and wind between loudspeakers and microphones at known places, and the index along a laser's path there.
 
 Each travel time is the mean of the temperature along its path plus what the wind carries, over the derivative of the
-speed by the temperature (`estimation.tomography`). Places, delay, pressure, humidity and the formula's own departure
-are parameters with priors that all paths share. What is not taken off: variances along a path, 0.003 °C for 1 K rms and
-0.007 °C for 1 m/s rms (`atmosphere.sound_path`), and bent rays.
+speed by the temperature (`estimation.shapes.tomography`). Places, delay, pressure, humidity and the formula's own
+departure are parameters with priors that all paths share. What is not taken off: variances along a path, 0.003 °C for 1
+K rms and 0.007 °C for 1 m/s rms (`atmosphere.sound.path`), and bent rays.
 """
 
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ class SoundField:
 
         start, end      (t, 3) or (3,), m
         wavelength_um   of the light
-        air_model       a name in `atmosphere.air.MODELS`
+        air_model       a name in `atmosphere.index.air.MODELS`
 
         Pressure and humidity are one for all lines, those of the station as the sound has corrected them.
         """
@@ -168,9 +168,9 @@ def sound_field(
     wind                 prior of each component of the wind, m/s, expected 0; None for still air
     co2_ppm, u_co2_ppm   carbon dioxide
     frequency_hz         of the sound: air's dispersion is taken off, a share of it is uncertain
-    model                a name in `atmosphere.sound.MODELS`
+    model                a name in `atmosphere.sound.speed.MODELS`
 
-    Source: exact geometry of `atmosphere.sound_path`, [TARANTOLA05] for the estimate; linearised about each path's own
+    Source: exact geometry of `atmosphere.sound.path`, [TARANTOLA05] for the estimate; linearised about each path's own
     temperature and wind, again until nothing changes. Raises ValidityError for weather and shapes, EstimationError
     where no time is left, or where temperature and wind do not settle.
     """

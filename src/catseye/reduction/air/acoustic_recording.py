@@ -109,8 +109,8 @@ def reduce_acoustic(
 
     files       .wav or .csv
     sheet       of all of them; None: each file's own, its name with .toml
-    model       formula of the speed of sound, a name in `atmosphere.sound.MODELS`
-    air_model   formula of the index, a name in `atmosphere.air.MODELS`
+    model       formula of the speed of sound, a name in `atmosphere.sound.speed.MODELS`
+    air_model   formula of the index, a name in `atmosphere.index.air.MODELS`
 
     Raises InputError, one line with file, place, value and what was expected; a bad shot is a status.
     """

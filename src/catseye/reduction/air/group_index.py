@@ -147,7 +147,7 @@ def absolute_group_index(
     At 100 m and 1500 MHz a whole cycle is 1000 ppm of index: the length decides, the weather hardly matters. The same
     length error then is in every index of the path; 0.1 mm in 100 m is 1 ppm.
 
-    Source: [PARKER04] eq. 1.31 with the sign of 5.18; rule of `signal.cycles.decision`; [JCGM100] eq. 10.
+    Source: [PARKER04] eq. 1.31 with the sign of 5.18; rule of `signal.cycles.whole.decision`; [JCGM100] eq. 10.
 
     >>> sure = {"u_path_length": 2e-5, "u_expected_index": 1e-6, "u_phase": 1e-3}
     >>> found = absolute_group_index(1.0, path_length=100.0, expected_index=1.00025, **sure)

@@ -1,10 +1,10 @@
 """The index of a campaign's paths from its weather stations: a profile in height and time, with full covariance.
 
-`AirField` of `reduction.air` is the campaign's own air, a line in height and a mean over minutes, whose thermometer
-offsets the adjustment estimates. This is the independent one: no range enters, and what it does not know is in its
-covariance. On night-01, with the same formula, this one's paths are 0.13 ppm above AirField's in the mean and 0.31 ppm
-at most: with two heights it cannot tell a lapse from a layer at the ground, and gives each its share where the other
-takes a line. It claims 0.63 ppm a path, 0.57 ppm of that common to all (`tests/reduction/air/test_path_air.py`).
+`AirField` of `reduction.epoch.air` is the campaign's own air, a line in height and a mean over minutes, whose
+thermometer offsets the adjustment estimates. This is the independent one: no range enters, and what it does not know is
+in its covariance. On night-01, with the same formula, this one's paths are 0.13 ppm above AirField's in the mean and
+0.31 ppm at most: with two heights it cannot tell a lapse from a layer at the ground, and gives each its share where the
+other takes a line. It claims 0.63 ppm a path, 0.57 ppm of that common to all (`tests/reduction/air/test_path_air.py`).
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ FIELDS = (("temperature", "C"), ("pressure", "hPa"), ("humidity", "%"))
 class SiteAir:
     """The air of a site over the time of its weather table.
 
-    profile     see `atmosphere.air_profile`
+    profile     see `atmosphere.path.air_profile`
     stations    names, in the order of the profile's numbers
     start_mjd   UTC of second zero
     block       s, readings were averaged over; 0 where each counts by itself
@@ -82,8 +82,8 @@ def site_air(
     temperature, pressure, humidity   priors
 
     Wild readings and lying stations are named in `notes`; nothing is left out that was not asked for.
-    Source: recipe; the model is `atmosphere.profile`'s. Raises InputError for a name that is no station and where no
-    station is left.
+    Source: recipe; the model is `atmosphere.path.profile`'s. Raises InputError for a name that is no station and where
+    no station is left.
     """
     readings = site_readings(site, weather, without)
     start = float(weather.mjd_utc.min())

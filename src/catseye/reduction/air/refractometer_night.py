@@ -294,7 +294,7 @@ def follow_phase(readings: PathReadings, weather: PathWeather) -> FollowedPhase:
     either side, six times what such medians usually differ by, and at least half of it sudden: air that slowly leaves
     the thermometers' is no jump. A step of a whole number of turns cannot be seen.
 
-    Source: [PARKER04] section 1.6; the rule is that of `signal.cycles`: the nearest integer with a margin.
+    Source: [PARKER04] section 1.6; the rule is that of `signal.cycles.whole`: the nearest integer with a margin.
     """
     sheet, hours = readings.sheet, readings.hours
     slope = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))

@@ -106,10 +106,10 @@ def air_by(
     u_temperature_c   standard uncertainty of the temperature, °C; it reaches the index by the density and by the vapour
     u_pressure_hpa    of the pressure, hPa
     u_co2_ppm         of the carbon dioxide, ppm
-    others            as of `atmosphere.air.air`
+    others            as of `atmosphere.index.air.air`
 
     Raises ValidityError for what cannot be.
-    Source: [JCGM100] eq. 10; the instruments' equations are in `atmosphere.hygrometer`.
+    Source: [JCGM100] eq. 10; the instruments' equations are in `atmosphere.index.hygrometer`.
 
     >>> found, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), model="rueger1990")
     >>> round(float(found.humidity_percent), 2), round(float(u) * 1e6, 4)

@@ -61,7 +61,7 @@ def resolve_cycles(
     Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
     Raises EstimationError where the safe shots alone find no answer.
 
-    Source: the law of `signal.cycles`; search by [TEUNISSEN95], see `estimation.ambiguity`.
+    Source: the law of `signal.cycles.whole`; search by [TEUNISSEN95], see `estimation.ambiguity.search`.
     """
     network = build_network(campaign, phases, electronics, settings, motion=motion)
     doubtful = doubtful_points(network)

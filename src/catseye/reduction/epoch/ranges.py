@@ -88,7 +88,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
 
     A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
     leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
-    changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see `signal.buffers`.
+    changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see
+    `signal.detection.buffers`.
     """
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
@@ -113,7 +114,8 @@ def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | 
 
 @dataclass(frozen=True, eq=False)
 class Detected:
-    """What synchronous detection found in n buffers, leakage still in it; fields as in `signal.phase.Detection`.
+    """What synchronous detection found in n buffers, leakage still in it; fields as in
+    `signal.detection.phase.Detection`.
 
     wrong   why a buffer's samples cannot be believed, "" where they can
     """

@@ -2,11 +2,12 @@
 
 Poses are in the reflector frame: x along rising azimuth, z along the beam, y downwards at low elevation. A small turn w
 of the dish moves the beam by w x z: azimuth times cos E by w_y, elevation by w_x. What then moves against the dish adds
-by the tilt of its wavefront (`geometry.beam_deviation`): azimuth by the slope towards x, elevation by minus that
-towards y. For a feed at the prime focus the shallow dish's -d/f is the plate scale; the beam deviation factor is what
-an aperture of this depth and offset makes of it, 0.77 across and 0.55 in the plane of symmetry of 100 m at f = 60 m.
+by the tilt of its wavefront (`geometry.antenna.beam_deviation`): azimuth by the slope towards x, elevation by minus
+that towards y. For a feed at the prime focus the shallow dish's -d/f is the plate scale; the beam deviation factor is
+what an aperture of this depth and offset makes of it, 0.77 across and 0.55 in the plane of symmetry of 100 m at f = 60
+m.
 
-`reduction.live_pose` gives the same offsets for the carried state of the coordinator; this is their form for any poses.
+`reduction.live.pose` gives the same offsets for the carried state of the coordinator; this is their form for any poses.
 """
 
 from dataclasses import dataclass
@@ -73,7 +74,7 @@ def pointing_offset(
     optics    "prime" or "gregorian" (`Gregorian`'s chosen parameters; the receiver stands still against the dish)
 
     First order in the turns. Raises FrameError for poses in other frames. Source: [RUZE65] for the beam deviation; the
-    derivation above and in `geometry.beam_deviation`.
+    derivation above and in `geometry.antenna.beam_deviation`.
     """
     if optics not in OPTICS:
         raise InputError(f"optics {optics!r} is none of {', '.join(OPTICS)}")

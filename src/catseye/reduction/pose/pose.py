@@ -1,6 +1,6 @@
 """Poses of the antenna's parts from solved points: between two epochs, or against the design in a site's records.
 
-Groups by name are what `reduction.live_bodies` says moves together: "dish" (prisms, triplets at the rim), "feed-arm"
+Groups by name are what `reduction.site.bodies` says moves together: "dish" (prisms, triplets at the rim), "feed-arm"
 (its rangers, targets at the arm), "alidade"; "subreflector" are targets whose names begin with SUB. Any other group
 is a list of points. Every epoch is first brought into the axes that carry the group by its told posture, so that two
 epochs at different postures compare: what is left is how the real antenna departs from [PARKER04] eq. 2.44.
@@ -122,7 +122,7 @@ def pose_of_group(
     points    names, three or more
     frame     of the answer: one of FRAMES, at the later epoch's posture
     pivot     (3,) m, in that frame; by default that of the group, or the points' mean
-    robust    as `estimation.pose.fit_pose`
+    robust    as `estimation.shapes.pose.fit_pose`
 
     Two epochs count as independent: what they share, such as the monuments' survey and a ranger's zero, makes a change
     better known than this says. Raises InputError where points or postures are missing, EstimationError as `fit_pose`.

@@ -61,7 +61,7 @@ def find(
     until the spot's centre is well inside; then `fit_spot`. Light that turns out to be no spot (a spike, a reflection)
     does not end the search: the spiral goes on.
 
-    Source: the notes' practice of searching at predicted counts; patterns in `geometry.search_pattern`.
+    Source: the notes' practice of searching at predicted counts; patterns in `geometry.mirror.search_pattern`.
     """
     looked: dict[tuple[float, ...], float] = {}
     refused: set[tuple[float, ...]] = set()

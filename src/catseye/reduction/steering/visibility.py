@@ -1,8 +1,9 @@
 """Which ranger can range to which retroreflector in a posture, and where it cannot, why not.
 
 How far off its axis each kind of retroreflector still serves stands in one table, `ACCEPTANCE`. A cube corner is used
-as long as `least_share` of its face sends light back (`optics.prism.clear_share`); what the polished faces of an
-uncoated prism let through beyond 20 deg on the side of an edge (`optics.solid_prism`) is not counted there.
+as long as `least_share` of its face sends light back (`optics.retroreflector.prism.clear_share`); what the polished
+faces of an uncoated prism let through beyond 20 deg on the side of an edge (`optics.retroreflector.solid_prism`) is not
+counted there.
 """
 
 from collections.abc import Mapping
@@ -176,7 +177,7 @@ def visibility(
 
     Reasons are judged in the order range, incidence, obstruction, stops.
 
-    Source: geometry of rays; see `geometry.solids`.
+    Source: geometry of rays; see `geometry.clearance.solids`.
     """
     limits = limits or RangeLimits()
     stand = np.array(list(rangers.values()), dtype=float).reshape(-1, 3)

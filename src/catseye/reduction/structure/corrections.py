@@ -140,7 +140,7 @@ def frame_motion(antenna: Antenna, measured: Measured, frame: str, *, added: Add
 
     Raises EstimationError with fewer targets, or on one line.
 
-    Source: [KABSCH76], [POPE72], as `estimation.rigid_body`.
+    Source: [KABSCH76], [POPE72], as `estimation.shapes.rigid_body`.
     """
     chosen = [i for i, name in enumerate(measured.names) if antenna.groups[group_of(antenna, name)].frame == frame]
     names = tuple(measured.names[i] for i in chosen)

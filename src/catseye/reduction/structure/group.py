@@ -28,7 +28,7 @@ MOVED = 0.05 * DEGREE  # of elevation: less is no move, and the way of the last 
 
 @dataclass(frozen=True)
 class Nominal:
-    """A rigid telescope: m, as `geometry.antenna` has them."""
+    """A rigid telescope: m, as `geometry.antenna.frames` has them."""
 
     elevation_axis_height: float = ELEVATION_AXIS_HEIGHT
     reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION

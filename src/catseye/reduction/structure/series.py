@@ -86,7 +86,7 @@ class GroupSeries:
     posture         (T,) elevation and azimuth, rad, and temperature, degrees C; NaN where unknown
     way             (T,) 1 after the elevation rose, -1 after it fell, 0 where it did not move or is unknown
     places          (T, n, 3) m; NaN where not measured
-    spread          covariance of the places, as `estimation.harmonic_series` takes it
+    spread          covariance of the places, as `estimation.harmonic.series` takes it
     pivot           (3,) m, of the group's turns
     labels          T names of the epochs, for messages
     """

@@ -11,8 +11,8 @@ stands and where the face lies only make p_0 and q_0; so does the face's tilt, b
 the circle's radius vector at two distances gives place and tilt of the beam; a screen that does not turn mixes them
 with the mount's own axis.
 
-What it does to pointing and range is computed with exact rays (`geometry.imperfect`). A tilt of the beam moves the
-pointing by itself; it moves no range to first order, as the wave's phase is the same all across.
+What it does to pointing and range is computed with exact rays (`geometry.mirror.imperfect`). A tilt of the beam moves
+the pointing by itself; it moves no range to first order, as the wave's phase is the same all across.
 """
 
 from typing import Annotated, Any

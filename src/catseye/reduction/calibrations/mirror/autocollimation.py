@@ -1,8 +1,8 @@
 """beta1, beta2, N_e0, N_a0 and the tilt of the face from an autocollimator that looks into the mirror.
 
-One adjustment of all readings with exact rays (`geometry.autocollimator`). Into the mirror near Phi = 0 the reflection
-goes round a circle as the azimuth is turned: its centre is beta, its radius is how far the shaft stands from N_e0, and
-the face's tilt. Into a flat on the x axis, at Phi = 90 degrees, it shows N_a0.
+One adjustment of all readings with exact rays (`geometry.mirror.autocollimator`). Into the mirror near Phi = 0 the
+reflection goes round a circle as the azimuth is turned: its centre is beta, its radius is how far the shaft stands from
+N_e0, and the face's tilt. Into a flat on the x axis, at Phi = 90 degrees, it shows N_a0.
 
 What the readings tell apart:
     beta, face tilt, N_e0   by azimuths half a turn apart; with one azimuth only, not at all
@@ -89,7 +89,7 @@ def calibrate_autocollimation(readings: Readings, reject: bool = False) -> Calib
 
     Raises EstimationError where the readings do not hold what is sought, naming it.
 
-    Source: [PARKER04] sections 2.2 (step 4) and 2.4 (step 6), with what `geometry.autocollimator` says of them.
+    Source: [PARKER04] sections 2.2 (step 4) and 2.4 (step 6), with what `geometry.mirror.autocollimator` says of them.
     """
     sheet, m = readings.sheet, len(readings)
     flat = _flat(readings)

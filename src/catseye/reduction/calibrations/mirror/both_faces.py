@@ -7,7 +7,7 @@
 L is the distance from the scan point, e the elevation axis off the azimuth axis, s the face off the elevation axis, b
 the retroreflector's. Half the difference of both pointings is e sin Phi whatever L is. s shows in no difference, as
 both pointings turn the same face to the same side (the notes, section 2.4, say twice the mirror's offset: see the top
-of `geometry.mirror_path`); it takes known distances.
+of `geometry.mirror.mirror_path`); it takes known distances.
 """
 
 from typing import Annotated, Any

@@ -8,7 +8,7 @@ With psi = Phi/2 the direct and the prime counts of one target, at a distance R,
 for the face tilt tau, the elevation shaft's own tilt kappa, the axis offset e: these need no known direction. The
 laser beam's tilt and N_a0 move both alike; they show where the directions of the targets are known. A tilt of the beam
 moves its azimuth by t, a turn of the whole mirror (beta) by t cos Phi, and both move Phi by t: targets well off the
-axis tell them apart. Exact rays: `geometry.imperfect`.
+axis tell them apart. Exact rays: `geometry.mirror.imperfect`.
 """
 
 from typing import Annotated, Any
@@ -88,7 +88,8 @@ def calibrate_both_faces_pointing(readings: Readings, reject: bool = False) -> C
 
     Raises EstimationError where no target was found in both pointings.
 
-    Source: [PARKER04] eq. 2.21 to 2.26 and what section 2.4 says of measuring in both; derived in `geometry.imperfect`.
+    Source: [PARKER04] eq. 2.21 to 2.26 and what section 2.4 says of measuring in both; derived in
+    `geometry.mirror.imperfect`.
     """
     m, names = len(readings), list(dict.fromkeys(readings.words["target"]))
     for row, word in enumerate(readings.words["pointing"]):

@@ -1,7 +1,7 @@
 """Amplitude-to-phase coupling: one target that stays, seen through several attenuations.
 
-phase added = coefficient ln(A / A_ref), as `signal.amplitude.amplitude_phase` has it. Leakage left over turns a weak
-phasor more and looks like coupling; it is a systematic effect with a prior here.
+phase added = coefficient ln(A / A_ref), as `signal.systematics.amplitude.amplitude_phase` has it. Leakage left over
+turns a weak phasor more and looks like coupling; it is a systematic effect with a prior here.
 """
 
 from typing import Annotated
