@@ -30,7 +30,9 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
-from catseye.estimation.network.multilateration import PointPriors, RangingNetwork, adjust_ranges
+from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
+from catseye.estimation.network.multilateration.network import RangingNetwork
+from catseye.estimation.network.multilateration.terms import PointPriors
 
 HERE = Path(__file__).parent
 SMALL, LARGE = (18, 2209), (40, 20_000)

@@ -16,7 +16,7 @@ from numba import njit
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from catseye.estimation.network.positions import positions
+from catseye.estimation.network.positions.dispatch import positions
 
 ROUNDS = 7
 TARGETS, SAMPLE = 1_000_000, 500

@@ -27,7 +27,7 @@ from catseye.geometry.mirror.pointing import Station, in_mirror_axes
 from catseye.geometry.mirror.track import apparent_motion, line_bound, longest_interval
 from catseye.geometry.sky.time_tag import TimeTag, tag_step
 from catseye.optics.spot import offset_range, offset_share, steering_range
-from catseye.records import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.tracking import (
     AZIMUTH_SLEW,

@@ -34,7 +34,7 @@ def ranging_network():
     import numpy as np
 
     from catseye.estimation.network.model import Network, Points
-    from catseye.estimation.observations import Distances
+    from catseye.estimation.observations.kinds import Distances
 
     def made(seed=0, *, stations=6, targets=12, sigma=5e-5, size=100.0, off=0.01, seen=1.0, flat=False):
         """The network and its true coordinates (n, 3); `off` is how wrong its given coordinates are, over the size."""

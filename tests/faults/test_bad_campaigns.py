@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.records import read_campaign
+from catseye.records.night.campaign import read_campaign
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

@@ -2,7 +2,7 @@ import pytest
 
 from catseye.gateways.epoch.files import write_reduction
 from catseye.gateways.writers.output import whole_directory
-from catseye.records import read_campaign
+from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from repository import ROOT
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations import Distances, Linear
+from catseye.estimation.observations.kinds import Distances, Linear
 
 seeds = st.integers(0, 2**32 - 1)
 SIGMA = 1e-4  # m

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kinds import (
     Coordinates,
     Directions,
     Distances,

@@ -8,13 +8,16 @@ from scipy.stats import chi2
 
 from catseye.estimation.quality.propagation import draw_inputs
 from catseye.records.night.campaign import REFERENCE, read_campaign
-from catseye.reduction.budget import Assumptions, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import budget_of, scatter_of
+from catseye.reduction.budget.inputs import items_of
+from catseye.reduction.budget.scene import Assumptions, scene_of
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.site.places import places_of
-from catseye.simulator import Conditions, simulate_night, write_night
+from catseye.simulator.night.air import Conditions
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 DRAWS = 100_000  # a u from so many is good to 0.22 %
 AGREED = 0.02  # the issue's

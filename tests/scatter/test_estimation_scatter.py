@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.least_squares.robust import adjust_robustly
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations.kinds import Distances
 
 SIGMA = 25e-6  # m
 STATIONS = np.array([[90, 0, 0], [45, 78, 2], [-45, 78, -1], [-90, 0, 1], [-45, -78, 0], [45, -78, 3]], dtype=float)

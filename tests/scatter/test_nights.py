@@ -9,7 +9,9 @@ from scipy.stats import chi2
 
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import Conditions, simulate_night, write_night
+from catseye.simulator.night.air import Conditions
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 QUICK = range(2101, 2107)
 MANY = range(2201, 2265)

@@ -1,6 +1,7 @@
 import pytest
 
-from catseye.simulator import Faults, Planted, simulate_night
+from catseye.simulator.night.faults import Faults, Planted
+from catseye.simulator.night.simulate import simulate_night
 
 QUIET = ("drift", "warm_up", "index_fluctuation")
 

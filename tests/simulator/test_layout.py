@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.simulator import simulate_night, write_night
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 from repository import ROOT
 
 NIGHT_01 = ROOT / "examples" / "night-01"

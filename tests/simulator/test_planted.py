@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError, ValidityError
-from catseye.simulator import EFFECTS, SUMMER_DAY, WINTER, Faults, Planted, Schedule, simulate_night, write_night
+from catseye.simulator.night.air import SUMMER_DAY, WINTER
+from catseye.simulator.night.faults import EFFECTS, Faults, Planted
+from catseye.simulator.night.schedule import Schedule
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 
 def changed_shots(night, other):

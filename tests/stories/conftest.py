@@ -7,7 +7,9 @@ import pytest
 
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import Faults, simulate_night, write_night
+from catseye.simulator.night.faults import Faults
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 SEED = 4711
 CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, wrong_position_mm=0.0)

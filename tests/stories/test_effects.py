@@ -13,7 +13,8 @@ from catseye.reduction.epoch import shots
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.site import places
-from catseye.simulator import Faults, Planted, simulate_night
+from catseye.simulator.night.faults import Faults, Planted
+from catseye.simulator.night.simulate import simulate_night
 
 SEED = 4711
 CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, wrong_position_mm=0.0)

@@ -7,7 +7,9 @@ import pytest
 
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import SUMMER_DAY, WINTER, simulate_night, write_night
+from catseye.simulator.night.air import SUMMER_DAY, WINTER
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 SEED = 815
 WORDS = re.compile(r"\b(ZY|ZP|TR|DP|ZBM|ZEG|ZAG|WX)(\d+[A-Z]*)\b")

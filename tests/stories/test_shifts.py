@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import Planted, simulate_night
+from catseye.simulator.night.faults import Planted
+from catseye.simulator.night.simulate import simulate_night
 
 SEED = 4711
 SHIFT = np.array([0.2, -0.1, 0.2]) * 1e-3  # 0.3 mm long

@@ -19,7 +19,8 @@ from catseye.reduction.pose.pose import pose_of_group
 from catseye.reduction.site.places import nominal_frame
 from catseye.reduction.surface.change import change_between
 from catseye.reduction.surface.shape import Aperture, Prisms, ShapeSettings
-from catseye.simulator import Planted, simulate_night
+from catseye.simulator.night.faults import Planted
+from catseye.simulator.night.simulate import simulate_night
 
 SEED = 4711
 F = 60.0  # m

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations import Coordinates, Distances, Linear
+from catseye.estimation.observations.kinds import Coordinates, Distances, Linear
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.ties import (
     BALL,

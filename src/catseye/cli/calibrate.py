@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from catseye.reduction.calibrations.calibration import Calibration
 
 
-KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spares itself
+KIND_NAMES = (  # as in catseye.reduction.calibrations.kinds, whose import --help spares itself
     "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
     "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
     "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
@@ -22,7 +22,7 @@ KIND_NAMES = (  # as in catseye.reduction.calibrations, whose import --help spar
 
 
 def _known(kind: str) -> str:
-    from catseye.reduction.calibrations import KINDS
+    from catseye.reduction.calibrations.kinds import KINDS
 
     if kind not in KINDS:
         raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
@@ -57,7 +57,7 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """A calibration from a table of readings: record with uncertainties, residuals, tests and a certificate."""
-    from catseye.reduction.calibrations import calibrate as calibrated
+    from catseye.reduction.calibrations.kinds import calibrate as calibrated
 
     _refuse_outputs(readings, sheet, write, certificate)
     found = calibrated(kind, readings, sheet, reject=reject)

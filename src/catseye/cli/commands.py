@@ -143,7 +143,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
         refuse_output(out, campaign)
     progress = ProgressLine(quiet)
     try:
-        from catseye.records import read_campaign
+        from catseye.records.night.campaign import read_campaign
         from catseye.reduction.epoch.epoch import reduce_epoch
 
         night = read_campaign(campaign)

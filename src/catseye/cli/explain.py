@@ -12,7 +12,7 @@ from catseye.reduction.epoch.settings import Settings
 
 if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
-    from catseye.reduction.budget import Explanation
+    from catseye.reduction.budget.explanation import Explanation
 
 FEWEST = 1000  # draws that show a 95 % interval at all
 MOST = 10_000_000
@@ -44,8 +44,8 @@ def explain(
     """The range of one shot and every cause of its uncertainty, before any adjustment."""
     progress = ProgressLine(quiet)
     try:
-        from catseye.records import read_campaign
-        from catseye.reduction.budget import explain_shot
+        from catseye.records.night.campaign import read_campaign
+        from catseye.reduction.budget.explanation import explain_shot
 
         settings = Settings(air_model=air_model)
         with _page(page) as pieces:  # refused before the work, not after it

@@ -1,6 +1,4 @@
-"""What we know, as frozen records read from files: `read_campaign` for a directory, `read_record` for one file."""
+"""What we know, as frozen records read from files.
 
-from catseye.records.files.reading import read_record
-from catseye.records.night.campaign import Campaign, read_campaign
-
-__all__ = ["Campaign", "read_campaign", "read_record"]
+`night.campaign.read_campaign` reads a directory, `files.reading.read_record` one file.
+"""

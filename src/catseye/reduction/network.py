@@ -9,11 +9,11 @@ from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
 from catseye.estimation.network.adjustment import adjust_network, with_datum
-from catseye.estimation.network.approximate import approximate
+from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.model import Network, NetworkSolution, points_of
 from catseye.estimation.network.monte_carlo import Disturbance, Scatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations.kinds import Distances
 from catseye.estimation.quality.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
 from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
 

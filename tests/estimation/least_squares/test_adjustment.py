@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, STEP_IN_SIGMAS, adjust
 from catseye.estimation.least_squares.rows import full_jacobian
-from catseye.estimation.observations import Distances, Linear
+from catseye.estimation.observations.kinds import Distances, Linear
 
 
 def distances(name, observed, covariance, origin, target):

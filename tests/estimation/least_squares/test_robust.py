@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
 from catseye.estimation.least_squares.conflict import LocalConflict
 from catseye.estimation.least_squares.robust import adjust_robustly
-from catseye.estimation.observations import Distances, Linear
+from catseye.estimation.observations.kinds import Distances, Linear
 
 SIGMA = 25e-6  # m
 STATIONS = np.array([[90, 0, 0], [45, 78, 2], [-45, 78, -1], [-90, 0, 1], [-45, -78, 0], [45, -78, 3]], dtype=float)

@@ -9,7 +9,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.network import adjustment as network_adjustment
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations import Azimuths, Coordinates, Directions, Distances, Vectors, ZenithAngles
+from catseye.estimation.observations.kinds import Azimuths, Coordinates, Directions, Distances, Vectors, ZenithAngles
 from catseye.estimation.shapes.motions import motions
 
 ENGINES = ("dense", "sparse")

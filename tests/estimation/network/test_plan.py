@@ -11,7 +11,7 @@ from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.model import Network, Parameter, Points
 from catseye.estimation.network.monte_carlo import Disturbance, measured, scatter
 from catseye.estimation.network.plan import plan, predicted, schedule
-from catseye.estimation.observations import Vectors, ZenithAngles
+from catseye.estimation.observations.kinds import Vectors, ZenithAngles
 
 
 def mean_u(network, interest):

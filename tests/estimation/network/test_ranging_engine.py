@@ -8,7 +8,7 @@ import pytest
 from catseye.errors import EstimationError
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.model import Parameter
-from catseye.estimation.observations import Coordinates, Distances, HeightDifferences
+from catseye.estimation.observations.kinds import Coordinates, Distances, HeightDifferences
 
 FIELDS = ("active", "residual", "sigma", "redundancy", "standardised", "estimated_error", "detectable_error")
 

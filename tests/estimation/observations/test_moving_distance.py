@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations import Distances, Linear, MovingDistances
+from catseye.estimation.observations.kinds import Distances, Linear, MovingDistances
 
 seeds = st.integers(0, 2**32 - 1)
 M = 5

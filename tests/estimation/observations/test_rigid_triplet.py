@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations import Coordinates, Linear, RigidTriplets
+from catseye.estimation.observations.kinds import Coordinates, Linear, RigidTriplets
 from catseye.estimation.observations.unit_direction import across
 
 seeds = st.integers(0, 2**32 - 1)

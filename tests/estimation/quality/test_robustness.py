@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, Fit, adjust
-from catseye.estimation.observations import Linear
+from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.robustness import WEIGHTS, _Rows, estimate_robustly, snoop
 
 quick = settings(deadline=None, max_examples=25)

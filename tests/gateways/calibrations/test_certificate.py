@@ -16,7 +16,7 @@ from catseye.gateways.writers.objects import json_line
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.calibration import CalibrationRecord
 from catseye.records.site.mirror import Mirror
-from catseye.reduction.calibrations import calibrate
+from catseye.reduction.calibrations.kinds import calibrate
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples" / "calibrations"

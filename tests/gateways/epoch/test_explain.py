@@ -10,7 +10,8 @@ import pytest
 from catseye.gateways.epoch.explain import budget_lines, explanation_object, explanation_passages
 from catseye.gateways.epoch.explain_page import MARK, explanation_page, figures
 from catseye.gateways.writers.objects import json_line
-from catseye.reduction.budget import Assumptions, explain_shot
+from catseye.reduction.budget.explanation import explain_shot
+from catseye.reduction.budget.scene import Assumptions
 
 KEYS = {
     "shot", "ranger", "target", "mjd_utc", "status", "reason", "range", "u_range", "expanded_uncertainty",

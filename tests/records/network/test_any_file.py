@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.estimation.observations import Coordinates, Distances
+from catseye.estimation.observations.kinds import Coordinates, Distances
 from catseye.records.files.columns import columns_of
 from catseye.records.network.any_file import read_network
 from repository import ROOT, TESTS

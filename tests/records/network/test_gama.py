@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.estimation.observations import Joint, Vectors
+from catseye.estimation.observations.kinds import Joint, Vectors
 from catseye.records.network.gama import AXES, gama_network, read_gama
 from catseye.records.network.gama_xml import GON, Element, band_matrix
 from repository import TESTS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations.kinds import Distances
 from catseye.records.network.any_file import read_network
 from repository import TESTS
 

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from catseye.errors import InputError
-from catseye.records import read_campaign
+from catseye.records.night.campaign import read_campaign
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

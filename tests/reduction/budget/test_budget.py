@@ -12,10 +12,10 @@ from catseye.estimation.quality.propagation import agrees, numerical_sensitivity
 from catseye.optics.retroreflector.prism import oblique_change
 from catseye.records.night.campaign import REFERENCE
 from catseye.records.night.path_temperature import PathTemperatureTable
-from catseye.reduction.budget import Assumptions, explain_shot, items_of, scene_of
 from catseye.reduction.budget.chain import measurement
-from catseye.reduction.budget.explanation import _cycles, _places, budget_of, scatter_of
-from catseye.reduction.budget.scene import walk_of
+from catseye.reduction.budget.explanation import _cycles, _places, budget_of, explain_shot, scatter_of
+from catseye.reduction.budget.inputs import items_of
+from catseye.reduction.budget.scene import Assumptions, scene_of, walk_of
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import Settings

@@ -10,7 +10,9 @@ from catseye.records.night.campaign import read_campaign
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator import Faults, simulate_night, write_night
+from catseye.simulator.night.faults import Faults
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 
 CLEAR = {"fraction_blocked": 0.0, "fraction_reflected": 0.0, "weak_ranger": None, "wrong_position_mm": 0.0}
 SMALL = {"dish_prisms": 8, "triplets": 3}

@@ -22,7 +22,9 @@ from catseye.reduction.epoch.settings import Settings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.stations import station_in
-from catseye.simulator import Faults, simulate_night, write_night
+from catseye.simulator.night.faults import Faults
+from catseye.simulator.night.sheets import write_night
+from catseye.simulator.night.simulate import simulate_night
 from catseye.simulator.night.world import kelvin_from_ground
 from mirror_scene import START, sent, traced_change
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations import Coordinates, Distances
+from catseye.estimation.observations.kinds import Coordinates, Distances
 from catseye.estimation.observations.unit_direction import across
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.triplet.ties import (

@@ -5,11 +5,12 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from catseye.constants import PPM, SPEED_OF_LIGHT
-from catseye.simulator import NIGHT, SUMMER_DAY, WINTER, Faults, Planted, simulate_night
-from catseye.simulator.night.air import Air, group_refractivity_ppm
+from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, Air, group_refractivity_ppm
+from catseye.simulator.night.faults import Faults, Planted
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
 from catseye.simulator.night.paraboloid import normal_deviation
 from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.simulate import simulate_night
 from catseye.simulator.night.world import kelvin_from_ground
 
 HALF_WAVE = SPEED_OF_LIGHT / 2 / 1.5e9  # in vacuum, m

@@ -17,7 +17,7 @@ from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import Rows
 from catseye.estimation.network.datum import Floating, floating_motions, to_datum, transformed
 from catseye.estimation.network.model import NetworkSolution
-from catseye.estimation.observations import Linear
+from catseye.estimation.observations.kinds import Linear
 
 CHUNK = 600  # columns of a covariance asked for at once
 CHECKED = 60  # coordinates whose covariance is compared with the observations'

@@ -15,7 +15,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import Covariance, Dense
 from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.rows import Rows, variances
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \

@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from catseye.estimation.least_squares.adjustment import Solution, adjust
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone

@@ -8,7 +8,7 @@ import numpy as np
 
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
 from catseye.estimation.least_squares.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 
 UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
 UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"

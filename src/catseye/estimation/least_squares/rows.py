@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 
 
 def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,7 @@ from catseye.estimation.network.datum import (
 )
 from catseye.estimation.network.diagnosis import diagnosed, floating_text, unconnected
 from catseye.estimation.network.model import Network, NetworkSolution
-from catseye.estimation.observations import Linear, Observations
+from catseye.estimation.observations.kinds import Linear, Observations
 
 FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
 DATUMS = ("free", "fixed")
@@ -126,7 +126,7 @@ def _with_reference(network: Network) -> Network:
     points = network.points
     if np.isfinite(points.xyz).any() or not points.datum.any():
         return network
-    from catseye.estimation.network.approximate import approximate
+    from catseye.estimation.network.approximate.start import approximate
 
     return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
@@ -173,7 +173,7 @@ class _Problem:
             xyz, values = np.where(points.fixed, points.xyz, start.x), start.parameters
             found, assumed, replaced = start.approximate, start.assumed, start.replaced
         else:
-            from catseye.estimation.network.approximate import approximate
+            from catseye.estimation.network.approximate.start import approximate
 
             begin = approximate(network)
             xyz, values, found = begin.xyz, begin.parameters, begin.found

@@ -14,7 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import Fit
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 
 
 @dataclass(frozen=True, eq=False)

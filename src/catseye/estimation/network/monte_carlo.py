@@ -10,7 +10,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.network.model import Network, NetworkSolution, points_of
-from catseye.estimation.observations import Distances, ZenithAngles
+from catseye.estimation.observations.kinds import Distances, ZenithAngles
 
 XY = np.arange(2)
 

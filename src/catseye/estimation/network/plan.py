@@ -13,7 +13,7 @@ from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.network.adjustment import adjust_network, with_datum
 from catseye.estimation.network.model import Network, NetworkSolution, points_of
-from catseye.estimation.observations import Distances
+from catseye.estimation.observations.kinds import Distances
 
 BATCH = 200  # ranges whose effect is computed at once
 

@@ -8,15 +8,12 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
 from catseye.estimation.network.model import Network, NetworkSolution
-from catseye.estimation.network.multilateration import (
-    PointPriors,
-    RangingNetwork,
-    RangingSolution,
-    StationRanges,
-    adjust_ranges,
-)
+from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
+from catseye.estimation.network.multilateration.network import RangingNetwork
+from catseye.estimation.network.multilateration.solution import RangingSolution
+from catseye.estimation.network.multilateration.terms import PointPriors, StationRanges
 from catseye.estimation.network.ranging_covariance import RangingCovariance
-from catseye.estimation.observations import Coordinates, Distances
+from catseye.estimation.observations.kinds import Coordinates, Distances
 
 FEWEST_POINTS = 200  # below it the dense form is as fast, and names what is wrong with more care
 MOST_STATIONS = 600  # their parameters make a dense system
@@ -158,7 +155,7 @@ def _problem(
     xyz = points.xyz
     if not np.isfinite(xyz).all() or start is not None:
         if start is None:
-            from catseye.estimation.network.approximate import approximate
+            from catseye.estimation.network.approximate.start import approximate
 
             begin = approximate(network)
             if begin.missing:

@@ -10,7 +10,7 @@ from catseye.estimation.quality.propagation import Input, agreement
 from catseye.gateways.epoch.summary import MEANING
 from catseye.gateways.writers.passage import Passage
 from catseye.records.night.campaign import REFERENCE
-from catseye.reduction.budget import Explanation
+from catseye.reduction.budget.explanation import Explanation
 
 MICROMETRE = 1e-6
 SMALLEST_SHARE = 5e-5  # of a line in the text's table

@@ -19,7 +19,8 @@ from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Fig
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.records.night.campaign import Campaign
-from catseye.reduction.budget import Assumptions, Explanation
+from catseye.reduction.budget.explanation import Explanation
+from catseye.reduction.budget.scene import Assumptions
 
 MARK = "<title>catseye: shot "  # tells our pages from others' files
 WIDE = 4.5  # standard uncertainties on either side in the histogram

@@ -10,7 +10,7 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
 from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations import Observations, Reported
+from catseye.estimation.observations.kinds import Observations, Reported
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.kinds import TOUCHES, Row, blocks_of, group_of
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.estimation.network.model import Network, Points
-from catseye.estimation.observations import Coordinates, Distances, Observations
+from catseye.estimation.observations.kinds import Coordinates, Distances, Observations
 from catseye.records.files.columns import Columns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import shown

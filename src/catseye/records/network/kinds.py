@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kinds import (
     Angles,
     Azimuths,
     Coordinates,

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kinds import (
     FramePoints,
     PointsOnLine,
     PointsOnPlane,

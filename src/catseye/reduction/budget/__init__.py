@@ -5,19 +5,3 @@ inputs       what of that is uncertain, with the slope of the range by each, wor
 chain        the same range as one function of drawn inputs, nothing linearised
 explanation  the recipe
 """
-
-from catseye.reduction.budget.explanation import Adjusted, Explanation, explain_shot
-from catseye.reduction.budget.inputs import Item, items_of
-from catseye.reduction.budget.scene import Assumptions, References, Scene, scene_of
-
-__all__ = [
-    "Adjusted",
-    "Assumptions",
-    "Explanation",
-    "Item",
-    "References",
-    "Scene",
-    "explain_shot",
-    "items_of",
-    "scene_of",
-]

@@ -12,7 +12,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import Solution, adjust
-from catseye.estimation.observations import Linear
+from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
 from catseye.reduction.calibrations.calibration import Decision
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood

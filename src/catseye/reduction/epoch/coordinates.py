@@ -9,7 +9,7 @@ from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import CONVERGED, Fit, Solution, adjust
 from catseye.estimation.least_squares.robust import CHECKED, adjust_robustly
-from catseye.estimation.observations import Linear, Observations
+from catseye.estimation.observations.kinds import Linear, Observations
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice

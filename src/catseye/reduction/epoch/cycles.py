@@ -15,7 +15,7 @@ from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
 from catseye.estimation.least_squares.robust import adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
-from catseye.estimation.observations import Observations
+from catseye.estimation.observations.kinds import Observations
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycle_search import Scene, search, spread
 from catseye.reduction.epoch.ranges import Electronics, Phases, Progress

@@ -4,7 +4,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.observations import Linear
+from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.shapes.paraboloid import fit_paraboloid
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.unknowns import Network

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.estimation.observations import Distances, MovingDistances
+from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.ranges import Electronics

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.observations import Distances, Linear, Observations
+from catseye.estimation.observations.kinds import Distances, Linear, Observations
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.triplet import Triplet
 from catseye.reduction.epoch.air import AirField

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.observations import Linear, Observations
+from catseye.estimation.observations.kinds import Linear, Observations
 from catseye.geometry.frames.frame import Transform
 from catseye.records.night.campaign import Campaign
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
-from catseye.estimation.observations import Distances, Linear, Observations, RigidTriplets
 from catseye.estimation.observations.fixed_distance import U_FIXED
+from catseye.estimation.observations.kinds import Distances, Linear, Observations, RigidTriplets
 from catseye.estimation.observations.unit_direction import across
 from catseye.reduction.triplet.use import MountedTriplet, obliquity_by_tilt
 

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
 from catseye.estimation.least_squares.adjustment import Solution, adjust
-from catseye.estimation.observations import Coordinates, Distances
+from catseye.estimation.observations.kinds import Coordinates, Distances
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.records.site.triplet import Triplet

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catseye.estimation.network.approximate import approximate
+from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kinds import (
     Angles,
     Azimuths,
     Coordinates,

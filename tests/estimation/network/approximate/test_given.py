@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.approximate import approximate
 from catseye.estimation.network.approximate.given import disagreeing
 from catseye.estimation.network.approximate.sightings import sightings
+from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations import Directions, Distances, HorizontalDistances, ZenithAngles
+from catseye.estimation.observations.kinds import Directions, Distances, HorizontalDistances, ZenithAngles
 
 S, T = 8, 30
 SIGMA = 1e-4  # m

@@ -11,14 +11,11 @@ from hypothesis import strategies as st
 
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
-from catseye.estimation.network.multilateration import (
-    PointPriors,
-    RangingNetwork,
-    StationRanges,
-    adjust_ranges,
-    gauss_newton,
-)
-from catseye.estimation.observations import Linear
+from catseye.estimation.network.multilateration import gauss_newton
+from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
+from catseye.estimation.network.multilateration.network import RangingNetwork
+from catseye.estimation.network.multilateration.terms import PointPriors, StationRanges
+from catseye.estimation.observations.kinds import Linear
 from repository import TESTS
 
 FOLDER = TESTS / "vectors" / "networks" / "ranging-18x500"

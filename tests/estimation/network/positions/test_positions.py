@@ -10,9 +10,10 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2, kstest
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.network.positions import Status, positions
 from catseye.estimation.network.positions import dispatch as module
 from catseye.estimation.network.positions.descent import CAP, Ranges, descend
+from catseye.estimation.network.positions.dispatch import positions
+from catseye.estimation.network.positions.status import Status
 from repository import TESTS
 
 NETWORK = TESTS / "vectors" / "networks" / "ranging-18x500"

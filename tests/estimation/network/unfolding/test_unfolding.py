@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.linalg import orthogonal_procrustes
 
 from catseye.errors import ValidityError
-from catseye.estimation.network.unfolding import UNFOLDED, classical_scaling, locate, unfold
-from catseye.estimation.network.unfolding.factors import match_means
+from catseye.estimation.network.unfolding.factors import classical_scaling, match_means
+from catseye.estimation.network.unfolding.location import locate
+from catseye.estimation.network.unfolding.unfold import UNFOLDED, unfold
 
 SIGMA = 1e-3  # m, on figures of 100 m
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from catseye.estimation.network.approximate.sightings import parts_of
 from catseye.estimation.network.model import Network
-from catseye.estimation.observations import FramePoints, RigidBodies
 from catseye.estimation.observations.kind import value
+from catseye.estimation.observations.kinds import FramePoints, RigidBodies
 from catseye.estimation.shapes.rigid_body import closed_form
 from catseye.geometry.frames.rotation import to_vector
 

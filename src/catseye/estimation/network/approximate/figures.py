@@ -8,7 +8,8 @@ from catseye.estimation.network.approximate.bodies import rigid_motion
 from catseye.estimation.network.approximate.search import LENIENT, STRICT, Search
 from catseye.estimation.network.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
 from catseye.estimation.network.approximate.ties import FLOOR
-from catseye.estimation.network.unfolding import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, classical_scaling, unfold
+from catseye.estimation.network.unfolding.factors import classical_scaling
+from catseye.estimation.network.unfolding.unfold import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, unfold
 from catseye.estimation.shapes.rigid_body import closed_form
 
 

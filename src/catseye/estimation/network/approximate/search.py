@@ -15,7 +15,7 @@ from catseye.estimation.network.approximate.sightings import (
     Sightings,
 )
 from catseye.estimation.network.approximate.ties import FLOOR, Ties, wrapped
-from catseye.estimation.network.unfolding import locate
+from catseye.estimation.network.unfolding.location import locate
 
 STRICT, LENIENT = 1e-3, 1e-7  # least over largest eigenvalue of a point's normal matrix: good geometry; any at all
 DECIDED = 4.0  # a second position must fit this many times worse, in squares ...

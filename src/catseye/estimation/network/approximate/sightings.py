@@ -9,7 +9,8 @@ import numpy as np
 
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.network.model import Network
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kind import value
+from catseye.estimation.observations.kinds import (
     Angles,
     Azimuths,
     Coordinates,
@@ -25,7 +26,6 @@ from catseye.estimation.observations import (
     Vectors,
     ZenithAngles,
 )
-from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.reading import reading_columns
 
 RANGE, LEVEL, BEARING, ZENITH, DIFFERENCE, COORDINATE = range(6)

@@ -30,7 +30,7 @@ from catseye.estimation.network.approximate.given import disagreeing, placed_ane
 from catseye.estimation.network.approximate.search import Search
 from catseye.estimation.network.approximate.sightings import GROUND, parts_of, sightings
 from catseye.estimation.network.model import Network
-from catseye.estimation.observations import (
+from catseye.estimation.observations.kinds import (
     Directions,
     Distances,
     FixedDistances,
@@ -73,7 +73,7 @@ def approximate(network: Network) -> Approximation:
     Source: [FOERSTNER16] chapter 4, the least squares of each point; the order of placing is ours.
 
     >>> from catseye.estimation.network.model import Points
-    >>> from catseye.estimation.observations import Vectors
+    >>> from catseye.estimation.observations.kinds import Vectors
     >>> points = Points(("A", "P"), np.array([[1.0, 2.0, 3.0], [np.nan] * 3]), *np.zeros((2, 2, 3), dtype=bool))
     >>> leg = Vectors("leg", np.array([10.0, 0.0, 1.0]), np.full(3, 1e-6), np.array([0]), np.array([3]))
     >>> approximate(Network(points, (), (leg,))).xyz[1]

@@ -15,7 +15,7 @@ from catseye.estimation.network.approximate.sightings import (
     ZENITH,
     Sightings,
 )
-from catseye.estimation.network.unfolding import locate
+from catseye.estimation.network.unfolding.location import locate
 
 FLOOR = 1e-3  # m: no sigma counts as smaller, for the points that are given may be poor
 RADII = (0.25, 1.0, 3.0)  # of the starts about the known points, in half their extent

@@ -1,0 +1,79 @@
+"""Calibrations from tables of readings: one kind is one file with a RECIPE, and one line here."""
+
+from pathlib import Path
+
+from catseye.errors import InputError
+from catseye.records.files.readings import read_readings
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.kind import Kind
+from catseye.reduction.calibrations.length import gauge_blocks, height_gauge, invar_wire
+from catseye.reduction.calibrations.mirror import (
+    alignment,
+    autocollimation,
+    both_faces,
+    both_faces_pointing,
+    detector_focus,
+    encoder,
+    limits,
+    search_results,
+)
+from catseye.reduction.calibrations.monument import azimuth as monument_azimuth
+from catseye.reduction.calibrations.monument import hydrostatic_level, inclinometer, plate_levels
+from catseye.reduction.calibrations.monument import place as monument_place
+from catseye.reduction.calibrations.ranging import (
+    amplitude,
+    glass_constants,
+    leakage,
+    leakage_lit,
+    linearity,
+    oscillator,
+    reference_distance,
+    repeatability,
+    retroreflector,
+)
+
+KINDS: dict[str, Kind] = {
+    "reference-distance": reference_distance.RECIPE,
+    "leakage": leakage.RECIPE,
+    "leakage-lit": leakage_lit.RECIPE,
+    "linearity": linearity.RECIPE,
+    "retroreflector": retroreflector.RECIPE,
+    "amplitude-to-phase": amplitude.RECIPE,
+    "oscillator": oscillator.RECIPE,
+    "repeatability": repeatability.RECIPE,
+    "prism-constant": glass_constants.PRISM_RECIPE,
+    "ball-constant": glass_constants.BALL_RECIPE,
+    "gauge-blocks": gauge_blocks.BLOCKS_RECIPE,
+    "spacers": gauge_blocks.SPACERS_RECIPE,
+    "invar-wire": invar_wire.RECIPE,
+    "autocollimation": autocollimation.RECIPE,
+    "height-gauge": height_gauge.RECIPE,
+    "both-faces": both_faces.RECIPE,
+    "both-faces-pointing": both_faces_pointing.RECIPE,
+    "encoder": encoder.RECIPE,
+    "limits": limits.RECIPE,
+    "alignment": alignment.RECIPE,
+    "detector-focus": detector_focus.RECIPE,
+    "search-results": search_results.RECIPE,
+    "monument-azimuth": monument_azimuth.RECIPE,
+    "plate-levels": plate_levels.RECIPE,
+    "monument-place": monument_place.RECIPE,
+    "inclinometer": inclinometer.RECIPE,
+    "hydrostatic-level": hydrostatic_level.RECIPE,
+}
+
+
+def calibrate(kind: str, path: Path | str, sheet: Path | str | None = None, *, reject: bool = False) -> Calibration:
+    """A calibration from a table of readings and the sheet beside it.
+
+    kind     a name in KINDS
+    path     of the table
+    sheet    of the sheet; the table's with the ending .toml if None
+    reject   leave out the readings that the tests reject; they stay in the table
+
+    Raises InputError for an unknown kind or a bad file, EstimationError where the readings do not hold what is sought.
+    """
+    if kind not in KINDS:
+        raise InputError(f"calibration {kind!r} is unknown (expected one of {', '.join(KINDS)})")
+    chosen = KINDS[kind]
+    return chosen.recipe(read_readings(path, chosen.layout, sheet), reject)
