@@ -76,6 +76,15 @@ def test_the_day_is_warmest_at_15_h_local_mean_time_and_drier():
     assert local[np.argmax(steel)] == pytest.approx(16.0, abs=0.05)
 
 
+def test_the_sun_is_brightest_at_half_past_twelve_local_mean_time():
+    air, seconds = twin(planted=only("diurnal")).air, np.arange(0.0, 86_400.0, 60.0)
+    clock = (START % 1.0 * 24.0 + site().site.site.longitude_deg / 15.0 + seconds / 3600.0) % 24.0
+    sunshine = air.sunshine(seconds)
+    assert clock[np.argmax(sunshine)] == pytest.approx(12.5, abs=1 / 60)
+    assert clock[np.argmin(sunshine)] == pytest.approx(0.5, abs=1 / 60)
+    assert (sunshine.min(), sunshine.max()) == pytest.approx((0.0, 1.0), abs=1e-4)
+
+
 def test_temperature_rises_from_the_ground_at_night_and_falls_by_day():
     made = twin(planted=only("stratification", "diurnal"))
     heights = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 100.0]]])
