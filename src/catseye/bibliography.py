@@ -26,7 +26,15 @@ SOURCES: dict[str, Source] = {
     "PARKER04": Source(
         title="D. H. Parker, Working notes on the Green Bank Telescope laser metrology system, 2004",
         locator="National Radio Astronomy Observatory, 29 April 2004",
-        used="chapters 1 to 8: eqs. 1.1-1.53, 2.1-2.47, 3.1-3.7, 4.1-4.14, 5.1-5.19",
+        used="chapter 1, eqs. 1.3-1.53: humidity, barometer, index of air and glass, a path as a refractometer "
+        "(`atmosphere.weather`, `atmosphere.index`, `atmosphere.path`, `optics.glass`, `reduction.air`); chapter 2, "
+        "section 2.1, eqs. 2.3-2.26, 2.40-2.47: frames, mirror, counts, track, Sun (`geometry`, `ranger`, "
+        "`reduction.site`, `reduction.steering`); chapter 3, eqs. 3.1-3.7: positions and their differences "
+        "(`estimation.network.positions`, `estimation.deformation.differential`); chapter 4, eqs. 4.1-4.14: speed of "
+        "sound (`atmosphere.sound`, `reduction.air.acoustic`); chapter 5, eqs. 5.1-5.19: phase, whole cycles, range "
+        "(`signal`, `ranger.ranging`, `reduction.epoch`); chapter 6, items 1 and 3 to 5: lens, multiple paths, "
+        "feedback, amplitude (`optics.receiver`, `signal.systematics`); chapters 7 and 8: what is to be calibrated "
+        "(`reduction.calibrations`). `simulator.night` and `simulator.twin` write what they need a second time",
         errata=(
             "1.2 prints 384 615.3 GHz for 780 nm (c taken as 3e8 m/s); 384 349.3 GHz, the sidebands likewise",
             "1.11 names the local station pressure p_t, p_l is meant; there is no 1.17",
@@ -55,7 +63,12 @@ SOURCES: dict[str, Source] = {
     "GOLDMAN00": Source(
         title="M. A. Goldman, Calibration of the GBT triplet retroreflector units, 2000",
         locator="National Radio Astronomy Observatory, 29 June 2000",
-        used="eqs. 3.4, 3.5, 3.8-3.29, section 3.4, A.1-A.8, B.1, C, D.1-D.5, figures 2 to 11",
+        used="eqs. 3.8-3.10, 3.14 and B.1: what glass adds (`optics.retroreflector`, `reduction.epoch.coordinates`); "
+        "sections 1.3, 2.2, 2.3, 3.1-3.4, eqs. 3.5, 3.11-3.29: a unit (`records.laboratory.triplet_measurement`, "
+        "`reduction.triplet.unit`, `reduction.triplet.geometry`, `reduction.triplet.memo`, `gateways.triplet`); eqs. "
+        "3.13, 3.16: its whole cycles (`signal.cycles.whole`); A.1-A.8, D.1-D.5: tolerances "
+        "(`reduction.triplet.tolerances`, `reduction.triplet.sensitivity`); section 1.1, appendix C, figure 10: a unit "
+        "on the telescope (`reduction.triplet.use`, `reduction.triplet.ties`, `geometry.antenna.triplet_mount`)",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
@@ -93,8 +106,10 @@ SOURCES: dict[str, Source] = {
     "RUEGER90": Source(
         title="J. M. Rüeger, Electronic Distance Measurement: An Introduction, third edition, Springer, 1990",
         locator="doi:10.1007/978-3-642-97196-9",
-        used="eqs. 5.23, 5.24, 5.27-5.29 (humidity), A.4, A.5, A.10 (group index), as PARKER04 quotes them; velocity "
-        "corrections; the resolutions of 1960 and 1963 with BARRELL39's formula",
+        used="eqs. 5.23, 5.24, 5.27-5.29 (`atmosphere.weather`), A.4, A.5, A.10 (`atmosphere.index.rueger1990`), as "
+        "PARKER04 quotes them; the resolutions of 1960 and 1963 with BARRELL39's formula "
+        "(`atmosphere.index.barrell_sears1963`); velocity corrections (`atmosphere.sound.velocity`) and the reduction "
+        "of slope distances (`reduction.baseline.lengths`); cyclic errors (`signal.systematics.cyclic`)",
     ),
     "OWENS67": Source(
         title="J. C. Owens, Optical refractive index of air: dependence on pressure, temperature and composition, 1967",
@@ -144,7 +159,10 @@ SOURCES: dict[str, Source] = {
     "FOERSTNER16": Source(
         title="W. Förstner and B. P. Wrobel, Photogrammetric Computer Vision, Springer, 2016",
         locator="doi:10.1007/978-3-319-11550-4",
-        used="chapters 3 and 4: tests of hypotheses, Gauss-Markov model, evaluation, robust estimation, outliers",
+        used="chapter 2: propagation, standard ellipsoids (`estimation.quality.ellipsoid`); chapter 4: Gauss-Markov "
+        "model with priors and constraints, evaluation, tests, robust estimation (`estimation.least_squares`, "
+        "`estimation.quality`, `estimation.network`, `estimation.deformation`, `reduction.calibrations`); chapter 15: "
+        "elimination of points from the normal equations (`estimation.network.multilateration`)",
     ),
     "HUBER09": Source(
         title="P. J. Huber and E. M. Ronchetti, Robust Statistics, second edition, Wiley, 2009",
@@ -189,7 +207,8 @@ SOURCES: dict[str, Source] = {
     "CASPARY87": Source(
         title="W. F. Caspary, Concepts of network and deformation analysis, 1987",
         locator="Monograph 11, School of Surveying, University of New South Wales",
-        used="congruence test, homogeneity of epochs, localisation, strain and rigid-body models",
+        used="congruence test, homogeneity of epochs, localisation, strain and rigid-body models "
+        "(`estimation.deformation`)",
     ),
     "RAO73": Source(
         title="C. R. Rao, Linear Statistical Inference and Its Applications, second edition, Wiley, 1973",
@@ -237,7 +256,7 @@ SOURCES: dict[str, Source] = {
     "STARNET04": Source(
         title="STAR*NET V6 Least Squares Survey Adjustment Program, Reference Manual, Standard and PLUS Editions, 2004",
         locator="Starplus Software, Oakland",
-        used="chapter 5, Preparing input data",
+        used="chapter 5, Preparing input data (`records.network.starnet`)",
     ),
     "POPE76": Source(
         title="A. J. Pope, The statistics of residuals and the detection of outliers, 1976",
@@ -318,7 +337,8 @@ SOURCES: dict[str, Source] = {
     "SIEGMAN86": Source(
         title="A. E. Siegman, Lasers, University Science Books, 1986",
         locator="ISBN 978-0-935702-11-8",
-        used="chapters 15, 17, 20: ray matrices, Gaussian beams, share through an aperture, the Huygens integral",
+        used="chapters 15, 17 (eqs. 17.4, 17.5, 17.11), 20: ray matrices, Gaussian beams, share through an aperture, "
+        "the Huygens integral (`optics.abcd`, `optics.gaussian_beam`, `optics.spot`, `reduction.optics`)",
     ),
     "GOODMAN05": Source(
         title="J. W. Goodman, Introduction to Fourier optics, third edition, Roberts, 2005",
@@ -636,7 +656,9 @@ SOURCES: dict[str, Source] = {
     "BORN99": Source(
         title="M. Born and E. Wolf, Principles of Optics, seventh edition, Cambridge University Press, 1999",
         locator="doi:10.1017/CBO9781139644181",
-        used="section 1.5: Fresnel's formulae (room L cites it too: join)",
+        used="section 1.4.2, eqs. 29, 30, 43: Stokes' parameters; section 1.5.2, eq. 21: Fresnel's formulae; section "
+        "1.5.4, eq. 61: phases of total reflection; section 14.2, eq. 13: metals (`optics.polarization`); the same "
+        "formulae squared, for the faces of a retroreflector (`optics.retroreflector.kinds`)",
     ),
     "JCGM106": Source(
         title="JCGM, Evaluation of measurement data: The role of measurement uncertainty in conformity "
@@ -717,7 +739,7 @@ SOURCES: dict[str, Source] = {
     "MACLEOD10": Source(
         title="H. A. Macleod, Thin-film optical filters, fourth edition, CRC Press, 2010",
         locator="ISBN 978-1-4200-7302-7",
-        used="chapters 2 and 6: characteristic matrix, tilted admittances, quarter-wave stacks",
+        used="chapters 2 and 6: characteristic matrix, tilted admittances, quarter-wave stacks (`optics.coating`)",
     ),
     "BABIC92": Source(
         title="D. I. Babić and S. W. Corzine, Analytic expressions for the reflection delay, penetration depth, "

@@ -77,8 +77,8 @@ def group_index(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
     glass            a name in GLASSES
 
     Source: [PARKER04] eq. 1.42 and 1.43. The old BK 7 series lies 1.15e-5 below N-BK7 at 0.780 um (and 3.5e-6 above it
-    in phase index), which shows what a differentiated fit is worth: `prism.wrong_glass` says what it costs. A target's
-    record says which glass it has.
+    in phase index), which shows what a differentiated fit is worth: `retroreflector.prism.wrong_glass` says what it
+    costs. A target's record says which glass it has.
 
     >>> round(float(group_index(0.780)), 8)
     1.52746375

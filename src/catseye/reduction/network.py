@@ -59,10 +59,10 @@ def adjusted(
 ) -> Adjusted:
     """A network's coordinates, every observation used as claimed unless asked otherwise.
 
-    network      from `records.read_network`
+    network      from `records.network.any_file.read_network`
     datum        as `adjust_network`
     reject       leave out observations that the w test rejects, found from a robust start
-    robust       or give each the weight of an M-estimate: a key of `robustness.WEIGHTS`
+    robust       or give each the weight of an M-estimate: a key of `estimation.quality.robustness.WEIGHTS`
     level        of all tests together, for `reject`
     components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
 

@@ -1,1 +1,1 @@
-"""What runs a living site: processes, the loop, the screen, the logs. It starts what other rooms compute."""
+"""What runs a living site: processes, the loop, the screen, the logs. It starts what other layers compute."""

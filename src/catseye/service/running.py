@@ -29,7 +29,7 @@ class LiveRun(Generic[T]):
     work           makes the coroutine; a signal cancels it, once
     loop_factory   of the loop; asyncio's own if None
 
-    The first signal cancels; a second one, or 4.5 s, leave at once in the way that `interruption` has.
+    The first signal cancels; a second one, or 4.5 s, leave at once in the way that `gateways.writers.interruption` has.
     """
 
     def __init__(

@@ -1,9 +1,9 @@
 """What the compiled forms of the air models share: saturation as a polynomial, blocks of states, threads.
 
 Nothing is exponentiated in a kernel. Within a model's limits of temperature the saturation pressure is a polynomial,
-interpolated at the Chebyshev points of that interval from the plain form in `humidity` when a kernel is imported: it
-follows that form, and no digits stand here. The constants of the plain forms are handed in as arguments, so that a
-kernel that numba has stored never holds older ones.
+interpolated at the Chebyshev points of that interval from the plain form in `atmosphere.weather.humidity` when a kernel
+is imported: it follows that form, and no digits stand here. The constants of the plain forms are handed in as
+arguments, so that a kernel that numba has stored never holds older ones.
 """
 
 import os

@@ -52,7 +52,7 @@ class Partials(NamedTuple):
     wavelength_um: Any
 
     def with_humidity_held(self, saturation, humidity_percent) -> Sensitivity:
-        """The chain rule from vapour pressure to relative humidity, by a `humidity.Saturation` and its slopes."""
+        """The chain rule from vapour pressure to relative humidity, by `saturation` and its slopes."""
         fraction = np.asarray(humidity_percent, float) / 100.0
         return Sensitivity(
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
@@ -138,7 +138,7 @@ class Model:
     dispersion             of each gas
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
     density_slopes         function of the same giving each factor's DensitySlopes
-    vapour_formula         the saturation formula it goes with, a name in `humidity.FORMULAS`
+    vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
     standard_uncertainty   of the formula itself in the group index of dry air, perfect weather given
     vapour_uncertainty     what each hPa of vapour adds to it in squares; see `uncertainty`
     limits                 argument's name -> Limit

@@ -104,7 +104,8 @@ def length_excess(curvature_, length):
     curvature_   of the ray, 1/m
     length       of the chord, m
 
-    Source: derived at the top of this file, kappa² d³/24; `velocity.arc_to_chord_correction` takes it away.
+    Source: derived at the top of this file, kappa² d³/24; `atmosphere.sound.velocity.arc_to_chord_correction` takes it
+    away.
 
     >>> round(float(length_excess(1e-6, 120.0)) * 1e6, 3)
     0.072

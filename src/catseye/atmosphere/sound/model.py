@@ -24,7 +24,7 @@ class SoundPartials(NamedTuple):
     co2_ppm: Any
 
     def with_humidity_held(self, saturation, humidity_percent) -> "SoundSensitivity":
-        """The chain rule from vapour pressure to relative humidity, by a `humidity.Saturation` and its slopes."""
+        """The chain rule from vapour pressure to relative humidity, by `saturation` and its slopes."""
         fraction = np.asarray(humidity_percent, float) / 100.0
         return SoundSensitivity(
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
@@ -61,7 +61,7 @@ class SoundModel:
     source                 the bibliography's keys
     speed                  function giving m/s
     partials               function giving SoundPartials
-    vapour_formula         the saturation formula it goes with, a name in `humidity.FORMULAS`
+    vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
     standard_uncertainty   of the formula itself, m/s, perfect weather given
     limits                 argument's name -> Limit
     has_co2                whether carbon dioxide enters

@@ -143,7 +143,7 @@ def temperature_of_speed_c(
     humidity_percent   relative humidity over liquid water, 0 to 100 %
     model              a name in MODELS
     co2_ppm            carbon dioxide, ppm, within the model's limits
-    frequency_hz       of the sound: the air's dispersion (`sound_dispersion`) is taken off the speed
+    frequency_hz       of the sound: the air's dispersion (`dispersion`) is taken off the speed
 
     Source: [PARKER04] eqs. 4.6 and 4.7, there with vapour pressure given; here Newton's method, exact to 1e-9 °C.
     Raises ValidityError for what is outside, the temperature found included.

@@ -300,7 +300,7 @@ def carried_pressure(
     vapour_pressure_hpa   at the barometer, 0 hPa to the total pressure (moist air is lighter)
     gravity               mean between, m/s²
 
-    `path.pressure_at` is the notes' 0.11 hPa/m, `path.hydrostatic_pressure_hpa` this with no lapse.
+    `atmosphere.path.mean.pressure_at` is the notes' 0.11 hPa/m, `hydrostatic_pressure_hpa` there this without lapse.
     Raises ValidityError outside these limits, and where the air would fall to absolute zero on the way.
     Source: [ICAO93] eqs. of the layers with lapse, with [CIDDOR96]'s molar masses; ideal gas. Good to 0.005 hPa over
     150 m with exact inputs, 4e-4 of the fall.

@@ -8,7 +8,8 @@ They agree within 0.1 % from -20 to 50 °C, which is 2e-9 in the index of satura
 0.1 % of each other from -40 to 0 °C.
 
 Below 0 °C the same vapour has a dew point and, nearer to the air's temperature, a frost point: at a dew point of
--10 °C the frost point is -8.9 °C. Which of them an instrument shows is not in its reading (see `hygrometer`).
+-10 °C the frost point is -8.9 °C. Which of them an instrument shows is not in its reading (see
+`atmosphere.index.hygrometer`).
 """
 
 from collections.abc import Callable

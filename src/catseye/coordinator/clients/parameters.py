@@ -1,6 +1,5 @@
 """M&C's parameters: checked for legality one by one and together, then activated by PREPARE and START."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -63,18 +62,3 @@ class Parameters:
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Name, value now, value that waits or none, help."""
         return [(p.name, p.now(), self._set.get(p.name, "none"), p.help) for p in self._all.values()]
-
-
-def number(low: float, high: float) -> Check:
-    """Numbers between two, both included."""
-
-    def check(text: str) -> str:
-        try:
-            value = float(text)
-        except ValueError:
-            raise InputError(f"{text[:20]!a} is no number (expected {low:g} to {high:g})") from None
-        if not (math.isfinite(value) and low <= value <= high):
-            raise InputError(f"{text[:20]} is outside {low:g} to {high:g}")
-        return f"{value:g}"
-
-    return check

@@ -1,8 +1,9 @@
 """The last word between every plan and every ranger: what may not be sent, and which beam must move, or go dark, when.
 
 It believes nobody: its Sun is its own, and where a command leads it works out from what the ranger was told. Of a move
-the whole rectangle of counts between where the mirror may be and where it goes is asked (`sweep`), so it does not
-matter how the axes run. It must be told what rangers answer (`heard`) and how the telescope stands (`telescope`).
+the whole rectangle of counts between where the mirror may be and where it goes is asked
+(`coordinator.visibility.sweep`), so it does not matter how the axes run. It must be told what rangers answer (`heard`)
+and how the telescope stands (`telescope`).
 """
 
 from collections.abc import Mapping

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.vantage import Vantage
 from catseye.errors import InputError
-from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
 from catseye.geometry.mirror.pointing import Station
 from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.cubes import Cubes
@@ -23,7 +22,6 @@ from catseye.records.site.folder import REFERENCE
 
 Array = NDArray[np.float64]
 GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
-MOST = 40.0 * COUNTS_PER_TURN  # counts: what is beyond is no place of a mirror
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""All sets of whole cycles that a prior position allows: the search behind `ambiguity`."""
+"""All sets of whole cycles that a prior position allows, one after the other, for `search`."""
 
 from dataclasses import dataclass
 from itertools import combinations

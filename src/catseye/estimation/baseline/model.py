@@ -1,6 +1,6 @@
 """The linear model of a baseline: shots averaged over their sets, directions, places known before; and its solution.
 
-See `baseline` for what is modelled.
+See `adjustment` for what is modelled.
 """
 
 from dataclasses import dataclass, replace

@@ -33,7 +33,7 @@ class GroupMotion:
     rigid         test that it did not deform (strain zero); None where strain was not asked for
     fit           test of what motion and strain leave over; None without redundancy
     curvature     m, second-order effect of the rotation that this linear model leaves out; beyond the points' sigma
-                  use `rigid_body.fit_transformation`
+                  use `shapes.rigid_body.fit_transformation`
     """
 
     names: tuple[str, ...]

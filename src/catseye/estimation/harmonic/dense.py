@@ -14,7 +14,7 @@ FLOATING = 1e-12  # of the normal matrix scaled to ones: an eigenvalue below it 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """As `harmonic_series.HarmonicFit`; six_link is its six_covariance, None where points define no rigid part."""
+    """As `series.HarmonicFit`; six_link is its six_covariance, None where points define no rigid part."""
 
     rigid: Array
     own: Array

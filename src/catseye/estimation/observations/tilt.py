@@ -15,9 +15,9 @@ from catseye.estimation.observations.unit_direction import require_direction
 class Tilts(Kind):
     """observed = asin(axis . R' up / |axis|) + x[zero] + error: how far a sensitive axis points above the horizontal.
 
-    R = exp([w]x) R0 is ground from frame, see `pose`. A two-axis inclinometer gives two rows, with axes (1, 0, 0) and
-    (0, 1, 0) where it is mounted square: for a small w the first reads -w_y, the second w_x. A turn about the vertical
-    does not show.
+    R = exp([w]x) R0 is ground from frame, see `bodies.pose`. A two-axis inclinometer gives two rows, with axes (1, 0,
+    0) and (0, 1, 0) where it is mounted square: for a small w the first reads -w_y, the second w_x. A turn about the
+    vertical does not show.
 
     name         what the group is, for reports
     observed     (m,) rad, positive when the axis points up

@@ -130,7 +130,8 @@ def fit_pose(
     cross               (3n, 3n) m^2, of the first (rows) with the second (columns), if any
     pivot               (3,) m, about which the rotation is told; the points' mean if None
     robust              None keeps every point; one of METHODS leaves out points that moved on their own: an L1 start,
-                        then that method's weights, by `robustness.estimate_robustly`; what it rejects goes whole
+                        then that method's weights, by `quality.robustness.estimate_robustly`; what it
+                        rejects goes whole
     limit               |w| of a coordinate beyond which `robust` rejects
 
     After a robust start the points that stay count fully, so the covariance is that of plain least squares with them;

@@ -32,7 +32,7 @@ def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
     paths       as reduced
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     """
     when = datetime.now(UTC)
     files: Files = {

@@ -302,7 +302,7 @@ def write_refractometer(
     """Table, object, report, and last the provenance with the hashes of the others.
 
     found       a calibrated path
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     progress    told of each file
     """
     when = datetime.now(UTC)

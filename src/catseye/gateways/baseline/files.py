@@ -27,7 +27,7 @@ def write_calibration(
     """Tables, object, report, and last the provenance with the hashes of the others.
 
     found       a calibration
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name
     progress    told of each file
     """

@@ -137,7 +137,7 @@ def pose_object(reduction: "Reduction") -> dict[str, Any]:
 
 
 def provenance_object(reduction: "Reduction", when: datetime) -> dict[str, Any]:
-    """What went in, by which programs, under which assumptions, when; `written.write_files` adds what came out."""
+    """What went in, by which programs, with which settings, when; `writers.written.write_files` adds what came out."""
     campaign = reduction.campaign
     return {
         "format": FORMAT,

@@ -39,7 +39,7 @@ def write_network(
     """Tables, objects, report, and last the provenance with the hashes of the others.
 
     found       what is told of a solution
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name, see `input_hashes`
     progress    told of each file
     treated     how observations were treated, where that was asked for

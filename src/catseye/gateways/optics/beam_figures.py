@@ -237,7 +237,7 @@ def write_beam(found: BeamPath, directory: Path, inputs: dict[str, str]) -> None
     """Tables, figure, object, and last the provenance with the hashes of the others.
 
     found       a reduced beam train
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      hashes of what was read
     """
     files: Files = {

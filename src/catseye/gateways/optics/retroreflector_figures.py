@@ -60,8 +60,8 @@ def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, An
 
     dimensions   of the targets; the GBT's if None
 
-    Source: `optics.retroreflector.hollow_cube`, `solid_prism`, `cats_eye`. Raises ValidityError for sizes that are
-    none.
+    Source: `hollow_cube`, `solid_prism` and `cats_eye` in `optics.retroreflector`. Raises ValidityError for sizes that
+    are none.
     """
     given = Dimensions() if dimensions is None else dimensions
     hollow, solid, ball = given.targets()

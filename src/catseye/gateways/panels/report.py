@@ -39,7 +39,7 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
     """Tables, object, report, and last the provenance with the hashes of the others.
 
     work        as reduced
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     progress    told of each file
     """
     when = datetime.now(UTC)

@@ -36,7 +36,7 @@ def write_pose(found: PoseResult, directory: Path, inputs: Mapping[str, str], se
     """Every file, and last the provenance.
 
     found       a pose
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name
     settings    what was asked for
     """

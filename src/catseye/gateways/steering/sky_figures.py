@@ -37,7 +37,7 @@ def sky_figure(
     guard    of the ranger
     mjd      UTC
     slew     counts (2,) from and to: the slew asked for, drawn to its first entry
-    route    what `reroute.route` found instead
+    route    what `reduction.steering.reroute.route` found instead
     """
     with mpl.rc_context():
         mpl.rcdefaults()

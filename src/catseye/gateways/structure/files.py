@@ -32,7 +32,7 @@ def write_structure(
     """The files of a fit.
 
     fit, check, predicted   as for `structure_object`
-    directory               ours to fill: see `output.whole_directory`
+    directory               ours to fill: see `writers.output.whole_directory`
     told                    what `structure_object` gave
     inputs                  SHA-256 of each file read, by its name
     progress                told of each file

@@ -44,7 +44,7 @@ def write_surface(
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name
     progress    told of each file
     """

@@ -34,7 +34,7 @@ def write_triplets(
     """NAME.txt, NAME.html, NAME.json for each sheet NAME.toml, triplets.csv, and the provenance with their hashes.
 
     units       calibrations by the file of their sheet
-    directory   exists, and is ours to fill: see `output.whole_directory`
+    directory   exists, and is ours to fill: see `writers.output.whole_directory`
     hashes      SHA-256 of each file
     progress    told of each file
 

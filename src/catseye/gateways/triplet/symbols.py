@@ -1,7 +1,7 @@
 """Every symbol of the triplet memo's section 3.4, with its meaning and its value in a calibration.
 
 `prism_D_1` and `prism_D_2` are the memo's bold D, the prisms' heights; `I_1` its gothic I; `dPc_1` its delta Pc. Psi,
-D_0 and I are by the memo's formulas; what H_corr rests on is by the ranges (see `triplet_geometry`).
+D_0 and I are by the memo's formulas; what H_corr rests on is by the ranges (see `reduction.triplet.geometry`).
 """
 
 from collections.abc import Callable

@@ -279,7 +279,8 @@ def first_entry(
     at, now = np.arange(n if zones else 0), np.zeros(n if zones else 0)
     while len(at):
         left = slews[at]
-        direction = beam(station, left.position(now)) @ station.mirror_from_ground  # as `ray`: eq. 2.47 turned round
+        # as `geometry.mirror.pointing.ray`: eq. 2.47 turned round
+        direction = beam(station, left.position(now)) @ station.mirror_from_ground
         share = now / np.where(total[at] > 0.0, total[at], 1.0)
         rate = left.beam_rate(now)
         gap, step = np.full(len(at), np.inf), np.full(len(at), np.inf)

@@ -80,7 +80,7 @@ def lean(frame: LocalFrame, points: ArrayLike) -> Floats:
 def mount_angles(gamma_matrix: ArrayLike) -> Floats:
     """The angles alpha1, alpha2, alpha3 (..., 3), rad, of a mount's matrix.
 
-    gamma_matrix   (..., 3, 3), from `mount.gamma`; alpha2 within ±pi/2
+    gamma_matrix   (..., 3, 3), from `geometry.mirror.mount.gamma`; alpha2 within ±pi/2
 
     Source: [PARKER04] eq. 2.5, elements 11, 12, 13, 23, 33. Exact.
 

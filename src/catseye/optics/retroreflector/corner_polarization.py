@@ -36,7 +36,7 @@ class Corner:
     """A cube corner as polarized light meets it.
 
     index       phase index of what fills it over that of the air: 1 for a hollow one
-    mirror      what its three faces reflect, from within: see `polarization.surface`
+    mirror      what its three faces reflect, from within: see `optics.polarization.surface`
     bare_face   a solid one has no antireflection coating, so that its face takes its share of s and p
     """
 
@@ -54,7 +54,7 @@ def hollow_corner(metal: complex) -> Corner:
 
     metal   index n + ik of the metal at the wavelength; infinite for a perfect conductor
 
-    Source: `polarization.reflection`.
+    Source: `optics.polarization.reflection`.
 
     >>> sector_jones(hollow_corner(complex("inf")), 0.3, 1.0)[2].real.round(12) + 0.0
     array([[1., 0.], [0., 1.]])
@@ -69,8 +69,8 @@ def solid_corner(index: float, behind: complex = 1.0, *, bare_face: bool = False
     behind      index behind its three faces: 1 for bare glass, n + ik for metal
     bare_face   as in `Corner`
 
-    Source: `polarization.reflection`. [PLAYER88] finds a quarter wave plate at an index that the abstract prints as
-    1.76476 (0.10 deg off): 1.767476 with a digit lost, as we infer.
+    Source: `optics.polarization.reflection`. [PLAYER88] finds a quarter wave plate at an index that the abstract prints
+    as 1.76476 (0.10 deg off): 1.767476 with a digit lost, as we infer.
 
     >>> from catseye.optics.polarization import retardance
     >>> round(float(np.degrees(retardance(sector_jones(solid_corner(1.767476), 0.0)[0]))), 4)

@@ -1,4 +1,4 @@
-"""Laser safety of a beam: its class, how far it is a hazard to eyes, what comes back (sweeping: `safety_sweep`).
+"""Laser safety of a beam: its class, how far it is a hazard to eyes, what comes back (sweeping: `sweep`).
 
 A warning for planning, never a certificate. The air takes nothing away, the beam is Gaussian, its centre hits the
 pupil, and nobody looks away sooner than the duration says.
@@ -144,7 +144,7 @@ def hazard_zone(beam: LaserBeam, limits: tuple[Limit, ...], viewer: Viewer = NAK
     """Distances (from, to), m, between which the standing beam is more than a limit allows; (0, 0) if nowhere.
 
     beam     the laser's
-    limits   of `safety_limits`; for the nominal ocular hazard distance those of the eye
+    limits   of `limits`; for the nominal ocular hazard distance those of the eye
     viewer   what the eye looks through
 
     With d^2 = d_w^2 + (divergence (z - z_w))^2 a Gaussian beam puts 1 - exp(-2 (D/d)^2) of its power through D; the
@@ -168,7 +168,7 @@ def classify(
     """The class that the beam would have as a product's only accessible emission.
 
     beam           the laser's, standing still: a sweep counts only where nothing can stop it
-    edition        a name in `safety_limits.EDITIONS`
+    edition        a name in `limits.EDITIONS`
     long_viewing   looking into it for long is intended: 30 000 s instead of 100 s
     subtense       rad, of the apparent source
 

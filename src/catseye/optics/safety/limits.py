@@ -26,7 +26,6 @@ CLASSES = ("1", "1M", "2", "2M", "3R", "3B", "4")
 ALPHA_MIN = 1.5e-3  # rad: a smaller source is a point to the eye
 PUPIL, SKIN_APERTURE = 7e-3, 3.5e-3  # m, diameters over which exposures are averaged
 SHORTEST, LONGEST = 1e-9, 3e4  # s
-PUPIL_AREA = 0.25 * np.pi * PUPIL**2
 CLASS_2, CLASS_3B = 1e-3, 0.5  # W
 
 

@@ -1,6 +1,6 @@
 """Laser safety of a beam that sweeps past an eye: a train of pulses, and how far it is a hazard.
 
-As `safety`: a warning for planning, never a certificate.
+As `hazard`: a warning for planning, never a certificate.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""Commands of the axes: moves, filters, homing, waiting. See `handlers` for how a handler answers."""
+"""Commands of the axes: moves, filters, homing, waiting. See `ranger.handlers` for how a handler answers."""
 
 from collections.abc import Callable, Generator
 

@@ -1,7 +1,7 @@
 """A network from a file or a folder, whatever program wrote it.
 
-folder        points.csv and ranges.csv                  `network_folder`
-.toml         our own, `format = "catseye-network-1"`    `network_toml`
+folder        points.csv and ranges.csv                  `folder`
+.toml         our own, `format = "catseye-network-1"`    `toml`
 .gkf, .xml    GNU Gama                                   `gama`
 .dat          STAR*NET                                   `starnet`
 """

@@ -12,7 +12,7 @@
                        u_mm + u_ppm of the length
     [[observations]]   many: columns and rows, or file; keys that stand beside them hold for all rows
     [[correlated]]     observation = [tables], correlation = matrix of all their values
-    [[body]] [[shape]] [[frame]] [[tilt]] [[plane]] [[line]] [[sphere]]     see `network_toml_bodies`
+    [[body]] [[shape]] [[frame]] [[tilt]] [[plane]] [[line]] [[sphere]]     see `toml_bodies`
 
 Kinds: slope_distance horizontal_distance fixed_distance distance_difference (from, to, from_2, to_2) direction (with
 set, "1" if not said) angle (at, backsight, foresight) azimuth zenith_angle height_difference inclination level_plane

@@ -77,7 +77,7 @@ def site_air(
     ground    m, height of the ground in the ground frame; None: 2 m below the record's lowest station
     without   names of stations to leave out, one that lies perhaps
     block     s, average readings over it; None: none up to 2000 readings, beyond that just as much as is needed
-    model     a name in `air.MODELS`
+    model     a name in `atmosphere.index.air.MODELS`
     co2_ppm   carbon dioxide, ppm
     temperature, pressure, humidity   priors
 

@@ -147,7 +147,7 @@ def explain_shot(
         )
     except InputError as problem:
         return replace(known, notes=(*known.notes, str(problem)))
-    return _budgeted(known, scene, draws, seed, reduction, progress)
+    return _budgeted(known, scene, draws, seed, progress)
 
 
 def budget_of(scene: Scene, items: tuple[Item, ...]) -> Budget:
@@ -168,9 +168,7 @@ def scatter_of(scene: Scene, items: tuple[Item, ...], draws: int, seed: int) -> 
     return replace(found, u=float("nan")) if spreadless else found  # such a t has no variance, only an interval
 
 
-def _budgeted(
-    known: Explanation, scene: Scene, draws: int, seed: int, reduction: Reduction | None, progress: Progress | None
-) -> Explanation:
+def _budgeted(known: Explanation, scene: Scene, draws: int, seed: int, progress: Progress | None) -> Explanation:
     items = items_of(scene)
     budget = budget_of(scene, items)
     if progress is not None and draws:

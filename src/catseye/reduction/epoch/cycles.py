@@ -2,8 +2,9 @@
 
 A shot's nearest integer is safe while misfit and five standard uncertainties of its coarse length stay under a quarter
 wavelength. Shots that keep this are adjusted first; what they and the records (benchmarks, triplets' dimensions) then
-say of the others may make those safe. Points that are still known too badly are searched for with `ambiguity`, against
-the stations as adjusted, round after round: rangers of the feed arm first, then what only these have seen.
+say of the others may make those safe. Points that are still known too badly are searched for with
+`estimation.ambiguity.search`, against the stations as adjusted, round after round: rangers of the feed arm first, then
+what only these have seen.
 """
 
 from dataclasses import dataclass, replace

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError
@@ -29,7 +28,6 @@ from catseye.reduction.live.state import Carried, from_ground, to_ground, with_u
 from catseye.reduction.site.motion import Motion, ground_from
 
 SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of what a round claims
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

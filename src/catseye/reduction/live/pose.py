@@ -27,7 +27,6 @@ from catseye.reduction.live.state import REFERENCE_EPOCH, XYZ, Carried
 Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
 BISECTIONS = 30
-OFFSETS = ("azimuth times cos E", "elevation", "focus")
 
 
 @dataclass(frozen=True, eq=False)

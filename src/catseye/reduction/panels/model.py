@@ -229,7 +229,7 @@ def panel_model(
     )  # fmt: skip
     n = len(observed)
     factor = np.column_stack([told.share, -np.ones(n), np.ones(n), np.where(read[:, None], -told.tool, 0.0)])
-    groups, blocks = _reading_groups(readings, layout, sheet, told, mapped, (observed, at, factor, read))
+    groups, blocks = _reading_groups(layout, sheet, told, mapped, (observed, at, factor, read))
     prior, target = sheet.panel, layout.offset + shape
     u_target = np.where(mapped, prior.u_map_um * MICROMETRE, 0.0)[:, None] * np.ones(4)
     more = [
@@ -257,7 +257,6 @@ def _mapped(
 
 
 def _reading_groups(
-    readings: PanelReadings,
     layout: PanelLayout,
     sheet: PanelInstrument,
     told: Tips,

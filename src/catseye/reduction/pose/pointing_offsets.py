@@ -53,7 +53,7 @@ class PointingOffset:
 
     @property
     def correction(self) -> np.ndarray:
-        """(3,) what takes the offset away: its opposite; azimuth and elevation are those of `pointing_series`."""
+        """(3,) what takes the offset away, its opposite; angles as in `geometry.antenna.pointing_series`."""
         return -self.offset
 
     @property

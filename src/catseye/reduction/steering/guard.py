@@ -356,7 +356,7 @@ def guard_of(
     station     of its monument and mirror (`pointing.station_of`), or on the feed arm as the telescope stands
     mirror      its stops, and its tilts and encoder errors, whose sizes together widen every zone
     keep_out    boxes, cone, horizon, margin
-    place       of the ground frame's origin (`earth_rotation.place_of`); None does not watch the Sun
+    place       of the ground frame's origin (`reduction.site.earth_rotation.place_of`); None does not watch the Sun
     pace        of its axes
     """
     encoder = [

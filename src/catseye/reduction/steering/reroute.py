@@ -84,7 +84,8 @@ def route(
     Without a way the status says why. Raises ValidityError for steps that are not above 0, and for counts that are not
     two finite numbers.
 
-    Source: [DIJKSTRA59] for the shortest way; verified by conservative advancement, `keep_out.first_entry`.
+    Source: [DIJKSTRA59] for the shortest way; verified by conservative advancement,
+    `geometry.clearance.keep_out.first_entry`.
     """
     if not (len(step) == 2 and step[0] > 0.0 and step[1] > 0.0):
         raise ValidityError(f"step {step} is not two numbers of counts above 0")

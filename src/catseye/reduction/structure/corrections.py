@@ -4,7 +4,7 @@
     correct_posture   corrections to all frames that carry measured targets, the model's uncertainty as their prior
 
 Measured coordinates come with their full covariance, as `coordinates.json` has it; targets' places in their frames
-(the sheet) are uncertain too. Many postures together change the model itself: `structure_fit`.
+(the sheet) are uncertain too. Many postures together change the model itself: `fit`.
 """
 
 from collections.abc import Mapping, Sequence

@@ -91,8 +91,8 @@ def corrections(
     roughness   of the surface; found from the prisms without
 
     The model: ten Zernike terms and the paraboloid's own parameters, free; a smooth part and a part of each point's own
-    beside them (`surface_field`). Raises InputError for a position without its actuator, EstimationError where the
-    prisms are too few.
+    beside them (`estimation.shapes.surface_field`). Raises InputError for a position without its actuator,
+    EstimationError where the prisms are too few.
     """
     own_place = {name: row for row, name in enumerate(shape.prisms.names)}
     same = np.array([own_place.get(name, -1) for name in names])

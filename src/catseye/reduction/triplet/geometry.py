@@ -139,7 +139,7 @@ def triplet_cycles(r: TripletReadings) -> TripletCycles:
     The coarse distance to a prism includes that it stands half of d_12 aside, 2.8 mm at 18 m.
 
     Source: [GOLDMAN00] eq. 3.11 solved for N. Its own rule (3.13, 3.16) takes INT and slips where true and coarse
-    length straddle a whole half wavelength: see `triplet_memo`.
+    length straddle a whole half wavelength: see `memo`.
     """
     half, half_fp = half_wavelengths(r)
     aside = np.sqrt(r.d_toppl**2 + r.h_s**2 + 0.25 * r.d_12**2)

@@ -9,7 +9,6 @@ from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 
 THINNEST, THICKEST = 0.05e-3, 0.15e-3  # m, the memo's estimate of the paint
 TOLERANCE = 0.15e-3  # m, of a point's place as made
-POINTS = ("T_1", "T_2", "BC")
 
 
 @dataclass(frozen=True)

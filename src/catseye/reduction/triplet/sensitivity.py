@@ -1,8 +1,8 @@
 """How far a triplet that is not as designed, or not calibrated as meant, puts H_corr and the ball: exact geometry.
 
 The unit, the flip and the scan point are placed in three dimensions and their distances turned into phases; the
-calibration's own reduction (`triplet_geometry`), told the design, gives H_corr. On the telescope the same unit is
-ranged from any direction and reduced by `triplet_use`.
+calibration's own reduction (`geometry`), told the design, gives H_corr. On the telescope the same unit is
+ranged from any direction and reduced by `use`.
 
 What the flip does to the glass: the ball's constant cancels and the prisms' counts twice. With ranges to the prisms e_p
 too long and to the ball e_b, the calibration gives H_corr + e_b - e_p; in use the mid-point seems e_p deeper, and from

@@ -1,6 +1,6 @@
 """Triplets as observations of a network: what their sheets say of them, and ranges to their prisms with the obliquity.
 
-The memo's steps one by one (`triplet_use`) lose what the ranges say of the unit's own shape; here the prisms, the ball,
+The memo's steps one by one (`use`) lose what the ranges say of the unit's own shape; here the prisms, the ball,
 the plate's tilts and the ball's lateral offsets are parameters, the offsets the same in every posture.
 """
 

@@ -29,9 +29,8 @@ from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.15e-3  # m: of the spacing, the ball's place, and of H_corr against the surface plate
-D_12, D_0 = 0.635, 18.0  # m: the design's spacing, the shortest calibration range
+D_12 = 0.635  # m: the design's spacing
 RATIO = 1.527077  # D.1
-WEATHER = (20.0, 933.0, 50.0)  # deg C, hPa, %: D.3, with the right temperature
 
 
 class Slopes(NamedTuple):
@@ -43,7 +42,8 @@ class Slopes(NamedTuple):
 
 
 MEMO_SLOPES = Slopes(-0.985e-6, 0.272e-6, -0.0096e-6)  # D.4 as printed
-SLOPES = Slopes(-0.895887e-6, 0.272048e-6, -0.0096058e-6)  # right, at WEATHER, by the formula that the memo used
+# right, by the formula that the memo used, at D.3's weather with the right temperature: 20 deg C, 933 hPa, 50 %
+SLOPES = Slopes(-0.895887e-6, 0.272048e-6, -0.0096058e-6)
 
 
 def spacing_effect(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> Array:

@@ -46,7 +46,7 @@ def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, c
 
     Source: [JCGM100] 5.1.4 note 2 and eq. F.2.
     """
-    inputs = list(_inputs(measurement, readings))
+    inputs = list(_inputs(measurement))
     count = len(measurement.placement)
     names = {name for _, moves in inputs for name in moves}
     stacked = {name: np.zeros((2 * len(inputs), count)) for name in names}
@@ -68,7 +68,7 @@ def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, c
     )
 
 
-def _inputs(measurement: TripletMeasurement, r: TripletReadings) -> Iterator[tuple[str, Moves]]:
+def _inputs(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
     """(group, what moves together by one standard uncertainty), every input once."""
     yield from _phases(measurement)
     yield from _air(measurement)

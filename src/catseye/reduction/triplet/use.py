@@ -9,14 +9,14 @@ Two ranges of a feed-arm ranger, corrected for the glass at normal incidence, be
 The exact last step is D_BC = sqrt(D_MP^2 - |v|^2 + (e . v)^2) - e . v, with v = H_corr n the ball from the mid-point:
 the memo leaves out H_corr^2 sin^2 / (2 D), 0.02 nm for 0.2 mm at 12 deg and 46 m, 0.2 um for the 20 mm that a record
 may hold. Figure 10's series, that of 3.19b, leaves out D_12^2 (delta_1 + delta_2) / (16 Delta^2): 2.4 um at 46 m where
-delta_1 + delta_2 is a wavelength (`triplet_memo.median_series`).
+delta_1 + delta_2 is a wavelength (`memo.median_series`).
 
 The memo takes the angles A-T-S for the incidences. The prisms' normals are parallel to the plate's, not meeting in A:
 T_1 A and T_2 A lean by D_12 / (2 D), 3 to 7 mrad, either way. At 46 m that is up to 0.3 um in each range at 10 deg,
 7 um at 30 deg, with opposite signs: the mid-point keeps a fiftieth of it or less. Here the normal itself is used.
 
 What lies beside the mid-point counts here, as it does not at the calibration: the ball 0.15 mm aside in the plate is
-0.15 mm times the sine of the incidence, 31 um at 12 deg (`triplet_tolerances`).
+0.15 mm times the sine of the incidence, 31 um at 12 deg (`tolerances`).
 """
 
 from collections.abc import Sequence

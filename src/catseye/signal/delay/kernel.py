@@ -1,4 +1,4 @@
-"""The compiled form of `delay_peak`: one pass a recording, its lines turned by a recurrence instead of exponentials."""
+"""The compiled form of `peak`: one pass a recording, its lines turned by a recurrence instead of exponentials."""
 
 import numpy as np
 from numba import njit
@@ -31,7 +31,7 @@ _inlined = njit(error_model="numpy")  # kept with their caller
 
 
 def find(piece, low, search: Search, ends):
-    """As `delay_peak.find`, its plain form."""
+    """As `peak.find`, its plain form."""
     found, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
     spectrum, scale = transformed(piece, search)
     padded = np.zeros((len(piece), search.stretch // 2 + 1), np.complex128)

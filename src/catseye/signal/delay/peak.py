@@ -1,6 +1,6 @@
 """The peak of a cross-correlation between the samples, and what is to be thought of it.
 
-This is the plain form of `delay_kernel`; the physics is in `delay`.
+This is the plain form of `kernel`; the physics is in `arrival`.
 """
 
 from enum import IntEnum

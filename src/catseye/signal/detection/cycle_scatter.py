@@ -15,8 +15,8 @@ them, and their ratio, the *colour*, has Fisher's distribution. Where it exceeds
 hundred, the scatter of the batches is claimed instead. That is honest for noise that forgets within a batch. For slower
 noise it is a lower limit: a factor of 2 to 3 may be missing, mostly without the threshold (2.8 at 128 cycles) being
 passed, and below it noise that does forget can hide a factor of 1.5 too. What is slower than a buffer shows between
-buffers: see `walk` and the calibration "oscillator". Noise with a colour below 1 (a line that averages out) keeps the
-larger claim.
+buffers: see `signal.drift.walk` and the calibration "oscillator". Noise with a colour below 1 (a line that averages
+out) keeps the larger claim.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The modes of a vibration found in a stretch of samples, for the filter of `vibration` to start with."""
+"""The modes of a vibration found in a stretch of samples, for `filter` to start with."""
 
 from collections.abc import Sequence
 from dataclasses import replace

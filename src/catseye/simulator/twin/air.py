@@ -21,7 +21,7 @@ WET, WET_WIDTH_C = 0.03, 0.15  # amplitude left on wet glass; width of the chang
 
 
 def saturation_hpa(temperature_c: ArrayLike, pressure_hpa: ArrayLike) -> Array:
-    """Saturation vapour pressure over water as in `air.group_refractivity_ppm`, hPa."""
+    """Saturation vapour pressure over water as in `simulator.night.air.group_refractivity_ppm`, hPa."""
     t = np.asarray(temperature_c, dtype=float)
     return 6.1121 * (1.0007 + 3.46e-6 * np.asarray(pressure_hpa)) * np.exp(17.502 * t / (240.97 + t))
 

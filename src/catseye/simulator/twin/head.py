@@ -55,7 +55,7 @@ class TwinHead:
     seed          of the twin: where the mirror stands at power on, offset, noise
     faults        of the twin: stuck-axis, lost-index, saturated-adc, drifting-clock are the head's
     tuning        how the mirror is driven where no command says it
-    travel        counts between the stops of azimuth and elevation: `twin_mirror.travel_of(record)`
+    travel        counts between the stops of azimuth and elevation: `mirror.travel_of(record)`
     clock_error   s, the most that the head's clock is off while it follows its time signal
     converter     its electronics; drawn by the seed if None
 

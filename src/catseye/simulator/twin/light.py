@@ -76,7 +76,7 @@ def path_waves(ranger: str, target: str, *, index_ppm: float, streams: Streams, 
 class Electronics:
     """Phase of a head's electronics: a random walk of 10 mrad in the root of an hour; every third warms up.
 
-    It is a sum of waves with a 1/f^2 spectrum (`twin_waves.walk`): smooth below 5 s, a walk up to some days.
+    It is a sum of waves with a 1/f^2 spectrum (`waves.walk`): smooth below 5 s, a walk up to some days.
     """
 
     def __init__(self, ranger: str, streams: Streams, planted: Planted):

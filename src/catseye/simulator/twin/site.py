@@ -4,10 +4,10 @@ A twin is a pure function of its arguments and of time: nothing is stepped or st
 same twin agree without talking. Only faults come and go, by the board that is handed in. Times are s since the start,
 arrays (k,); places m, ground frame. Where its parts are:
 
-    twin_motion      where the telescope's axes turn          twin_air       weather, index, dew
-    twin_telescope   how it stands and bends                  twin_stations  rangers and their mirrors
-    twin_targets     where everything truly rests             twin_light     glass, acceptance, noise
-    twin_scene       all of these at a time                   twin_returns   what comes back
+    motion      where the telescope's axes turn          air        weather, index, dew
+    telescope   how it stands and bends                  stations   rangers and their mirrors
+    targets     where everything truly rests             light      glass, acceptance, noise
+    scene       all of these at a time                   returns    what comes back
 
 Left out, as below 1 um here: the time of flight (0.3 um at the rim in a slew), the bending of rays. What is not here at
 all: things that stand in a beam's way.

@@ -151,7 +151,7 @@ def single(record: TargetRecord, draw: Drawing) -> Retro:
 
 
 def triplet(record: Triplet, draw: Drawing) -> dict[str, Retro]:
-    """The truth of a triplet: two prisms and the ball, as `structure.triplet` has them, by the data sheet and its u."""
+    """Prisms and ball as they truly are, by the data sheet and its u (as `simulator.night.structure.triplet`)."""
     rng, gain = draw.streams(f"place/{record.triplet}"), draw.planted.gain
     ball = np.array(record.nominal_position_mm) * MILLIMETRE + draw.typed(rng, record.u_position_mm)
     normal = tilted(unit(np.array(record.normal)), gain("normals") * 0.3, rng)

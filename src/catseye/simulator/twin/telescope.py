@@ -21,7 +21,7 @@ from catseye.simulator.twin.motion import Angles, Motion
 from catseye.simulator.twin.waves import Waves, band, joined
 
 Array = NDArray[np.float64]
-ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `posture`
+ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `simulator.night.posture`
 GRAVITY_DISH = 0.6 * MILLIMETRE  # rms of the surface's low orders for a unit of sine or cosine of elevation
 GRAVITY_SHIFT = 2.0 * MILLIMETRE
 GRAVITY_SAG = 12.0 * MILLIMETRE  # of the arm's tip for a unit of cosine of elevation, the way gravity pulls

@@ -234,7 +234,7 @@ def _terms(
         index = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
         if len(index):
             known.append(Gauges(("zero priors", "scale priors")[i], 3 + i, index, start[index], sigma[index]))
-    return Terms(priors[0], priors[1], _between(network.between, counts[0], names), tuple(known))
+    return Terms(priors[0], priors[1], _between(network.between, counts[0]), tuple(known))
 
 
 def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointPriors:
@@ -258,7 +258,7 @@ def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointP
     return PointPriors(index, observed - origin, covariance)
 
 
-def _between(between: StationRanges | None, s: int, names: Names) -> StationRanges | None:
+def _between(between: StationRanges | None, s: int) -> StationRanges | None:
     if between is None or not len(between.distance):
         return None
     first, second = (np.asarray(i, dtype=np.int64) for i in (between.first, between.second))

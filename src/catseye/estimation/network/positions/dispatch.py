@@ -1,7 +1,8 @@
 """Positions of many targets from ranges to known stations, by weighted least squares.
 
-The stations are known here; where they are not, the network is adjusted as one (`adjustment`, `network`).
-Every threshold is a pure number: in standard uncertainties, or relative to the size of the stations' figure.
+The stations are known here; where they are not, the network is adjusted as one (`network.adjustment`,
+`network.multilateration`). Every threshold is a pure number: in standard uncertainties, or relative to the size of the
+stations' figure.
 """
 
 from collections.abc import Callable

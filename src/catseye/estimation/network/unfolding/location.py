@@ -1,7 +1,7 @@
 """Points from ranges to known points, many at once, with both places where the sum of squares is least.
 
-`trilateration` gives the one place, its covariance and a verdict; here the second place is wanted too, however well it
-fits, and no sigma is known yet.
+`positions.trilateration` gives the one place, its covariance and a verdict; here the second place is wanted too,
+however well it fits, and no sigma is known yet.
 """
 
 import numpy as np

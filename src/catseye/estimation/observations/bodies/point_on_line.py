@@ -16,8 +16,8 @@ class PointsOnLine(Kind):
     """observed_i = f_i . (P - centre) - x[shift_i] + error, i = 1, 2: the two components of the distance from a line.
 
     f_1, f_2 are square to the line and to each other. One number, the distance itself, would have no derivative on the
-    line. Four parameters are minimal: two tilts of the direction from its start (see `unit_direction`) and the shifts
-    along f_1, f_2. A line that is known has -1 in place of its parameters.
+    line. Four parameters are minimal: two tilts of the direction from its start (see `observations.unit_direction`) and
+    the shifts along f_1, f_2. A line that is known has -1 in place of its parameters.
 
     name         what the group is, for reports
     observed     (2b,) metres, point by point

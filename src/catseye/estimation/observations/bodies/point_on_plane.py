@@ -15,9 +15,9 @@ from catseye.estimation.observations.unit_direction import direction, require_di
 class PointsOnPlane(Kind):
     """observed = u . (P - centre) - x[offset] + error: the distance from the plane, positive where the normal points.
 
-    Three parameters are minimal: two tilts of the normal u from its start (see `unit_direction`) and the offset along
-    u. A plane that is known has -1 in place of its parameters. Observed 0 says on the plane; the radius of a ball that
-    touches it is another choice.
+    Three parameters are minimal: two tilts of the normal u from its start (see `observations.unit_direction`) and the
+    offset along u. A plane that is known has -1 in place of its parameters. Observed 0 says on the plane; the radius of
+    a ball that touches it is another choice.
 
     name         what the group is, for reports
     observed     (m,) metres

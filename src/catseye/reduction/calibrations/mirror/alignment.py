@@ -128,7 +128,7 @@ def calibrate_alignment(readings: Readings, reject: bool = False) -> Calibration
         reject=reject,
         level=sheet.level,
     )
-    return _told(readings, found, theta)
+    return _told(readings, found)
 
 
 def effect(
@@ -141,7 +141,8 @@ def effect(
     theta      (n,), rad, and phi, rad: the target's direction in mirror axes
     distance   m, from the scan point
 
-    The way runs from the plane across the incoming beam through the scan point, as in `mirror_path.path_change`.
+    The way runs from the plane across the incoming beam through the scan point, as in
+    `geometry.mirror.mirror_path.path_change`.
 
     >>> change, counts = effect(np.array([0.0, 1e-4, 0.0]), np.zeros(2), theta=np.zeros(1), phi=1.0, distance=100.0)
     >>> round(float(change[0] * 1e6), 6), counts.round(3).tolist()  # one count of elevation is 125.66 urad of the beam
@@ -159,7 +160,7 @@ def effect(
     return way - distance, counts - np.stack([ideal.azimuth_counts, ideal.elevation_counts], axis=-1)
 
 
-def _told(readings: Readings, found: CurvedFit, theta: np.ndarray) -> Calibration:
+def _told(readings: Readings, found: CurvedFit) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     wanted = [
         (f"beam {axis}", f"beam_{axis}_mm", "mm", f"laser beam from the azimuth axis at the mirror, along {axis}", 1.0)

@@ -75,10 +75,10 @@ def calibrate_limits(readings: Readings, reject: bool = False) -> Calibration:
         level=sheet.level,
     )
     single = claimed if claimed is not None else found.fit.components["scatter of a touch"]
-    return _told(readings, found, high, single)
+    return _told(readings, found, single)
 
 
-def _told(readings: Readings, found: CurvedFit, high: np.ndarray, single: float) -> Calibration:
+def _told(readings: Readings, found: CurvedFit, single: float) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     wide = [float(times) for times in student(fit.effective, WIDE)]
     inwards = [

@@ -59,7 +59,7 @@ def calibrate_azimuth(readings: Readings, reject: bool = False) -> Calibration:
     else:
         raise refusal(readings.file, f"the azimuth does not settle ({moved:.1e} rad in the last round): is a point at "
                                      "the instrument itself?")  # fmt: skip
-    return _told(sights, fit, linear, tied)
+    return _told(sights, fit, linear)
 
 
 def _tied(sights: Sights) -> bool:
@@ -234,7 +234,7 @@ def _closures(sights: Sights, fit: Fit, effects: list[Effect]) -> list[tuple[str
     return told
 
 
-def _told(sights: Sights, fit: Fit, linear: dict[str, Any], tied: bool) -> Calibration:
+def _told(sights: Sights, fit: Fit, linear: dict[str, Any]) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
     alpha1 = float(wrapped(np.array(np.pi - azimuth)))

@@ -160,7 +160,7 @@ def _squares(rail: Rail, orders: tuple[int, ...], active: np.ndarray, weight: np
     return float(v @ weight @ v)
 
 
-def _quantities(rail: Rail, fit: Fit, orders: tuple[int, ...], absolute: bool) -> tuple[list, np.ndarray]:
+def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[list, np.ndarray]:
     """Keys, and the matrix that turns (offset at the mean, scale, cosines, sines) into the quantities."""
     count = len(orders)
     turn = np.diag([1.0 / MILLIMETRE, 1.0 / PPM, *([1.0 / MILLIMETRE] * 2 * count)])
@@ -189,7 +189,7 @@ def _told(
     reason: str,
 ) -> Calibration:
     sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
-    keys, turn = _quantities(rail, fit, orders, sheet.start_m is not None)
+    keys, turn = _quantities(rail, orders, sheet.start_m is not None)
     covariance = turn @ fit.covariance @ turn.T
     found = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
     count = len(orders)
