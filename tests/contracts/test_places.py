@@ -124,7 +124,7 @@ def test_what_is_history_is_still_said():
         ("as `catseye.signal.cycles.whole.Decision.margin` says", None, True, None),
         ("as `catseye.signal.cycles.whole.Decision.marvel` says", None, False, None),
         ("as `signal.whole` says, by `.venv/bin/catseye reduse`", None, False, False),
-        ("`records.read_campaign(directory)`, `catseye plot servo`", None, True, True),
+        ("`records.night.campaign.read_campaign(directory)`, `catseye plot servo`", None, True, True),
         ("`estimation.adjustment`", None, False, None),
         ("`catseye` alone, `signalled.word`, a catseye somewhere, `air.MODELS`", None, None, None),
     ],
