@@ -125,6 +125,22 @@ def test_the_truth_of_a_shaking_point_is_its_mean_over_the_epochs_shots():
     assert at_once > 3.0 * found.worst_mm
 
 
+def test_a_shot_is_of_the_middle_of_its_buffer():
+    """All shots of one buffer while the arm's tip shakes: the truth of its middle is met, that of its begin is not."""
+    world = twin("fixed 145.3 30", planted=only("vibration"))
+    judge = {}
+    for instant in (5.0, 5.064):  # where a buffer of 0.128 s begins, and its middle
+        judge[instant] = TwinComparison(site(), world, reference_after=1)
+        for shot in shots(world, np.full(len(NUMBERS), 5.0)):
+            judge[instant].shot(shot)
+    met = {
+        instant: each.epoch(solution(world, np.array(list(world.truth(NAMES, instant).values())), np.eye(15))).worst_mm
+        for instant, each in judge.items()
+    }
+    assert met[5.064] < 0.001  # ticks of 0.9 ms, at some 1 mm/s
+    assert met[5.0] > 10.0 * met[5.064]
+
+
 def test_shots_that_come_while_an_epoch_is_solved_are_of_the_next_one():
     """The telescope slews: were the second epoch held against the times of none, or of the first, it would be off."""
     world = still("slew 145.3 30 150 35")
