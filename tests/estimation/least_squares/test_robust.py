@@ -321,3 +321,40 @@ def test_whatever_is_wrong_it_ends_with_a_status(seed, stations, wrong, typed):
             assert np.abs(fit.standardised[seen]).max(initial=0.0) < 3.5
     else:
         assert not typed or "undecided" in solution.status or "not converged" in solution.status
+
+
+# back in: what was left out must fit better than what is left out, or the two limits would be one
+
+
+def one_left_out(w, others=4):
+    """One unknown seen alike by some who agree and one who is |w| from them; which were left out at the end.
+
+    Against the mean of k others of the same sigma an observation stands off by sigma sqrt(1 + 1/k).
+    """
+    observed = np.array([*([0.0] * others), w * SIGMA * np.sqrt(1.0 + 1.0 / others)])
+    groups = [Linear("seen", observed, np.full(others + 1, SIGMA**2), np.arange(1), np.ones((others + 1, 1)))]
+    removable, active = [np.ones(others + 1, dtype=bool)], [np.arange(others + 1) < others]
+
+    def adjusted(start):
+        solution = adjust_robustly(np.zeros(1), groups, removable, active=[start]).require_converged()
+        fit = solution.fits[0]
+        assert abs(fit.standardised[others]) == pytest.approx(abs(w), rel=1e-6)  # in or out: Baarda's w is the same
+        return np.flatnonzero(~fit.active).tolist()
+
+    return adjusted(active[0]), adjusted(np.ones(others + 1, dtype=bool))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("share", "once_out", "once_in"),
+    [
+        (1.02, [4], [4]),
+        (0.98, [4], []),
+        (0.92, [4], []),
+        (0.88, [], []),
+        (0.5, [], []),
+    ],
+)
+def test_what_is_out_comes_back_a_tenth_below_the_limit_and_what_is_in_stays_up_to_it(share, once_out, once_in, sign):
+    """Critical is 3.5: between 3.15 and 3.5 an observation stays where it is, so that no rounding turns it about."""
+    assert one_left_out(sign * share * 3.5) == (once_out, once_in)

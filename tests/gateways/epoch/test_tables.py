@@ -1,11 +1,14 @@
 """The tables say what was measured, shot by shot, and every correction can be followed."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
+from catseye.gateways.epoch.tables import kind_of, ranges_csv
+from column_scene import assert_columns
 
 
 def read(path):
@@ -77,3 +80,83 @@ def test_the_surface_has_a_row_a_prism(written, reduction):
     rows = read(written / "surface.csv")
     deviation = np.array([float(row["deviation_mm"]) for row in rows])
     assert np.sqrt(np.mean(deviation**2)) == pytest.approx(reduction.surface.rms * 1e3, abs=1e-4)
+
+
+def test_every_column_of_the_ranges_has_the_unit_of_its_name(reduction):
+    """In night-01 no head stands off its scan point and no shot is thin: here some do and are."""
+    campaign, phases, coordinates = reduction.campaign, reduction.phases, reduction.coordinates
+    count = len(coordinates.ranges.shot)
+    ranges = replace(coordinates.ranges, head=np.linspace(-3e-3, 5e-3, count), thin=np.arange(count) % 7 == 0)
+    changed = replace(reduction, coordinates=replace(coordinates, ranges=ranges))
+    shots, row = campaign.shots, {int(shot): k for k, shot in enumerate(ranges.shot)}
+    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
+
+    def ranged(value):
+        return lambda k: value(row[k]) if k in row else None
+
+    def vacuum(k):
+        return (ranges.cycles[k] - ranges.phase[k] / TWO_PI) * half
+
+    told = {
+        "shot": lambda k: shots.shot[k],
+        "mjd_utc": lambda k: shots.mjd_utc[k],
+        "ranger": lambda k: shots.ranger[k],
+        "target": lambda k: shots.target[k],
+        "status": lambda k: reduction.status[k],
+        "reason": lambda k: reduction.rejected.get(int(shots.shot[k]), ""),
+        "amplitude_v": lambda k: phases.amplitude[k],
+        "phase_rad": lambda k: phases.phase[k],
+        "u_phase_rad": lambda k: phases.u_phase[k],
+        "electronics_rad": ranged(lambda k: ranges.electronics[k] % TWO_PI),
+        "difference_rad": ranged(lambda k: ranges.phase[k]),
+        "cycles": ranged(lambda k: ranges.cycles[k]),
+        "margin_mm": ranged(lambda k: ranges.margin[k]),
+        "thin": lambda k: "thin" if k in row and ranges.thin[row[k]] else "",
+        "vacuum_length_m": ranged(vacuum),
+        "refractivity_ppm": ranged(lambda k: ranges.refractivity[k]),
+        "air_mm": ranged(lambda k: -vacuum(k) * ranges.refractivity[k] / (1.0 + ranges.refractivity[k])),
+        "d0_mm": lambda k: 1e-3 * campaign.mirror_of(shots.ranger[k]).d0_mm,
+        "zero_mm": ranged(lambda k: ranges.zero[k]),
+        "glass_mm": ranged(lambda k: ranges.glass[k]),
+        "incidence_deg": ranged(lambda k: ranges.incidence[k]),
+        "obliquity_mm": ranged(lambda k: ranges.obliquity[k]),
+        "leakage_mm": ranged(lambda k: ranges.leakage[k]),
+        "head_mm": ranged(lambda k: ranges.head[k]),
+        "range_m": ranged(lambda k: ranges.range_[k]),
+        "u_range_mm": ranged(lambda k: ranges.u_range[k]),
+        "residual_mm": ranged(lambda k: ranges.residual[k]),
+        "standardised": ranged(lambda k: ranges.standardised[k]),
+        "redundancy": ranged(lambda k: ranges.redundancy[k]),
+        "detectable_mm": ranged(lambda k: ranges.detectable[k]),
+    }
+    assert_columns(ranges_csv(changed), told, range(len(shots)))
+
+
+def test_every_column_of_the_coordinates_has_the_unit_of_its_name(written, reduction):
+    found = reduction.coordinates
+
+    def q(i, a, b):
+        return found.covariance[3 * i + a, 3 * i + b]
+
+    told = {
+        "point": lambda i: found.points[i],
+        "kind": lambda i: kind_of(reduction, found.points[i]),
+        **{f"{'xyz'[a]}_m": lambda i, a=a: found.x[i, a] for a in range(3)},
+        **{f"u_{'xyz'[a]}_mm": lambda i, a=a: q(i, a, a) ** 0.5 for a in range(3)},
+        **{f"cov_{'xyz'[a]}{'xyz'[b]}_mm2": lambda i, a=a, b=b: q(i, a, b) for a, b in ((0, 1), (0, 2), (1, 2))},
+        "shots": lambda i: found.shots[i],
+        "from_approximate_mm": lambda i: np.linalg.norm(found.x[i] - found.start[i]),
+    }
+    assert_columns((written / "coordinates.csv").read_text(), told, range(len(found.points)))
+
+
+def test_every_column_of_the_surface_has_the_unit_of_its_name(written, reduction):
+    surface, found = reduction.surface, reduction.coordinates
+    told = {
+        "point": lambda i: surface.names[i],
+        **{f"{'xyz'[a]}_dish_m": lambda i, a=a: surface.fit.local[i, a] for a in range(3)},
+        "deviation_mm": lambda i: surface.fit.deviation[i],
+        "u_deviation_mm": lambda i: surface.u_deviation[i],
+        "shots": lambda i: found.shots[found.points.index(surface.names[i])],
+    }
+    assert_columns((written / "surface.csv").read_text(), told, range(len(surface.names)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal.entries import AnsweredShot, Run, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Command, Run, Solution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
@@ -17,6 +17,7 @@ from catseye.gateways.writers import output
 from catseye.records.night.campaign import read_campaign
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
+from column_scene import assert_columns
 from journal_scene import START, scene_entries, scene_run, scene_shot
 
 HALF_TICK = 0.5 / TICKS_PER_DAY
@@ -138,6 +139,102 @@ def test_coordinates_come_with_the_block_of_the_covariance_that_is_theirs(tables
         "",
         "2",
     )
+
+
+def nested(name):
+    """Of an answer: SI as the live reduction gives it; nothing for a null."""
+    return lambda r: r[1].answer.get(name)
+
+
+COLUMNS = {  # what each column says of an entry and, where an entry has more rows, of one of its points
+    "shots": {
+        "number": lambda r: r[1].shot.number,
+        "ranger": lambda r: r[1].shot.ranger,
+        "target": lambda r: r[1].shot.target,
+        "cycles": lambda r: r[1].shot.cycles,
+        "samples_per_cycle": lambda r: r[1].shot.samples_per_cycle,
+        "if_hz": lambda r: r[1].shot.if_hz,
+        "amplitude_v": lambda r: r[1].shot.amplitude,
+        "phase_rad": lambda r: r[1].shot.phase,
+        "status": lambda r: r[1].status,
+        "text": lambda r: r[1].text,
+        "range_m": lambda r: r[1].range_,
+        "u_range_mm": lambda r: r[1].u_range,
+        "misfit_mm": lambda r: r[1].misfit,
+    },
+    "weather": {
+        "station": lambda r: r[1].station,
+        "temperature_c": lambda r: r[1].temperature_c,
+        "pressure_hpa": lambda r: 100.0 * r[1].pressure_hpa,
+        "humidity_percent": lambda r: 0.01 * r[1].humidity_percent,
+    },
+    "postures": {
+        "azimuth_deg": lambda r: r[1].azimuth,
+        "elevation_deg": lambda r: r[1].elevation,
+        "azimuth_rate_deg_s": lambda r: r[1].azimuth_rate,
+        "elevation_rate_deg_s": lambda r: r[1].elevation_rate,
+    },
+    "commands": {
+        "ranger": lambda r: r[1].ranger,
+        "tid": lambda r: r[1].tid,
+        "line": lambda r: r[1].line,
+        "reply": lambda r: r[1].reply,
+        "ok": lambda r: {None: "", True: "1", False: "0"}[r[1].ok],
+    },
+    "happenings": {
+        **{name: lambda r, name=name: getattr(r[1], name) for name in ("severity", "who", "kind", "text")},
+        "details": lambda r: json.dumps(r[1].details),
+    },
+    "solutions": {
+        "number": lambda r: r[1].answer.get("number") or 0,
+        "variance_factor": nested("variance_factor"),
+        "degrees_of_freedom": nested("degrees_of_freedom"),
+        "refractivity_ppm": lambda r: None if r[1].answer.get("refractivity_ppm") is None else 268.5e-6,
+        "points": lambda r: len(r[1].answer.get("names") or ()),
+        "pose": lambda r: json.dumps(r[1].answer["pose"]) if "pose" in r[1].answer else "",
+    },
+    "coordinates": {
+        "point": lambda r: r[1].answer["names"][r[2]],
+        **{f"{'xyz'[a]}_m": lambda r, a=a: r[1].answer["x"][r[2]][a] for a in range(3)},
+        **{f"u_{'xyz'[a]}_mm": lambda r, a=a: r[1].covariance[3 * r[2] + a, 3 * r[2] + a] ** 0.5 for a in range(3)},
+        **{
+            f"cov_{'xyz'[a]}{'xyz'[b]}_mm2": lambda r, a=a, b=b: r[1].covariance[3 * r[2] + a, 3 * r[2] + b]
+            for a, b in ((0, 1), (0, 2), (1, 2))
+        },
+    },
+}
+ENTRIES = {
+    "shots": AnsweredShot,
+    "weather": LiveWeather,
+    "postures": LivePosture,
+    "commands": Command,
+    "happenings": Happening,
+    "solutions": Solution,
+    "coordinates": Solution,
+}
+
+
+def test_every_column_of_every_table_has_the_unit_of_its_name(tmp_path):
+    root = 1e-3 * np.random.default_rng(3).normal(size=(6, 9))
+    last = epoch(START + 7_777, root @ root.T)
+    last = replace(last, answer={**last.answer, "refractivity_ppm": 268.5, "degrees_of_freedom": 12.5})
+    turning = LivePosture(START + 7_000, 2.5, 0.7, 1e-3, -2e-3)  # rad, rad/s
+    entries = [*scene_entries(6), turning, last]
+    written(tmp_path / "j.db", entries)
+    with JournalReader(tmp_path / "j.db") as reader:
+        export_tables(reader, tmp_path / "out", runs=[1], forms=["csv"])
+    assert set(TABLES) == set(COLUMNS)
+    for name, told in COLUMNS.items():
+        own = [(seq, e) for seq, e in enumerate(entries, 1) if isinstance(e, ENTRIES[name])]
+        if name == "coordinates":
+            own = [(seq, e, point) for seq, e in own if "names" in e.answer for point in (0, 1)]
+        head = {
+            "run": lambda r: 1,
+            "seq": lambda r: r[0],
+            "mjd_utc": lambda r: stamp(r[1].shot.ticks if hasattr(r[1], "shot") else r[1].ticks),
+        }
+        silent = {"text"} if name == "shots" else set()
+        assert_columns((tmp_path / "out" / f"{name}.csv").read_text("utf-8"), head | told, own, silent)
 
 
 def test_the_provenance_names_journal_runs_and_every_file(tables):
@@ -263,6 +360,31 @@ def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_0
     assert np.array_equal(again.weather.humidity_percent, night.weather.humidity_percent)
     assert again.targets == night.targets
     assert again.mirrors == night.mirrors
+
+
+def test_every_column_of_a_campaign_has_the_unit_of_its_name(tmp_path):
+    entries = campaign_entries()
+    exported(tmp_path, entries)
+    shots = [e for e in entries if isinstance(e, LiveShot)]
+    readings = [e for e in entries if isinstance(e, LiveWeather)]
+    told = {
+        "shot": lambda k: shots[k].number,
+        "mjd_utc": lambda k: stamp(shots[k].ticks),
+        "ranger": lambda k: shots[k].ranger,
+        "target": lambda k: shots[k].target,
+        "cycles": lambda k: shots[k].cycles,
+        "samples_per_cycle": lambda k: shots[k].samples_per_cycle,
+        "frame": lambda k: k,
+    }
+    assert_columns((tmp_path / "out" / "shots.csv").read_text(), told, range(len(shots)))
+    told = {
+        "mjd_utc": lambda read: stamp(read.ticks),
+        "station": lambda read: read.station,
+        "temperature_c": lambda read: read.temperature_c,
+        "pressure_mb": lambda read: 100.0 * read.pressure_hpa,
+        "humidity_pct": lambda read: 0.01 * read.humidity_percent,
+    }
+    assert_columns((tmp_path / "out" / "weather.csv").read_text(), told, readings)
 
 
 def test_it_stands_as_the_telescope_stood(tmp_path):

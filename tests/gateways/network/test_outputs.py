@@ -5,6 +5,7 @@ import hashlib
 import io
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,18 +15,22 @@ from scipy.stats import chi2
 from catseye.errors import EstimationError
 from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.plan import Candidate
 from catseye.gateways.network.comparison import Comparison, comparison_object, comparison_passages, displacements_csv
 from catseye.gateways.network.files import input_hashes, write_comparison, write_network
 from catseye.gateways.network.findings import findings
 from catseye.gateways.network.objects import network_json, network_object
+from catseye.gateways.network.plan import candidates_csv
 from catseye.gateways.network.summary import treatment_passages
 from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
 from catseye.gateways.network.xml import NAMESPACE, network_xml
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
 from catseye.reduction.network import adjusted
+from column_scene import assert_columns
 from repository import TESTS
 
+LENGTHS = {"slope_distance", "horizontal_distance", "height_difference", "vector", "coordinates"}  # kinds in m
 NETWORKS = TESTS / "vectors" / "networks"
 GON = np.pi / 200.0
 TRUTH = {  # x north, y east, z up, as the axes-xy "ne" says
@@ -600,3 +605,104 @@ def test_the_files_of_two_epochs_stand_beside_each_other(compared, tmp_path):
     outputs = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))["outputs"]
     assert set(outputs) | {"provenance.json"} == names
     assert "epoch-1-coordinates.csv" in (tmp_path / "epoch-1-report.html").read_text(encoding="utf-8")
+
+
+# Units: each number is the one in memory over the unit in its column's name ------------------------------------------
+
+
+def test_every_column_of_the_coordinates_has_the_unit_of_its_name(found):
+    network = found.network
+    told = {
+        "point": lambda i: found.names[i],
+        **{f"{'xyz'[a]}_m": lambda i, a=a: found.x[i, a] for a in range(3)},
+        **{f"u_{'xyz'[a]}_mm": lambda i, a=a: found.covariance[i, a, a] ** 0.5 for a in range(3)},
+        **{
+            f"cov_{'xyz'[a]}{'xyz'[b]}_mm2": lambda i, a=a, b=b: found.covariance[i, a, b]
+            for a in range(3)
+            for b in range(a, 3)
+        },
+        **{f"semi_axis_{k + 1}_mm": lambda i, k=k: found.ellipsoid.semi_axes[i, k] for k in range(3)},
+        "fixed": lambda i: "x y z" if network.points.fixed[i].all() else "",
+        "datum": lambda i: "",
+        "observations": lambda i: found.seen[i],
+    }
+    largest = np.linalg.eigvalsh(found.covariance)[:, -1] ** 0.5
+    np.testing.assert_allclose(np.max(found.ellipsoid.semi_axes, axis=1), largest, rtol=1e-6)  # m, of the ellipsoid
+    assert_columns(coordinates_csv(found), told, range(len(found.names)), silent={"datum"})
+
+
+def test_every_column_of_the_observations_is_si_as_its_unit_says(found):
+    rows, names, suspects = found.table, (*found.names, ""), set(found.suspects.tolist())
+
+    def word(flags):
+        return lambda i: "yes" if flags[i] else "no"
+
+    told = {
+        "number": lambda i: i,
+        "kind": lambda i: rows.kinds[rows.kind[i]],
+        **{role: lambda i, k=k: names[rows.ends[i, k]] for k, role in enumerate(("from", "to", "third", "fourth"))},
+        "component": lambda i: str(rows.component[i]),
+        "unit": lambda i: "m" if rows.kinds[rows.kind[i]] in LENGTHS else "rad",
+        "observed": lambda i: rows.observed[i],
+        "u": lambda i: rows.u[i],
+        "residual": lambda i: rows.residual[i],
+        "standardised": lambda i: rows.standardised[i],
+        "redundancy": lambda i: rows.redundancy[i],
+        "mdb": lambda i: rows.mdb[i],
+        "estimated_error": lambda i: rows.estimated_error[i],
+        "bias_to_noise": lambda i: rows.bias_to_noise[i],
+        "effect": lambda i: rows.effect[i],
+        "test": lambda i: found.statistic[i],
+        "p": lambda i: found.p[i],
+        "suspect": lambda i: "yes" if i in suspects else "no",
+        "active": word(rows.active),
+        "checked": word(rows.checked),
+        "group": lambda i: found.network.groups[rows.group[i]].name,
+        "place": lambda i: found.network.places[rows.group[i]][rows.row[i]],
+    }
+    assert_columns(observations_csv(found), told, range(len(rows)), silent={"fourth"})
+
+
+def test_every_column_of_the_parameters_is_si_as_its_unit_says(found):
+    told = {
+        "parameter": lambda k: found.network.parameters[k].name,
+        "unit": lambda k: found.network.parameters[k].unit,
+        "value": lambda k: found.solution.parameters[k],
+        "u": lambda k: found.u_parameters[k],
+        "prior_u": lambda k: found.network.parameters[k].sigma,
+    }
+    rows = range(len(found.network.parameters))
+    assert_columns(parameters_csv(found), told, rows, silent={"prior_u"})  # orientations are free
+
+
+def test_every_column_of_the_displacements_has_the_unit_of_its_name(compared):
+    d, axes = compared.deformation, range(3)
+    told = {
+        "point": lambda i: d.names[i],
+        **{f"{'xyz'[a]}_m": lambda i, a=a: compared.first.x[compared.rows[i], a] for a in axes},
+        **{f"d{'xyz'[a]}_mm": lambda i, a=a: compared.displacement[i, a] for a in axes},
+        "length_mm": lambda i: np.linalg.norm(compared.displacement[i]),
+        **{f"u_d{'xyz'[a]}_mm": lambda i, a=a: compared.covariance[i, a, a] ** 0.5 for a in axes},
+        **{f"plain_d{'xyz'[a]}_mm": lambda i, a=a: compared.difference[0][i, a] for a in axes},
+        "statistic": lambda i: d.statistic[i],
+        "p": lambda i: d.p[i],
+        "p_adjusted": lambda i: d.p_adjusted[i],
+        "detectable_mm": lambda i: d.detectable[i],
+        "verdict": lambda i: compared.verdicts[i],
+    }
+    assert_columns(displacements_csv(compared), told, range(len(d.names)))
+
+
+def test_every_column_of_further_ranges_has_the_unit_of_its_name():
+    rows = [Candidate("S1", 'P"1"', 2.5e-4, 1.25e-4, 3.5e-6), Candidate("S2", "Q,2", 1.5e-4, 1.1e-4, 4.5e-6, 12.5)]
+    plan = SimpleNamespace(plan=SimpleNamespace(candidates=rows[:1]), picked=rows[1:])
+    told = {
+        "list": lambda c: "schedule" if c is rows[1] else "candidate",
+        "from": lambda c: c.from_,
+        "to": lambda c: c.to,
+        "u_mm": lambda c: c.u,
+        "mean_u_mm": lambda c: c.mean_u,
+        "gain_um": lambda c: c.gain,
+        "at_s": lambda c: c.at_s,
+    }
+    assert_columns(candidates_csv(plan), told, rows)

@@ -9,6 +9,7 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.gateways.optics.beam_figures import beam_figure, beam_object, coating_plot, lines, read_beam, write_beam
 from catseye.gateways.writers.objects import json_line
+from column_scene import assert_columns
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "beams" / "head.toml"
@@ -63,3 +64,32 @@ def test_the_coating_figure_tells_reflectance_and_range():
         coating_plot(("copper",))
     with pytest.raises(ValidityError, match="at most 6"):
         coating_plot(("gold",) * 7)
+
+
+def test_every_column_of_the_tables_has_the_unit_of_its_name(found, tmp_path):
+    path = found[0]
+    write_beam(path, tmp_path, found[1])
+    told = {
+        "leg": lambda p: p.leg,
+        "name": lambda p: p.name,
+        "way_m": lambda p: p.way,
+        "radius_x_m": lambda p: p.radius[0],
+        "radius_y_m": lambda p: p.radius[1],
+        "curvature_x_per_m": lambda p: p.curvature[0],
+        "curvature_y_per_m": lambda p: p.curvature[1],
+        "aperture_m": lambda p: p.aperture,
+        "clipped": lambda p: p.clipped,
+        "power_w": lambda p: p.power,
+    }
+    assert_columns((tmp_path / "beam.csv").read_text(), told, path.places)
+    told = {
+        "distance_m": lambda r: r.distance,
+        "radius_x_m": lambda r: r.radius[0],
+        "radius_y_m": lambda r: r.radius[1],
+        "hit": lambda r: r.hit,
+        "collected": lambda r: r.collected,
+        "power_w": lambda r: r.power,
+        "status": lambda r: r.status,
+    }
+    assert [r.distance for r in path.returned] == [60.0, 100.0]  # m, as the file of the train says
+    assert_columns((tmp_path / "returned.csv").read_text(), told, path.returned)

@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 from html.parser import HTMLParser
 
@@ -20,6 +21,7 @@ from catseye.gateways.writers.objects import json_line, plain
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.unit import reduce_triplet
+from column_scene import assert_columns
 from triplet_scene import SHEET, document, measurement
 
 # section 3.4, in the order of the memo; T1, T2, S and so on are points
@@ -206,3 +208,23 @@ def test_a_unit_without_an_answer_says_unknown():
     assert not re.search(r"\bnan\b", text)
     assert not re.search(r"[+>]nan\b", html)
     assert not found.accepted
+
+
+def test_every_column_of_the_table_of_units_has_the_unit_of_its_name(found):
+    units = {"TR99.toml": found, "TR98.toml": replace(found, difference=-1.6e-4, accepted=False)}  # 99's is below a nm
+    told = {
+        "file": lambda f: "TR99.toml" if f is found else "TR98.toml",
+        "triplet": lambda f: f.measurement.triplet,
+        "h_corr_mm": lambda f: f.h_corr,
+        "u_h_corr_mm": lambda f: f.u_h_corr,
+        "l_mpbc_mm": lambda f: f.l_mpbc,
+        "u_l_mpbc_mm": lambda f: f.u_l_mpbc,
+        "difference_mm": lambda f: f.difference,
+        "u_difference_mm": lambda f: f.u_difference,
+        "accepted": lambda f: "yes" if f.accepted else "no",
+        "conformity_probability": lambda f: f.conformity_probability,
+        "placements": lambda f: len(f.h),
+        "p": lambda f: f.p,
+    }
+    assert found.accepted == (abs(found.difference) <= 0.15e-3)  # m, the memo's limit
+    assert_columns(triplets_csv(units), told, list(units.values()))

@@ -8,7 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from catseye.errors import InputError
-from catseye.records.night.campaign import read_campaign
+from catseye.records.night.campaign import read_campaign, refuse_times
+from catseye.records.night.shot import Shot
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -104,3 +105,16 @@ def test_the_schema_states_the_ranges(night):
     assert (schema["d0_mm"]["minimum"], schema["d0_mm"]["maximum"]) == (50, 1000)
     assert schema["u_d0_mm"]["exclusiveMinimum"] == 0
     assert schema["format"]["enum"] == [1, "catseye-mirror-1"]
+
+
+@pytest.mark.parametrize(("late", "taken"), [(3599.0, True), (3601.0, False), (-3599.0, True), (-3601.0, False)])
+def test_a_shot_is_refused_from_an_hour_beside_the_weather(night, late, taken):
+    """Late after the last reading of any station, or before the first: s. Until then the air there is carried on."""
+    mjd = night.weather.mjd_utc
+    when = float(mjd.max() if late > 0.0 else mjd.min()) + late / 86_400.0
+    shot = Shot(shot=1, mjd_utc=when, ranger="ZY101", target="ZRG", cycles=128, samples_per_cycle=64, frame=0)
+    if taken:
+        refuse_times(night, [shot])
+    else:
+        with pytest.raises(InputError, match=r"shots\.csv: row 1, mjd_utc = .* has no weather .*expected within 1 h"):
+            refuse_times(night, [shot])

@@ -245,3 +245,75 @@ def test_slopes_of_a_sounded_line_are_derivatives_and_every_row_feels_its_own_u(
     assert np.all(found.slopes[:, 3] > 0.0)  # sound that reads too warm hides a higher index
     assert found.slopes[1, 3] / found.slopes[0, 3] == pytest.approx(3.0, rel=0.02)
     assert field.sigmas[3] == pytest.approx(np.sqrt((0.01 + 0.09) / 2))
+
+
+def trended(campaign, until=(3600.0, 3600.0)):
+    """Two stations, 5 °C apart, that fall by 2 °C, rise by 3 hPa and moisten by 20 % in an hour.
+
+    until   s of each station's last reading; the first is at 0 s, one every 30 s
+    """
+    campaign, start = weathered(
+        campaign, [0.0, 40.0], np.arange(0.0, 3601.0, 30.0), lambda s, i: 10.0 + 5.0 * i - 2.0 * s / 3600.0
+    )
+    weather = campaign.weather
+    seconds = (weather.mjd_utc - start) * SECONDS_PER_DAY
+    last = np.array([until[int(name[1:])] for name in weather.station])
+    kept = seconds < last + 1.0
+    columns = {
+        "mjd_utc": weather.mjd_utc[kept],
+        "station": tuple(name for name, keep in zip(weather.station, kept, strict=True) if keep),
+        "temperature_c": weather.temperature_c[kept],
+        "pressure_hpa": (900.0 + 3.0 * seconds / 3600.0)[kept],
+        "humidity_percent": (50.0 + 20.0 * seconds / 3600.0)[kept],
+    }
+    return dataclasses.replace(campaign, weather=Weather(**columns)), start
+
+
+FIRST = [[10.0, 900.0, 50.0], [15.0, 900.0, 50.0]]  # °C, hPa, % of the stations at 0 s
+LAST = [[8.0, 903.0, 70.0], [13.0, 903.0, 70.0]]  # at 3600 s, by hand
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [(0.0, FIRST), (-1.0, FIRST), (-3600.0, FIRST), (3600.0, LAST), (3601.0, LAST), (7200.0, LAST)],
+)
+def test_before_the_first_reading_and_after_the_last_the_air_is_that_of_the_reading(night_01, seconds, expected):
+    """No jump at the ends, and no trend carried on: an hour later a line would say 6 °C, 906 hPa, 90 %."""
+    campaign, start = trended(night_01)
+    found = AirField.of(campaign, Settings()).smoothed(at(start, seconds))[0]
+    # 1e-6: the Modified Julian Day resolves a microsecond
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def test_a_station_that_falls_silent_keeps_its_last_reading_while_the_other_goes_on(night_01):
+    campaign, start = trended(night_01, until=(3600.0, 1800.0))
+    found = AirField.of(campaign, Settings()).smoothed(at(start, 1800.0, 2700.0, 3600.0, 5400.0))
+    np.testing.assert_allclose(found[:, 0, 0], [9.0, 8.5, 8.0, 8.0], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found[:, 1], [[14.0, 901.5, 60.0]] * 4, rtol=0, atol=1e-6)
+
+
+def test_a_station_with_one_reading_says_it_before_and_after(night_01):
+    campaign, start = trended(night_01, until=(3600.0, 0.0))
+    found = AirField.of(campaign, Settings()).smoothed(at(start, -1800.0, 0.0, 1800.0, 5400.0))
+    np.testing.assert_allclose(found[:, 1], [FIRST[1]] * 4, rtol=0, atol=1e-6)
+
+
+def test_a_shot_after_the_last_reading_is_ranged_in_the_last_air_and_one_before_the_first_in_the_first(night_01):
+    """By hand: n_g - 1 of 258 ppm falls by 1/281 of it a degree, 0.92 ppm, and rises by 1/905 a hectopascal, 0.285 ppm.
+
+    Colder by 2 °C and denser by 3 hPa the air is later, so the index is the larger; vapour changes it by 0.1 ppm.
+    """
+    campaign, start = trended(night_01)
+    field = AirField.of(campaign, Settings())
+    foot = np.array([[0.0, 0.0, 0.0]])
+    far = np.array([[100.0, 0.0, 0.0]])
+    index = {}
+    for seconds in (-1800.0, 0.0, 3600.0, 5400.0):
+        path = field.along(at(start, seconds), foot, far, np.zeros(3))
+        index[seconds] = float(path.refractivity[0])
+    assert index[-1800.0] == pytest.approx(index[0.0], abs=1e-12)
+    assert index[5400.0] == pytest.approx(index[3600.0], abs=1e-12)
+    # level at the lower station, 20 m below the mean height: 8 °C, 903 + 20 x 0.11 hPa, 70 %
+    expected = group_refractivity(8.0, 905.2, 70.0, wavelength_um=0.78, model="rueger1990")
+    assert index[5400.0] == pytest.approx(float(expected), abs=1e-11)
+    assert 1e6 * (index[5400.0] - index[-1800.0]) == pytest.approx(2.0 * 0.92 + 3.0 * 0.285, rel=0.05)
