@@ -2,9 +2,12 @@
 
 import json
 import math
+import tomllib
 
+import numpy as np
 import pytest
 
+from catseye.geometry.antenna import frames
 from repository import ROOT
 
 ZY3, ZP3 = ROOT / "examples/monuments/ZY3.toml", ROOT / "examples/mirrors/ZP3.toml"
@@ -236,6 +239,24 @@ def test_visibility_answers_under_its_own_key(catseye):
     assert (turned["visible"], "above 30" in turned["reason"]) == (False, True)
     unknown = answer(catseye, *NIGHT, "--to=60,40,20", "--reflector", "ball")[0]["visibility"]
     assert (unknown["visible"], unknown["incidence"]) == (True, None)
+
+
+def test_a_posture_is_degrees_of_azimuth_and_elevation(catseye, tmp_path):
+    """A ball carried by the dish that stands in the way at 145.3, 30 deg, and at no other of these postures."""
+    monument = tomllib.loads(NIGHT[1].read_text("utf-8"))  # whose scan point is some 0.1 m off
+    middle = 0.5 * (np.array([60.0, 40.0, 20.0]) + [1e-3 * monument[f"{axis}_mm"] for axis in "xyz"])
+    ground_from_reflector = frames.ground_from_reflector(145.3 * math.pi / 180.0, 30.0 * math.pi / 180.0)
+    ball = tmp_path / "ball.toml"
+    ball.write_text(
+        'format = "catseye-solids-1"\n[[sphere]]\nname = "ball"\nframe = "reflector"\nradius_mm = 500.0\n'
+        f"centre_mm = {(1e3 * ground_from_reflector.inverse().points(middle)).tolist()}\n"
+    )
+    scene = ["--to=60,40,20", "--reflector", "prism", "--solids", ball, "--posture"]
+    seen = {
+        posture: answer(catseye, *NIGHT, *scene, posture)[0]["visibility"]["visible"]
+        for posture in ("145.3,30", "145.3,33", "149,30", "30,30")
+    }
+    assert seen == {"145.3,30": False, "145.3,33": True, "149,30": True, "30,30": True}
 
 
 def test_what_no_pointing_reaches_is_not_visible_and_the_records_are_named(catseye, tmp_path):

@@ -1,8 +1,12 @@
 """link as programs call it."""
 
 import json
+import math
 
 import pytest
+
+from catseye.reduction.optics.link import Link, Reflector
+from catseye.reduction.optics.link_budget import link_budget
 
 
 def test_a_measured_return_sets_the_gain_and_an_oblique_one_is_weaker(catseye):
@@ -40,3 +44,29 @@ def test_what_makes_no_sense_is_refused_in_one_line(catseye, option, value, line
     status, out, err = catseye(*arguments, option, value)
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert line in err
+
+
+def test_every_option_is_taken_in_the_unit_of_its_name(catseye):
+    """All at once, each unlike its default; what it must mean is written out here in SI."""
+    options = {
+        "--distance": 80, "--incidence-deg": 12, "--offset-mm": 3, "--power-mw": 2.5, "--depth": 0.6, "--waist-mm": 9,
+        "--receiver-mm": 30, "--transmission": 0.4, "--aperture-mm": 15, "--height-mm": 28, "--index": 1.6,
+        "--duration": 0.3, "--blocked-noise-volt": 0.004, "--background-uw": 7,
+    }  # fmt: skip
+    status, out, err = catseye("link", "--json", *(f"{name}={value}" for name, value in options.items()))
+    assert (status, err) == (0, "")
+    head = Link(
+        power=2.5e-3, depth=0.6, waist=9e-3, receiver=30e-3, transmission=0.4, duration=0.3, blocked_noise_volt=0.004
+    )
+    expected = link_budget(
+        head,
+        Reflector(aperture=15e-3, height=28e-3, index=1.6),
+        80.0,
+        offset=3e-3,
+        incidence=math.radians(12.0),
+        background=7e-6,
+    )
+    told = json.loads(out)
+    assert told["received_power"] == pytest.approx(expected.received, rel=1e-12)
+    assert told["u_range"] == pytest.approx(expected.u_range, rel=1e-12)
+    assert told["noise_shares"] == pytest.approx(expected.noise_shares, rel=1e-12)
