@@ -16,6 +16,7 @@ DECISIVE = 9.0  # difference of sums of squares between two explanations, below 
 GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
 UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
 CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
+BACK = 0.9  # of `critical`: what is out comes back below it; between the two it stays as it is, or rounds would not end
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -43,8 +44,8 @@ def adjust_robustly(
     free        (n,) bool, as for `adjust`
     active      one (m,) bool array a group: start from this selection instead of searching for one
     names       (n,) what the parameters are called
-    critical    |w| above which an observation is left out, below which it comes back; 3.5 leaves out one good
-                observation in 2000
+    critical    |w| above which an observation is left out, and below nine tenths of which it comes back; 3.5 leaves out
+                one good observation in 2000
     rounds      cap of removal rounds; if they do not end, the status says so
 
     Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
@@ -87,7 +88,7 @@ def adjust_robustly(
             active = [a.copy() for a in active]
             active[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
             continue
-        back = [~a & (t < 0.9 * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
+        back = [~a & (t < BACK * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
         if not any(b.any() for b in back):
             return _without_undecided(solution, groups, removable, points, advice, free, names)
         active = [a | b for a, b in zip(active, back, strict=True)]
