@@ -6,11 +6,14 @@ import signal
 import subprocess
 import time
 
+import numpy as np
 import pytest
 
+from catseye.cli.live import simulate
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from cli.living_scene import PATIENCE, RUN, ended, processes_with, recorded, small_site, started
+from sun_scene import astropy_sun
 
 
 @pytest.mark.parametrize(
@@ -28,6 +31,13 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
     status, out, err = catseye("simulate", "gbt", *words)
     assert (status, out) == (2, "")
     assert said in " ".join(err.split())
+
+
+def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
+    """22 h local mean time; the Sun, by astropy's own position, is far below the horizon for the four hours to come."""
+    assert pytest.approx(22.0, abs=0.5) == simulate.NIGHT % 1.0 * 24.0 + 24.0 - 79.839835 / 15.0
+    up = astropy_sun(simulate.NIGHT + np.linspace(0.0, 4.0 / 24.0, 9))[:, 2]
+    assert np.degrees(np.arcsin(up)).max() < -30.0
 
 
 @pytest.mark.parametrize(

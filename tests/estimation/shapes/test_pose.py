@@ -172,3 +172,31 @@ def test_points_on_a_line_are_refused_by_name():
     line = np.arange(5.0)[:, None] * [1.0, 2.0, 0.0]
     with pytest.raises(EstimationError, match="on one line"):
         fit_pose(names(5), line, line, frame="g", covariance_second=spread(5))
+
+
+def test_what_both_epochs_share_counts_once_in_every_row():
+    """Largest normalised error by hand: all weights from the joint covariance of both epochs, (-R, 1) C (-R, 1)'."""
+    n, rng = 8, np.random.default_rng(5)
+    x, matrix = points(n), Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
+    root = rng.normal(size=(6 * n, 9 * n)) * 5e-5
+    root[3 * n :] += 0.7 * root[: 3 * n]  # the second epoch shares much of the first
+    joint = root @ root.T
+    noise = rng.multivariate_normal(np.zeros(6 * n), joint).reshape(2, n, 3)
+    first, second = x + noise[0], x @ matrix.T + noise[1]
+    found = fit_pose(
+        names(n),
+        first,
+        second,
+        frame="ground",
+        covariance_first=joint[: 3 * n, : 3 * n],
+        covariance_second=joint[3 * n :, 3 * n :],
+        cross=joint[: 3 * n, 3 * n :],
+    )
+    turned = np.hstack([-np.kron(np.eye(n), found.motion.matrix), np.eye(3 * n)])
+    weight = np.linalg.inv(turned @ joint @ turned.T)
+    arm = (first - found.pivot) @ found.motion.matrix.T
+    columns = np.concatenate([np.hstack([np.eye(3), -np.cross(np.eye(3), a)]) for a in arm])
+    left = (second - found.motion.apply(first)).ravel()
+    cofactor = np.linalg.inv(weight) - columns @ np.linalg.inv(columns.T @ weight @ columns) @ columns.T
+    w = np.abs(weight @ left) / np.sqrt(np.diag(weight @ cofactor @ weight))
+    assert found.w == pytest.approx(w.reshape(n, 3).max(axis=1), rel=1e-3)

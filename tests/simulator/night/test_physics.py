@@ -1,13 +1,16 @@
 """The twin against formulas that it does not use: those of the README and of the notes, worked out here by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
 from catseye.constants import PPM, SPEED_OF_LIGHT
 from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, Air, group_refractivity_ppm
-from catseye.simulator.night.faults import Faults, Planted
+from catseye.simulator.night.faults import EFFECTS, Faults, Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
+from catseye.simulator.night.head import electronic_phase
 from catseye.simulator.night.paraboloid import normal_deviation
 from catseye.simulator.night.posture import Posture
 from catseye.simulator.night.simulate import simulate_night
@@ -276,3 +279,15 @@ def test_a_perfect_dish_is_found_exactly_where_the_posture_put_it():
     assert max(map(abs, paraboloid.deviations.values())) < 1e-10
     np.testing.assert_allclose(paraboloid.vertex, pose.dish(np.zeros(3)), atol=1e-8)
     np.testing.assert_allclose(paraboloid.focus, pose.dish(np.array([0.0, 0.0, 60.0])), atol=1e-8)
+
+
+def test_a_head_that_warms_up_comes_nearer_to_its_rest_by_e_in_five_minutes():
+    seconds = np.array([0.0, 300.0, 600.0, 3.6e4])
+    alone = Planted(ignore=[effect for effect in EFFECTS if effect != "warm_up"])
+    phases = [electronic_phase(SimpleNamespace(ranger=f"ZY{n}"), seconds, Streams(3), alone) for n in range(60)]
+    rises = np.array([phase - phase[-1] for phase in phases])
+    warm = np.abs(rises[:, 0]) > 1e-9
+    assert 10 <= warm.sum() <= 30  # every third of 60
+    assert np.all((np.abs(rises[warm, 0]) > 0.010) & (np.abs(rises[warm, 0]) < 0.030))
+    np.testing.assert_allclose(rises[warm, 1:3] / rises[warm, :1], [[np.exp(-1.0), np.exp(-2.0)]] * warm.sum())
+    np.testing.assert_allclose(rises[~warm], 0.0, atol=1e-12)
