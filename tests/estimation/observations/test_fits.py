@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation import observations as kinds
+from catseye.estimation.observations import kinds
 
 GON = np.pi / 200.0
 

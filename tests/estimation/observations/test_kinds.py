@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.estimation import observations as kinds
+from catseye.estimation.observations import kinds
 
 POINTS, OTHERS = 6, 12
 N = 3 * POINTS + OTHERS

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation import observations as kinds
+from catseye.estimation.observations import kinds
 from catseye.estimation.observations.bodies.pose import right_jacobian
 from catseye.estimation.observations.unit_direction import direction
 from catseye.geometry.frames.rotation import from_vector, skew

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from catseye.estimation import observations
+from catseye.estimation.observations import kinds as observations
 from repository import TESTS
 
 TABLES = sorted((TESTS / "vectors").glob("observations*.toml"))
