@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.catseye-installed
+# Tests that lie together go to one worker, whose fixtures serve them all; bytecode is kept, for hundreds of processes start.
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --dist worksteal
 
 .PHONY: help setup check test test-all demo bench release clean
 
@@ -19,14 +21,14 @@ setup: $(STAMP)  ## make .venv and install catseye in it
 check: setup  ## style, types, layers
 	$(BIN)/ruff check src tests benchmarks studies
 	$(BIN)/ruff format --check src tests benchmarks studies
-	$(BIN)/mypy
+	MYPY_NUM_WORKERS=2 $(BIN)/mypy
 	$(BIN)/lint-imports
 
 test: check  ## check, then the tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
+	$(PYTEST)
 
 test-all: check  ## the same with the long scatter and fault runs
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m 'slow or not slow' --hypothesis-profile=explore
+	$(PYTEST) -m 'slow or not slow' --hypothesis-profile=explore
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01

@@ -4,7 +4,7 @@ from datetime import date
 
 import pytest
 
-RUNS = [pytest.param(80, id="quick"), pytest.param(1500, id="long", marks=pytest.mark.slow)]  # of a Monte Carlo
+RUNS = [pytest.param(27, id="quick"), pytest.param(1500, id="long", marks=pytest.mark.slow)]  # of a Monte Carlo
 C = 299_792_458.0
 PROVENANCE = {
     "instrument": "ZP1",

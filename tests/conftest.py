@@ -1,5 +1,7 @@
 """What tests of every room share: the example night, read and reduced once."""
 
+import gc
+
 import pytest
 from hypothesis import settings
 
@@ -8,6 +10,15 @@ from repository import ROOT
 settings.register_profile("seeded", derandomize=True, deadline=None)  # the same examples on every machine
 settings.register_profile("explore", deadline=None, max_examples=300)  # for `make test-all`
 settings.load_profile("seeded")
+
+gc.set_threshold(20_000, 20, 50)  # what a test leaves is little beside what all the modules hold, which it walks over
+
+
+def pytest_collection_finish():
+    """What was imported stays: the collector need not walk over it again and again."""
+    gc.collect()
+    gc.freeze()
+
 
 EXAMPLE = ROOT / "examples" / "night-01"
 
@@ -21,11 +32,11 @@ def night_01():
 
 
 @pytest.fixture(scope="session")
-def reduced_night_01(night_01):
+def reduced_night_01():
     """Its reduction with default settings."""
-    from catseye.reduction.epoch.epoch import reduce_epoch
+    from kept_scene import reduction_of_example
 
-    return reduce_epoch(night_01)
+    return reduction_of_example()
 
 
 @pytest.fixture(scope="session")

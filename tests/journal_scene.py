@@ -14,6 +14,7 @@ import numpy as np
 from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Run, Solution
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import read_site
+from process_scene import ends_with_us
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -105,7 +106,14 @@ class PostgresServer:
         """Until it says that it takes connections."""
         command = [self.bin / "postgres", "-D", f"{self.root}/data", "-k", str(self.root), "-c", "listen_addresses="]
         command += ["-c", "shared_buffers=16MB", "-c", "max_connections=20"]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=self.root, **self.who)
+        self.process = subprocess.Popen(
+            command,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=self.root,
+            preexec_fn=ends_with_us(signal.SIGQUIT),  # at once, and its children and shared memory with it
+            **self.who,
+        )
         said = []
         for line in self.process.stderr:
             said.append(line)

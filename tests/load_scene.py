@@ -24,6 +24,7 @@ from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import REFERENCE, SiteFolder, read_site
 from catseye.records.site.target import Target
 from catseye.simulator.clock.world_clock import SystemClock
+from process_scene import ends_with_us
 from repository import ROOT
 
 VOLTS_PER_CODE = 10.0 / 32768
@@ -260,7 +261,8 @@ class LoadChild:
         self.clock = SystemClock.starting_at(START_MJD)
         program = [sys.executable, str(ROOT / "tests" / "faults" / "load_child.py"), str(self.rangers)]
         program += [str(self.targets or 0), repr(self.clock.offset), "twin" if self.twin else "fast"]
-        self.process = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = subprocess.Popen(program, text=True, preexec_fn=ends_with_us(), **pipes)
         with ThreadPoolExecutor(1) as reader:
             try:
                 line = reader.submit(self.process.stdout.readline).result(LONGEST_START)

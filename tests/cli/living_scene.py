@@ -3,13 +3,13 @@
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 
 from catseye.records.site.folder import site_files
+from kept_scene import kept
+from process_scene import ends_with_us
 from simulator.living_scene import site
 
 RUN = (sys.executable, "-P", "-c", "from catseye.cli.main import run; run()")
@@ -17,32 +17,25 @@ SOON = 5.0  # s, the contract's
 PATIENCE = 90.0  # s for a process to come up on a machine that is busy
 
 
-def write_site(folder: Path) -> Path:
+def write_site(folder: Path) -> None:
     """The small site's folder."""
     for path, text in site_files(site()).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
-    return folder
 
 
-@cache
 def small_site() -> Path:
-    """Written once a process; the system's temporary directory is emptied by the system."""
-    return write_site(Path(_kept().name) / "site")
+    return kept("small-site", write_site)
 
 
-@cache
 def recorded() -> Path:
-    """The journal of 24 s, in virtual time."""
-    journal = Path(_kept().name) / "night.db"
-    words = ["simulate", str(small_site()), "--fast", "--minutes", "0.4", "--journal", str(journal), "--quiet"]
-    subprocess.run([*RUN, *words], check=True, timeout=PATIENCE)
-    return journal
+    """The journal of 24 s, in virtual time, to be read."""
 
+    def record(journal: Path) -> None:
+        words = ["simulate", str(small_site()), "--fast", "--minutes", "0.4", "--journal", str(journal), "--quiet"]
+        subprocess.run([*RUN, *words], check=True, timeout=PATIENCE, preexec_fn=ends_with_us())
 
-@cache
-def _kept() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory(prefix="catseye-test-")
+    return kept("recorded.db", record)
 
 
 @contextmanager
@@ -56,6 +49,7 @@ def started(*words, home=None, stdin=subprocess.DEVNULL):
         stderr=subprocess.PIPE,
         text=True,
         env=place,
+        preexec_fn=ends_with_us(),
     )
     try:
         yield process

@@ -1,6 +1,7 @@
 """Every citation has its entry in the bibliography, every entry is cited."""
 
 import re
+from functools import cache
 
 from catseye.bibliography import SOURCES
 from repository import ROOT
@@ -10,6 +11,7 @@ KEY = re.compile(r"\[([A-Z]{3,}\d{2,3})\]")
 BARE = re.compile(r"\b([A-Z]{3,}\d{2,3})\b")
 
 
+@cache
 def cited() -> dict[str, set[str]]:
     """Keys in brackets by where they stand; in this project's source, the bibliography itself left out."""
     found: dict[str, set[str]] = {}

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,16 +16,23 @@ from typer.testing import CliRunner
 from catseye import __version__
 from catseye.atmosphere.index.air import MODELS
 from catseye.cli import commands
-from catseye.cli.commands import app, join_commands
+from catseye.cli.commands import app
+from command_scene import command_line
 from repository import ROOT
 
-join_commands()
 NIGHT = ROOT / "examples" / "night-01"
 WEATHER = ["--temperature-c", "20", "--pressure-hpa", "933", "--humidity-percent", "50"]
 COMMANDS = sorted(typer.main.get_command(app).commands)
 
 
-def catseye(*arguments, cwd=None, **streams):
+@pytest.fixture
+def catseye(capsys, tmp_path, monkeypatch):
+    """A command run in this process and an empty directory: exit status, what it said, what it complained of."""
+    monkeypatch.chdir(tmp_path)
+    return command_line(capsys)
+
+
+def started(*arguments, cwd=None, **streams):
     """The program as a user starts it: its entry point in a process of its own."""
     code = "from catseye.cli.main import run; run()"
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
@@ -38,7 +46,7 @@ def reduced(tmp_path_factory):
     """One whole `reduce --json --out`, the first on its machine: matplotlib builds its font cache and would say so."""
     out, fresh = tmp_path_factory.mktemp("reduced") / "out", tmp_path_factory.mktemp("home")
     place = {**os.environ, "HOME": str(fresh), "MPLCONFIGDIR": str(fresh)}
-    return catseye("reduce", NIGHT, "--out", out, "--json", env=place), out
+    return started("reduce", NIGHT, "--out", out, "--json", env=place), out
 
 
 def test_reduce_gives_one_object_on_stdout_and_nothing_on_stderr(reduced):
@@ -67,20 +75,20 @@ def test_reduce_writes_every_file_and_leaves_no_neighbour(reduced):
     assert [path.name for path in out.parent.iterdir()] == ["out"]
 
 
-def test_reduce_replaces_its_own_output_and_tells_people(reduced):
-    _, out = reduced
-    done = catseye("reduce", NIGHT, "--out", out, "--air-model", "ciddor_hill1999")
-    assert (done.returncode, done.stderr) == (0, "")
+def test_reduce_replaces_its_own_output_and_tells_people(catseye, reduced, tmp_path):
+    out = shutil.copytree(reduced[1], tmp_path / "out")
+    status, said, complaint = catseye("reduce", NIGHT, "--out", out, "--air-model", "ciddor_hill1999")
+    assert (status, complaint) == (0, "")
     for word in ("The shots", "The feed arm", "The dish", "The air", "variance factor", "report.html"):
-        assert word.lower() in done.stdout.lower()
-    assert "\x1b" not in done.stdout
+        assert word.lower() in said.lower()
+    assert "\x1b" not in said
     assert json.loads((out / "provenance.json").read_text())["settings"]["air_model"] == "ciddor_hill1999"
 
 
-def test_demo_reports_and_ends_with_the_path(tmp_path):
-    done = catseye("demo", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    report = tmp_path / done.stdout.strip().splitlines()[-1].removeprefix("Report: ")
+def test_demo_reports_and_ends_with_the_path(catseye, tmp_path):
+    status, said, complaint = catseye("demo")
+    assert (status, complaint) == (0, "")
+    report = tmp_path / said.strip().splitlines()[-1].removeprefix("Report: ")
     assert report == tmp_path / "demo-night-01" / "report.html"
     assert report.is_file()
 
@@ -103,8 +111,17 @@ def test_demo_reports_and_ends_with_the_path(tmp_path):
         ["demo", "a", "b"],
     ],
 )
-def test_wrong_usage_is_2(arguments, tmp_path):
-    done = catseye(*arguments, cwd=tmp_path)
+def test_wrong_usage_is_2(catseye, arguments, tmp_path):
+    status, said, complaint = catseye(*arguments)
+    assert status == 2
+    assert "Usage" in said + complaint
+    assert "Traceback" not in complaint
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("arguments", [[], ["air", *WEATHER, "--bogus"]])
+def test_the_process_of_wrong_usage_ends_with_2(arguments, tmp_path):
+    done = started(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert "Usage" in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
@@ -125,37 +142,38 @@ def test_wrong_usage_is_2(arguments, tmp_path):
         (["air", *WEATHER, "--wavelength-um", "-1"], "wavelength -1 um is outside"),
     ],
 )
-def test_what_cannot_be_done_is_1_in_one_line(arguments, said, tmp_path):
-    done = catseye(*arguments, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("catseye: ")
-    assert done.stderr.count("\n") == 1
-    assert said in done.stderr
+def test_what_cannot_be_done_is_1_in_one_line(catseye, arguments, said, tmp_path):
+    status, out, complaint = catseye(*arguments)
+    assert (status, out) == (1, "")
+    assert complaint.startswith("catseye: ")
+    assert complaint.count("\n") == 1
+    assert said in complaint
     assert not list(tmp_path.iterdir())
 
 
-def test_a_name_with_a_line_break_still_makes_one_line():
-    done = catseye("reduce", "no\nsuch\x1b[31m\nplace", "--json")
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+def test_the_process_of_what_cannot_be_done_ends_with_1_and_a_name_with_a_line_break_still_makes_one_line():
+    done = started("reduce", "no\nsuch\x1b[31m\nplace", "--json")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("catseye: ")
     assert "\x1b" not in done.stderr
 
 
 def test_a_full_disk_under_stdout_is_1_in_one_line():
     with Path("/dev/full").open("w") as full:
-        done = catseye("air", *WEATHER, "--json", stdout=full)
+        done = started("air", *WEATHER, "--json", stdout=full)
     assert (done.returncode, done.stderr) == (1, "catseye: standard output: No space left on device\n")
 
 
 def test_a_reader_who_leaves_early_is_no_failure():
     reading, writing = os.pipe()
     os.close(reading)
-    done = catseye("air", *WEATHER, stdout=writing)
+    done = started("air", *WEATHER, stdout=writing)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_terminal_that_knows_ascii_only_is_no_failure():
-    done = catseye("air", *WEATHER, env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    done = started("air", *WEATHER, env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -22,6 +22,7 @@ from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 from catseye.simulator.clock.world_clock import SystemClock
 from cli.living_scene import PATIENCE, RUN, small_site
+from process_scene import ends_with_us
 
 START = 60_635.125  # MJD; night at Green Bank
 GROUPS = {"feed": ("ZY101", "ZY102"), "other": ("ZY103", "ZY104")}  # one process each; the first serves the feed
@@ -53,6 +54,7 @@ class Node:
             stderr=subprocess.STDOUT,
             text=True,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            preexec_fn=ends_with_us(),
         )
         self._reader = threading.Thread(target=self._read, args=(self.process, self.lines), daemon=True)
         self._reader.start()

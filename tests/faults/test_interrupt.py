@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from catseye.gateways.writers.output import FORMAT
+from process_scene import ends_with_us
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -31,6 +32,7 @@ def start(out, *, stderr=subprocess.PIPE, mplconfig=None):
         stdout=subprocess.DEVNULL,
         stderr=stderr,
         env=place,
+        preexec_fn=ends_with_us(),
     )
 
 

@@ -14,7 +14,9 @@ import pytest
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.simulator.clock.world_clock import ManualClock
+from draws import draws
 from journal_scene import MOST_WAIT, PostgresServer, plainly, scene_answer, scene_run
+from process_scene import ends_with_us
 
 CHILD = Path(__file__).with_name("journal_child.py")
 REOPENED = 5.0  # s, what a restarted coordinator may take
@@ -38,6 +40,7 @@ def killed_at(place, first, wanted, spin):
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(CHILD.parents[1])},
+        preexec_fn=ends_with_us(),
     )
     run = int(child.stdout.readline().split()[1])
     lines = [child.stdout.readline() for _ in range(wanted)]
@@ -78,8 +81,9 @@ def kill_and_look(place, times, seed):
         assert_all_there(place, run, began, acknowledged)
 
 
-def test_a_writer_killed_at_any_moment_loses_and_doubles_nothing(tmp_path):
-    kill_and_look(tmp_path / "j.db", 8, seed=1)
+@draws(8, name="times")
+def test_a_writer_killed_at_any_moment_loses_and_doubles_nothing(tmp_path, times):
+    kill_and_look(tmp_path / "j.db", times, seed=1)
 
 
 @pytest.mark.slow
@@ -88,8 +92,9 @@ def test_a_writer_killed_two_hundred_times_loses_and_doubles_nothing(tmp_path):
         kill_and_look(tmp_path / f"{seed}.db", 20, seed)
 
 
-def test_a_writer_to_a_server_killed_at_any_moment_loses_and_doubles_nothing(server):
-    kill_and_look(server.database("killed"), 3, seed=2)
+@draws(3, quick=2, name="times")
+def test_a_writer_to_a_server_killed_at_any_moment_loses_and_doubles_nothing(server, times):
+    kill_and_look(server.database(f"killed-{times}"), times, seed=2)
 
 
 def server_killed(server, name, times, seed):

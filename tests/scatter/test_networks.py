@@ -98,7 +98,7 @@ def test_an_error_of_the_detectable_size_is_found_as_often_as_promised(network, 
     assert np.mean(found) == pytest.approx(0.80, abs=4 * np.sqrt(0.8 * 0.2 / runs))
 
 
-@pytest.mark.parametrize("runs", [pytest.param(60, id="quick"), pytest.param(2000, id="full", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [pytest.param(20, id="quick"), pytest.param(2000, id="full", marks=pytest.mark.slow)])
 def test_the_claim_holds_after_outliers_are_removed(strong, runs):
     network = strong
     rng = np.random.default_rng(4)

@@ -9,6 +9,7 @@ from catseye.geometry.antenna.pointing_series import TERMS, published
 from catseye.records.laboratory.tilts import Tilts
 from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
 from catseye.reduction.pose.track_profile import joined_tilt, track_profile
+from draws import draws
 
 
 def holds(sample, claimed, count):
@@ -19,9 +20,10 @@ def holds(sample, claimed, count):
     return sample.mean(axis=0) / u * count**0.5
 
 
+@draws(3, name="thirds")
 @pytest.mark.parametrize("robust", [None, "igg3"])
-def test_poses_scatter_as_their_covariance_says(robust):
-    rng, n, count = np.random.default_rng(21), 8, 600 if robust is None else 90
+def test_poses_scatter_as_their_covariance_says(robust, thirds):
+    rng, n, count = np.random.default_rng(21), 8, (200 if robust is None else 30) * thirds
     x = rng.uniform(-30, 30, (n, 3))
     q1, q2 = (r @ r.T for r in rng.normal(size=(2, 3 * n, 4 * n)) * 3e-5)
     sample, chi2 = [], []

@@ -11,6 +11,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.service.child import LiveChild
+from process_scene import ends_with_us
 
 SPEAKS = "import sys; print('here', flush=True); sys.stdin.read()"
 DEAF = (
@@ -97,7 +98,8 @@ def test_it_does_not_outlive_a_keeper_that_is_killed():
         f"program=(sys.executable, '-c', {SPEAKS!r}))\n"
         "asyncio.run(one.keep())\n"
     )
-    with subprocess.Popen([sys.executable, "-c", keeper], stdout=subprocess.PIPE, text=True) as process:
+    program = [sys.executable, "-c", keeper]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, text=True, preexec_fn=ends_with_us()) as process:
         pid = int(process.stdout.readline())
         assert alive(pid)
         process.kill()

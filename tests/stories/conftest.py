@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from catseye.records.night.campaign import read_campaign
-from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.faults import Faults
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from kept_scene import night_directory, night_of, reduction_of
 
 SEED = 4711
 CLEAR = Faults(fraction_blocked=0.0, fraction_reflected=0.0, weak_ranger=None, wrong_position_mm=0.0)
@@ -25,31 +24,30 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="session")
 def night():
     """A night with all the usual faults."""
-    return simulate_night(SEED)
+    return night_of(SEED)
 
 
 @pytest.fixture(scope="session")
-def campaign(written, night):
-    return written(night)
+def campaign():
+    return read_campaign(night_directory(SEED))
 
 
 @pytest.fixture(scope="session")
-def whole(campaign):
+def whole():
     """Its reduction."""
-    return reduce_epoch(campaign)
+    return reduction_of(SEED)
 
 
 @pytest.fixture(scope="session")
 def clear_night():
     """The same site in a night in which nothing was in the way."""
-    return simulate_night(SEED, faults=CLEAR)
+    return night_of(SEED, faults=CLEAR)
 
 
 @pytest.fixture(scope="session")
-def clear(written, clear_night):
+def clear():
     """Its campaign and reduction."""
-    found = written(clear_night)
-    return found, reduce_epoch(found)
+    return read_campaign(night_directory(SEED, faults=CLEAR)), reduction_of(SEED, faults=CLEAR)
 
 
 @pytest.fixture(scope="session")

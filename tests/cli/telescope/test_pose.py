@@ -6,19 +6,16 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND
-from catseye.gateways.epoch.files import write_reduction
+from kept_scene import reduction_directory
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
 
 
 @pytest.fixture(scope="module")
-def night(tmp_path_factory, reduced_night_01):
+def night():
     """A directory as `catseye reduce --out` writes it."""
-    where = tmp_path_factory.mktemp("pose") / "night"
-    where.mkdir()
-    write_reduction(reduced_night_01, where)
-    return where
+    return reduction_directory()
 
 
 def test_the_dish_against_design_in_json(catseye, night):

@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from catseye.gateways.epoch.files import write_reduction
 from catseye.optics.zernike import Term
 from catseye.records.panels.actuators import read_corrections
+from kept_scene import reduction_directory
 from surface_scene import NAMES, half_path_of, prisms
 
 ROWS = np.arange(0, len(NAMES), 12)
@@ -107,9 +107,7 @@ def test_an_elevation_series_gives_gravity_and_hysteresis(catseye, tmp_path):
 
 
 def test_a_reductions_directory_gives_its_dish_with_full_covariance(catseye, tmp_path, reduced_night_01):
-    directory = tmp_path / "night"
-    directory.mkdir()
-    write_reduction(reduced_night_01, directory)
+    directory = reduction_directory()
     status, said, complaint = catseye(directory, "--free", "vertex,axis", "--json")
     assert (status, complaint) == (0, "")
     found = json.loads(said)

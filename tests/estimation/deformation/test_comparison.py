@@ -12,6 +12,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.deformation import comparison, epoch_model
 from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.adjustment import adjust_network
+from draws import draws
 from repository import TESTS
 
 METRO = TESTS / "vectors" / "networks" / "monitoring"
@@ -169,8 +170,9 @@ def check_metro_scatter(metro, runs, seed):
     assert abs(alarms / runs - 0.05) < 3.5 * np.sqrt(0.05 * 0.95 / runs)
 
 
-def test_the_claimed_covariance_of_metro_displacements_holds_in_100_runs(metro):
-    check_metro_scatter(metro, 100, 31)
+@draws(100)
+def test_the_claimed_covariance_of_metro_displacements_holds_in_a_few_runs(metro, runs):
+    check_metro_scatter(metro, runs, 31)
 
 
 @pytest.mark.slow
@@ -235,8 +237,9 @@ def check_false_alarms(ranging_network, runs, seed):
     assert stats.kstest(p, "uniform").pvalue > 1e-3
 
 
-def test_where_nothing_moved_alarms_come_at_the_level_in_200_runs(ranging_network):
-    check_false_alarms(ranging_network, 200, 42)
+@draws(200)
+def test_where_nothing_moved_alarms_come_at_the_level_in_a_few_runs(ranging_network, runs):
+    check_false_alarms(ranging_network, runs, 42)
 
 
 @pytest.mark.slow
@@ -343,10 +346,10 @@ def test_many_points_are_compared_beside_the_points_that_define_the_datum(rangin
         compare(*floating)
 
 
-def test_alarms_beside_a_frame_stay_below_the_level(ranging_network):
+@draws(100)
+def test_alarms_beside_a_frame_stay_below_the_level(ranging_network, runs):
     rng = np.random.default_rng(48)
     stations = [f"S{i:02d}" for i in range(1, 9)]
-    runs = 100
     alarms = sum(compare(*twins(ranging_network, rng), frame=stations).deformation.moved.any() for _ in range(runs))
     assert 0 < alarms / runs < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / runs)
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from catseye.errors import EstimationError
 from catseye.estimation.deformation.congruence import Epochs, VarianceFactor, congruence_test
 from catseye.estimation.deformation.deformation import detectable_displacement, moved_points
+from draws import draws
 from epoch_scene import FIELD, SIGMA, movement
 
 
@@ -109,16 +110,17 @@ def test_planted_movements_of_one_to_three_points_are_found(moved, rule):
     assert right >= 0.85 * runs  # the level itself costs 5 %
 
 
-def test_the_claimed_covariance_of_a_movement_holds_in_scatter():
+@draws(300)
+def test_the_claimed_covariance_of_a_movement_holds_in_scatter(runs):
     rng = np.random.default_rng(8)
     true = movement({3: [4e-4, 0, 4e-4]})
     errors = []
-    for _ in range(300):
+    for _ in range(runs):
         found = moved_points(FIELD.epochs(FIELD.ranges(rng, true)), level=1e-4)
         assert found.moved[3]
         errors.append(np.linalg.solve(np.linalg.cholesky(found.covariance[3]), found.displacement[3] - true[3]))
-    np.testing.assert_allclose(np.cov(np.array(errors).T), np.eye(3), atol=4.5 * np.sqrt(2.0 / 300))
-    assert np.abs(np.mean(errors, axis=0)).max() < 4.0 / np.sqrt(300)
+    np.testing.assert_allclose(np.cov(np.array(errors).T), np.eye(3), atol=4.5 * np.sqrt(2.0 / runs))
+    assert np.abs(np.mean(errors, axis=0)).max() < 4.0 / np.sqrt(runs)
 
 
 @pytest.mark.parametrize("rule", ["global", "local"])

@@ -9,6 +9,7 @@ from catseye.estimation.harmonic.body import moved, rigid_design, rigid_part
 from catseye.estimation.harmonic.eliminated import weights_of
 from catseye.estimation.harmonic.series import Spread, fit_harmonics
 from catseye.geometry.frames.rotation import from_vector
+from draws import draws, same_sigmas
 
 
 def scene(seed, *, epochs=12, n=5, shared=2, lost=0.15):
@@ -143,15 +144,16 @@ def test_inverses_by_adjugates_are_numpys():
     np.testing.assert_allclose(weights_of(q, np.ones((6, 4), bool)), np.linalg.inv(q), rtol=1e-8)
 
 
+@draws(400)
 @pytest.mark.parametrize("way", ["together", "apart"])
-def test_claimed_covariance_is_the_scatter(way):
-    """Every unknown's and every prediction's spread over 400 draws, and chi-squares, against what was claimed."""
+def test_claimed_covariance_is_the_scatter(way, runs):
+    """Every unknown's and every prediction's spread over the draws, and chi-squares, against what was claimed."""
     rng, arms, body, own, points, u, seen, truth = scene(11, n=4, lost=0.1)
     spread = Spread(full=full_of(points, u)) if way == "together" else Spread(points=points, shared=u)
     new_body, new_own = np.array([[np.sin(0.7), np.cos(0.7), 2.0]]), np.ones((1, 1))
     wanted = moved(new_body @ truth["rigid"].T, arms)[0] + truth["own"][..., 0]
     squares, predicted, pvv = [], [], []
-    for _ in range(400):
+    for _ in range(runs):
         found = fit_harmonics(
             observed(rng, arms, body, own, points, u, seen, truth), arms, body=body, own=own, spread=spread
         )
@@ -162,8 +164,8 @@ def test_claimed_covariance_is_the_scatter(way):
         predicted.append([e[p] @ np.linalg.solve(q[p], e[p]) for p in range(len(arms))])
         pvv.append(found.pvv)
     for values, freedom in ((squares, 18), (pvv, found.degrees_of_freedom), *((v, 3) for v in np.array(predicted).T)):
-        assert abs(np.mean(values) - freedom) < 4.0 * np.sqrt(2.0 * freedom / 400)
-        assert np.mean(np.array(values) > chi2.ppf(0.95, freedom)) < 0.10
+        assert abs(np.mean(values) - freedom) < 4.0 * np.sqrt(2.0 * freedom / runs)
+        assert np.mean(np.array(values) > chi2.ppf(0.95, freedom)) < 0.05 + same_sigmas(0.05, 400, runs)
 
 
 def test_what_floats_or_is_no_covariance_is_refused():

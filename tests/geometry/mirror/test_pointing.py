@@ -20,6 +20,7 @@ from catseye.geometry.mirror.pointing import (
     ray_covariance,
     ray_jacobian,
 )
+from draws import draws
 
 ZY3 = Station(
     np.array([5586.2, 20850.0, -5.8]) * 1e-3,
@@ -72,9 +73,9 @@ def stations(n, rng, tilt=0.01):
     )
 
 
-def test_forward_and_back_agree_for_a_million_random_monuments_mirrors_and_points():
+@draws(1_000_000, name="n")
+def test_forward_and_back_agree_for_a_million_random_monuments_mirrors_and_points(n):
     rng = np.random.default_rng(20261121)
-    n = 1_000_000
     station = stations(n, rng, tilt=0.05)
     points = rng.uniform(-150, 150, (n, 3))
     found = aim(station, points)

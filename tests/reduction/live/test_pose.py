@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from catseye.reduction.live.pose import beam_per_feed_shift, live_pose
 from catseye.reduction.live.state import REFERENCE_EPOCH, Carried, with_reference
 from catseye.simulator.twin.beam import TracedDish
+from draws import draws, same_sigmas
 from live_scene import site
 
 F = 60.0  # m
@@ -120,8 +121,9 @@ def test_rigid_motions_are_found_as_planted(seed):
     np.testing.assert_allclose(pose.feed.pivot, FOCUS, rtol=0, atol=1e-12)
 
 
-def test_claimed_covariances_are_those_of_many_draws():
-    rng, count = np.random.default_rng(11), 3000
+@draws(3000, name="count")
+def test_claimed_covariances_are_those_of_many_draws(count):
+    rng = np.random.default_rng(11)
     n = 6 * (len(DISH) + len(ARM))
     a = rng.normal(size=(n, n + 5))
     covariance = 1e-8 * a @ a.T / n
@@ -137,7 +139,7 @@ def test_claimed_covariances_are_those_of_many_draws():
         half = np.linalg.inv(np.linalg.cholesky(wanted[key]))
         normalised = half @ np.cov(sample.T) @ half.T
         # an element of 3000 draws' covariance has u = 0.018, on the diagonal 0.026: four of these
-        np.testing.assert_allclose(normalised, np.eye(len(normalised)), rtol=0, atol=0.11)
+        np.testing.assert_allclose(normalised, np.eye(len(normalised)), rtol=0, atol=same_sigmas(0.11, 3000, count))
     for found in bodies.values():
         chi2 = np.array([b.chi2 for b in found])
         assert chi2.mean() == pytest.approx(6.0, abs=4 * np.sqrt(12 / count))

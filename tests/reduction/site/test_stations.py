@@ -9,6 +9,7 @@ from catseye.geometry.mirror.pointing import Station
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.site.stations import AXES, TILTS, imperfections_of, point, station_of
+from draws import draws
 
 MONUMENT = MonumentGeometry(
     monument="ZY1", x_mm=0.0, y_mm=20_000.0, z_mm=0.0, alpha1_rad=0.0, alpha2_rad=0.0, alpha3_rad=0.0,
@@ -35,8 +36,9 @@ REAL = MIRROR.model_copy(
 TO = np.array([[5.0, 10.0, 20.0], [-8.0, 12.0, -3.0], [6.0, 19.0, -9.0]])  # the last two to either side of Theta's cut
 
 
-def test_u_of_a_real_mirrors_counts_is_their_scatter():
-    rng, n = np.random.default_rng(5), 2000
+@draws(2000, name="n")
+def test_u_of_a_real_mirrors_counts_is_their_scatter(n):
+    rng = np.random.default_rng(5)
     station, mean = station_of(MONUMENT, REAL), imperfections_of(REAL)
     u = np.array([1e-3] * 3 + [2e-5, 1e-5, 1e-5] + [1e-5] * 3 + [1e-5] * 2 + [0.5] * 2)
     drawn = []

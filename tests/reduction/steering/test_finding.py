@@ -1,5 +1,6 @@
 """Finding targets by their return. The spots are real ones, by diffraction; the fit knows only Gaussians."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import gaussian_spot, matched_radius, offset_share
 from catseye.reduction.steering.finding import SearchResult, adjustment_readings, find, found_point, search_results
 from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
+from draws import draws
 
 STATION = Station([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
 TARGET = np.array([20.0, -30.0, 75.0])
@@ -20,9 +22,14 @@ TRUE = counts(STATION, TARGET)
 LIGHT = {"aperture": 0.0254, "receiver": 0.05, "waist": 0.01, "wavelength": 0.78e-6}
 RADIUS = matched_radius(RANGE, **LIGHT) / RANGE
 OFFSETS = np.linspace(0.0, 0.06, 61)
-SHARES = offset_share(OFFSETS, RANGE, **LIGHT)
 HEAD = Head((2691.0, 1434.0), (-21_309.0, 75_691.0), radius=RADIUS, threshold_volt=0.5, noise_volt=0.02)
 PEAK = 6.0
+
+
+@cache
+def shares():
+    """Of the power that comes back by the offsets."""
+    return offset_share(OFFSETS, RANGE, **LIGHT)
 
 
 def returned(at, true, *, peak=PEAK, real=True, head=HEAD):
@@ -30,7 +37,7 @@ def returned(at, true, *, peak=PEAK, real=True, head=HEAD):
     off = offsets_of_counts(true, head.zeros, np.atleast_2d(at))
     r = np.hypot(*off.T)
     if real:
-        return peak * np.interp(r * RANGE, OFFSETS, SHARES, right=0.0)
+        return peak * np.interp(r * RANGE, OFFSETS, shares(), right=0.0)
     return gaussian_spot(*off.T, peak=peak, radius=head.radius, background=0.0)
 
 
@@ -128,10 +135,10 @@ def anywhere(rng):
     return TRUE + rng.uniform(-3, 3, 2)
 
 
+@draws(40, name="n")
 @pytest.mark.parametrize("how", [{}, {"missing": 0.2}, {"full": 4.0}])
-def test_the_centres_scatter_is_what_the_covariance_says_where_the_spot_is_gaussian(how):
+def test_the_centres_scatter_is_what_the_covariance_says_where_the_spot_is_gaussian(how, n):
     """The mean of e' C^-1 e is 2, that of n fits has u = 2/sqrt(n)."""
-    n = 40
     ratios, factors = errors(np.random.default_rng(7), n, anywhere, real=False, **how)
     assert np.mean(ratios) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(n))
     assert np.mean(factors) == pytest.approx(1.0, abs=0.3)  # shafts within a count are bounded, not normal

@@ -10,6 +10,7 @@ from catseye.geometry.antenna.deformation import Posture
 from catseye.geometry.frames.rotation import from_vector
 from catseye.reduction.structure.check import left_out
 from catseye.reduction.structure.series import GroupSeries, SeriesModel, fit_structure
+from draws import draws, same_sigmas
 
 PIVOT = np.array([0.0, -8.0, 10.0])
 
@@ -61,10 +62,11 @@ def test_what_was_planted_comes_back_and_is_foretold():
     assert np.abs(told.six.mean(axis=0)).max() < 1e-12
 
 
-def test_foretelling_covers_the_truth_as_often_as_it_claims():
-    """Over 60 campaigns with wind: the epoch to come, its new wind with it, against the claimed covariance."""
+@draws(60)
+def test_foretelling_covers_the_truth_as_often_as_it_claims(runs):
+    """Over campaigns with wind: the epoch to come, its new wind with it, against the claimed covariance."""
     squares, u = [], []
-    for seed in range(60):
+    for seed in range(runs):
         series, _ = planted(seed, epochs=41, wind=(0.3, 3.0), own=0.1)
         found = fit_structure(series.part(np.arange(40)), SeriesModel())
         told = found.predict(
@@ -75,9 +77,9 @@ def test_foretelling_covers_the_truth_as_often_as_it_claims():
         squares.append([e[3 * p : 3 * p + 3] @ np.linalg.solve(q[p], e[3 * p : 3 * p + 3]) for p in range(8)])
         u.append([*found.scatter.u_six[:3], found.scatter.u_point])
     # points of an epoch share its wind: 60 epochs, of some 6 degrees of freedom each
-    assert abs(np.mean(squares) / 3.0 - 1.0) < 4.0 * np.sqrt(2.0 / (60 * 5))
-    np.testing.assert_allclose(np.mean(u, axis=0)[3], 0.1 * MILLIMETRE, rtol=0.05)
-    np.testing.assert_allclose(np.mean(u, axis=0)[:3], 0.3 * MILLIMETRE, rtol=0.15)
+    assert abs(np.mean(squares) / 3.0 - 1.0) < 4.0 * np.sqrt(2.0 / (runs * 5))
+    np.testing.assert_allclose(np.mean(u, axis=0)[3], 0.1 * MILLIMETRE, rtol=same_sigmas(0.05, 60, runs))
+    np.testing.assert_allclose(np.mean(u, axis=0)[:3], 0.3 * MILLIMETRE, rtol=same_sigmas(0.15, 60, runs))
 
 
 def test_epochs_left_out_are_met_as_claimed_and_too_small_a_claim_is_seen():

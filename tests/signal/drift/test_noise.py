@@ -6,6 +6,7 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.signal.drift.allan import allan_deviation, expected_variance, spur_variance
 from catseye.signal.drift.noise import noise_spectrum
+from draws import draws
 
 
 def made(rng, n, white, flicker, walk):
@@ -50,11 +51,12 @@ def test_what_is_not_there_comes_out_as_nothing_and_noise_is_no_spur():
     assert spurs <= 2  # one in a thousand is asked for
 
 
-def test_a_57_hz_line_is_found_among_all_three_noises_and_claims_its_scatter():
+@draws(60)
+def test_a_57_hz_line_is_found_among_all_three_noises_and_claims_its_scatter(runs):
     rng = np.random.default_rng(12)
     time = np.arange(4096) * 1e-3
     off = []
-    for k in range(60):
+    for k in range(runs):
         phase = 0.1 * k
         y = made(rng, 4096, 1.0, 0.1, 0.02) + 0.3 * np.sin(2 * np.pi * 57.123 * time + phase)
         spur = noise_spectrum(y, 1e-3).spurs[0]

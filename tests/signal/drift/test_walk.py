@@ -6,6 +6,7 @@ import pytest
 from catseye.errors import EstimationError, ValidityError
 from catseye.signal.drift.reference import drift_along, drift_at
 from catseye.signal.drift.walk import estimate_walk, longest_gap, midpoint_uncertainty, walk_test
+from draws import draws, same_sigmas
 
 WALK = 3e-4  # rad per square root of a second, some ten times what ZY rangers show
 
@@ -61,29 +62,32 @@ def test_the_estimate_is_where_the_likelihood_of_scipy_is_highest():
     assert found.white**2 == pytest.approx(np.exp(theirs.x[1]), rel=1e-4)
 
 
-def test_the_estimates_uncertainty_is_the_scatter_and_its_interval_holds_the_truth():
+@draws(300)
+def test_the_estimates_uncertainty_is_the_scatter_and_its_interval_holds_the_truth(runs):
     rng = np.random.default_rng(22)
-    nights = [series_of(rng, WALK, (1e-3) ** 2) for _ in range(300)]
+    nights = [series_of(rng, WALK, (1e-3) ** 2) for _ in range(runs)]
     found = [estimate_walk(t, phase, variance, series=name) for t, phase, variance, name in nights]
     squares = np.array([w.random_walk**2 for w in found])
     # 300 nights scatter by 1 % in the mean, 4 % in the standard deviation
-    assert squares.mean() == pytest.approx(WALK**2, rel=0.03)
-    assert np.std(squares) == pytest.approx(np.mean([np.sqrt(w.covariance[0, 0]) for w in found]), rel=0.12)
+    assert squares.mean() == pytest.approx(WALK**2, rel=same_sigmas(0.03, 300, runs))
+    claimed = np.mean([np.sqrt(w.covariance[0, 0]) for w in found])
+    assert np.std(squares) == pytest.approx(claimed, rel=same_sigmas(0.12, 300, runs))
     held = np.mean([low <= WALK <= high for low, high in (w.interval() for w in found)])
-    assert held == pytest.approx(0.95, abs=0.038)  # three standard deviations of 300
+    assert held == pytest.approx(0.95, abs=same_sigmas(0.038, 300, runs))  # three standard deviations of 300
 
 
-def test_walk_and_white_noise_are_told_apart_with_their_covariance():
+@draws(150)
+def test_walk_and_white_noise_are_told_apart_with_their_covariance(runs):
     rng = np.random.default_rng(23)
-    nights = [series_of(rng, WALK, (1e-3) ** 2, rangers=6, references=12, white=4e-3) for _ in range(150)]
+    nights = [series_of(rng, WALK, (1e-3) ** 2, rangers=6, references=12, white=4e-3) for _ in range(runs)]
     found = [estimate_walk(t, phase, variance, series=name, white=True) for t, phase, variance, name in nights]
     error = np.array([[w.random_walk**2 - WALK**2, w.white**2 - 1.6e-5] for w in found])
     claimed = np.mean([w.covariance for w in found], axis=0)
     # three standard deviations of 150 nights
-    np.testing.assert_allclose(np.var(error, axis=0) / np.diag(claimed), 1.0, atol=0.35)
+    np.testing.assert_allclose(np.var(error, axis=0) / np.diag(claimed), 1.0, atol=same_sigmas(0.35, 150, runs))
     correlation = claimed[0, 1] / np.sqrt(claimed[0, 0] * claimed[1, 1])
     assert correlation < -0.2  # one takes what the other leaves
-    assert np.corrcoef(error.T)[0, 1] == pytest.approx(correlation, abs=0.24)
+    assert np.corrcoef(error.T)[0, 1] == pytest.approx(correlation, abs=same_sigmas(0.24, 150, runs))
 
 
 def test_noise_enough_to_explain_everything_leaves_no_walk():

@@ -7,6 +7,7 @@ from scipy.stats import chi2
 
 from catseye.errors import ValidityError
 from catseye.signal.vibration.spectrum import Spectrum, aliases, likely_alias, peaks, shape_at, spectrum
+from draws import draws
 
 RATE = 7.8
 
@@ -93,10 +94,11 @@ def test_a_wave_above_half_the_rate_is_named_with_all_it_may_be_and_other_rhythm
     np.testing.assert_allclose(alone, 1.0)  # one rhythm knows nothing
 
 
-def test_a_shape_comes_back_with_the_scatter_it_claims():
+@draws(60)
+def test_a_shape_comes_back_with_the_scatter_it_claims(runs):
     rng, t = np.random.default_rng(6), np.arange(2000) / RATE
     truth, off = np.array([1.0, -0.5, 0.2, 0.0]), []
-    for _ in range(60):
+    for _ in range(runs):
         band = signal.sosfilt(signal.butter(2, [0.75, 0.85], "bandpass", fs=RATE, output="sos"), rng.normal(size=2400))
         y = truth[:, None] * band[400:] + 0.05 * rng.normal(size=(4, 2000))
         found = shape_at(spectrum([t] * 4, list(y), stretch=250 / RATE), 0.8)

@@ -14,6 +14,7 @@ from catseye.estimation.network.positions import dispatch as module
 from catseye.estimation.network.positions.descent import CAP, Ranges, descend
 from catseye.estimation.network.positions.dispatch import positions
 from catseye.estimation.network.positions.status import Status
+from draws import draws
 from repository import TESTS
 
 NETWORK = TESTS / "vectors" / "networks" / "ranging-18x500"
@@ -266,11 +267,12 @@ def test_the_compiled_form_takes_the_near_image_of_the_stations_that_each_target
     assert (mirrored.status[found] == Status.AMBIGUOUS).all()
 
 
+@draws(60)
 @pytest.mark.parametrize("compiled", [False, True])
-def test_no_target_is_found_on_the_side_that_near_excludes(compiled):
+def test_no_target_is_found_on_the_side_that_near_excludes(compiled, runs):
     """Coplanar stations, sigmas from 10 um to 10 m, targets a hand or a house above them: a descent may pass below."""
     rng = np.random.default_rng(5)
-    for _ in range(60):
+    for _ in range(runs):
         s = int(rng.integers(3, 7))
         stations, u = rng.uniform(-60, 60, (s, 3)) * [1, 1, 0], 10 ** rng.uniform(-5, 1, s)
         x = np.concatenate([rng.uniform(-60, 60, (400, 2)), 10 ** rng.uniform(-1.5, 2, (400, 1))], axis=1)
@@ -298,10 +300,11 @@ def test_a_step_across_the_stations_plane_does_not_end_at_the_worse_image(compil
     assert got.x[0, 2] > 1.4
 
 
-def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly():
+@draws(60)
+def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly(runs):
     """Sigmas over six decades, noise beyond them, figures flat and thin, ranges missing: the same status and place."""
     rng = np.random.default_rng(23)
-    for k in range(60):
+    for k in range(runs):
         s = int(rng.integers(4, 9))
         stations = rng.uniform(-60, 60, (s, 3)) * [1, 10 ** rng.uniform(-2, 0), 10 ** rng.uniform(-5, 0)]
         u = 10 ** rng.uniform(-5, 1.3, s) if k % 2 else np.full(s, 10 ** rng.uniform(-5, 1))

@@ -11,6 +11,7 @@ from catseye.reduction.calibrations.ranging.glass_constants import (
     calibrate_ball,
     calibrate_prism,
 )
+from draws import draws, same_sigmas
 from reduction.calibrations.length_scene import readings
 
 GLASS = {
@@ -47,12 +48,13 @@ def test_warm_glass_is_taken_to_20_degrees():
     assert warm.value("height_mm") == pytest.approx(38.4 * (1 - 7.1e-6 * 3.0), abs=1e-7)
 
 
-def test_the_claimed_covariance_of_a_balls_constants_is_their_scatter():
+@draws(400)
+def test_the_claimed_covariance_of_a_balls_constants_is_their_scatter(runs):
     rng = np.random.default_rng(4)
     part = ("r1", "r2") * 4
     truth = np.array([50.0, 96.5])
     found, claimed = [], []
-    for _ in range(400):
+    for _ in range(runs):
         index = 1.527077 + 1e-4 * rng.normal()
         gauge, warm = 0.002 * rng.normal(), 0.5 * rng.normal()
         size = truth[[0, 1] * 4] * (1 + 7.1e-6 * (3.0 + warm)) + gauge + 0.003 * rng.normal(size=8)
@@ -64,7 +66,7 @@ def test_the_claimed_covariance_of_a_balls_constants_is_their_scatter():
         claimed.append(c.covariance)
     scatter, claim = np.cov(np.array(found).T), np.mean(claimed, axis=0)
     u = np.sqrt(np.diag(claim))
-    assert np.all(np.abs(scatter - claim) / np.outer(u, u) < 0.25)  # 400 runs: 7 to 10 % each
+    assert np.all(np.abs(scatter - claim) / np.outer(u, u) < same_sigmas(0.25, 400, runs))  # 400 runs: 7 to 10 % each
 
 
 def test_a_part_that_is_none_is_refused_with_its_line():
@@ -87,16 +89,17 @@ def test_what_the_index_and_the_expansion_leave_open_is_in_the_constants_of_a_pr
     assert found.u("height_mm") == pytest.approx(38.4 * 3.0 * 2e-6, rel=1e-3)  # 3 °C above 20 °C
 
 
+@draws(1000)
 @pytest.mark.parametrize("count", [2, 3, 6])
-def test_the_interval_holds_the_height_as_often_as_it_says_even_from_two_readings(count):
+def test_the_interval_holds_the_height_as_often_as_it_says_even_from_two_readings(count, runs):
     rng = np.random.default_rng(count)
     held = 0
     sheet = {**GLASS, "u_gauge_mm": 0.0, "u_temperature_c": 0.0, "temperature_c": 20.0}
-    for _ in range(1000):
+    for _ in range(runs):
         height = 38.2 + 0.002 * rng.normal(size=count)
         (h, *_) = calibrate_prism(readings(GlassSheet, PRISM, numbers={"height_mm": height}, **sheet)).quantities
         held += abs(h.value - 38.2) <= h.coverage * h.u
-    assert abs(held - 954.5) < 27  # four standard deviations of a count
+    assert abs(held - 0.9545 * runs) < same_sigmas(27 / 1000, 1000, runs) * runs  # four standard deviations of a count
 
 
 def test_what_is_known_keeps_the_factor_two():

@@ -1,0 +1,20 @@
+"""The command line in this process: what it does, says and complains of, without the seconds that a start takes."""
+
+import typer
+
+from catseye.cli.commands import app, join_commands
+from catseye.cli.terminal import attempt
+
+join_commands()
+
+
+def command_line(capsys):
+    """Function (*arguments) -> exit status, what was said, what was complained of."""
+
+    def run(*arguments):
+        command = typer.main.get_command(app)
+        status = attempt(lambda: command.main([str(a) for a in arguments], prog_name="catseye"))
+        said = capsys.readouterr()
+        return status, said.out, said.err
+
+    return run
