@@ -2,10 +2,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.catseye-installed
-# Tests that lie together go to one worker, whose fixtures serve them all; bytecode is kept, for hundreds of processes start.
-PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --dist worksteal
+# One worker more than cores: tests that wait for processes leave theirs to others. Bytecode is kept: hundreds of processes start.
+WORKERS := $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check test test-all demo bench release clean
+.PHONY: help setup check style types test tests test-all demo bench release clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -18,17 +19,24 @@ $(STAMP): pyproject.toml constraints.txt
 
 setup: $(STAMP)  ## make .venv and install catseye in it
 
-check: setup  ## style, types, layers
+check: style types  ## style, types, layers
+
+style: setup
 	$(BIN)/ruff check src tests benchmarks studies
 	$(BIN)/ruff format --check src tests benchmarks studies
-	MYPY_NUM_WORKERS=2 $(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: check  ## check, then the tests
-	$(PYTEST)
+types: setup
+	$(BIN)/mypy
 
-test-all: check  ## the same with the long scatter and fault runs
-	$(PYTEST) -m 'slow or not slow' --hypothesis-profile=explore
+test: style  ## check, and the tests: types beside them, as a core is idle now and then
+	$(MAKE) --no-print-directory --jobs 2 types tests
+
+test-all: style  ## the same with the long scatter and fault runs
+	$(MAKE) --no-print-directory --jobs 2 types tests TESTS="-m 'slow or not slow' --hypothesis-profile=explore"
+
+tests: setup
+	$(PYTEST) $(TESTS)
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
