@@ -18,6 +18,7 @@ from catseye.atmosphere.index.air import MODELS
 from catseye.cli import commands
 from catseye.cli.commands import app
 from command_scene import command_line
+from process_scene import ends_with_us
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -35,7 +36,7 @@ def catseye(capsys, tmp_path, monkeypatch):
 def started(*arguments, cwd=None, **streams):
     """The program as a user starts it: its entry point in a process of its own."""
     code = "from catseye.cli.main import run; run()"
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "preexec_fn": ends_with_us(), **streams}
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)], check=False, text=True, cwd=cwd, timeout=60, **streams
     )

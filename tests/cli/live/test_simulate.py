@@ -12,8 +12,11 @@ import pytest
 from catseye.cli.live import simulate
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from cli.living_scene import PATIENCE, RUN, ended, processes_with, recorded, small_site, started
+from cli.living_scene import PATIENCE, RUN, ended, processes_with, recorded, small_site, started, write_site
+from process_scene import ends_with_us
 from sun_scene import astropy_sun
+
+OPTIONS = {"capture_output": True, "text": True, "timeout": PATIENCE, "check": True}
 
 
 @pytest.mark.parametrize(
@@ -64,7 +67,7 @@ def test_a_run_in_virtual_time_is_as_true_as_it_claims_and_the_same_each_time(tm
     """
     journal = tmp_path / "again.db"
     words = ["simulate", str(small_site()), "--fast", "--minutes", "0.19", "--json", "--journal", str(journal)]
-    run = subprocess.run([*RUN, *words], capture_output=True, text=True, timeout=PATIENCE, check=True)
+    run = subprocess.run([*RUN, *words], **OPTIONS, preexec_fn=ends_with_us())
     told = json.loads(run.stdout)
     assert run.stderr == ""
     assert told["shots"] == told["acknowledged"] > 50
@@ -93,7 +96,7 @@ def what_was_said(reader):
 @pytest.mark.slow
 def test_another_seed_is_another_site(tmp_path):
     words = ["simulate", str(small_site()), "--fast", "--minutes", "0.19", "--json", "--seed", "2"]
-    run = subprocess.run([*RUN, *words], capture_output=True, text=True, timeout=PATIENCE, check=True)
+    run = subprocess.run([*RUN, *words], **OPTIONS, preexec_fn=ends_with_us())
     told = json.loads(run.stdout)
     with JournalReader(recorded()) as reader:
         _, first = next(reader.solutions(1))
@@ -109,7 +112,9 @@ def test_a_run_in_real_time_ends_clean_while_it_measures(tmp_path, number, statu
     journal = tmp_path / "out" / "night.db"
     journal.parent.mkdir()
     (tmp_path / "tmp").mkdir()
-    words = ["simulate", small_site(), "--minutes", "0", "--port-base", "0", "--journal", journal]
+    site = tmp_path / "site"  # of its own: other workers have processes of the shared one
+    write_site(site)
+    words = ["simulate", site, "--minutes", "0", "--port-base", "0", "--journal", journal]
     with started(*words, home=tmp_path / "tmp") as process:
         said = [process.stdout.readline(), process.stdout.readline()]
         assert said == ["starting the twin\n", "starting the coordinator\n"]
@@ -119,7 +124,7 @@ def test_a_run_in_real_time_ends_clean_while_it_measures(tmp_path, number, statu
     assert "Shots" in out
     assert [path.name for path in journal.parent.iterdir()] == ["night.db"]
     assert list((tmp_path / "tmp").iterdir()) == []
-    assert processes_with(str(small_site())) == []
+    assert processes_with(str(site)) == []
     with JournalReader(journal) as reader:
         assert reader.run().ended is not None
 
