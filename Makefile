@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.catseye-installed
-# One worker more than cores: tests that wait for processes leave theirs to others. Bytecode is kept: hundreds of processes start.
+# One worker more than cores: tests that wait for a process leave their core to others. The processes find bytecode made.
 WORKERS := $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 

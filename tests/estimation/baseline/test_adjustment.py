@@ -319,7 +319,7 @@ def check_scatter(runs, seed, tolerance):
 
 
 @draws(150)
-def test_claimed_covariance_is_the_scatter_of_150_campaigns(runs):
+def test_claimed_covariance_is_the_scatter_of_campaigns(runs):
     """A standard deviation of 150 is known to 5.8 %: three of these, and the largest of seven."""
     check_scatter(runs, 5, same_sigmas(0.18, 150, runs))
 

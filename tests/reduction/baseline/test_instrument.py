@@ -286,7 +286,7 @@ def campaigns(path, tops, runs, seed):
 
 
 @draws(30, name="pairs")
-def test_what_is_claimed_is_what_30_pairs_of_campaigns_scatter(tmp_path, heights, pairs):
+def test_what_is_claimed_is_what_pairs_of_campaigns_scatter(tmp_path, heights, pairs):
     """A standard deviation of 30 is known to 13 %; three of these."""
     missed, claimed = campaigns(tmp_path / "o.csv", heights(), pairs, 4)
     assert missed.std(axis=0) == pytest.approx(claimed, rel=same_sigmas(0.39, 30, pairs))
