@@ -2,9 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.catseye-installed
-# One worker more than cores: tests that wait for a process leave their core to others. The processes find bytecode made.
-WORKERS := $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
-PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+# What lies together goes to one worker, whose fixtures serve it all; processes that tests start find their bytecode made.
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --dist worksteal
 
 .PHONY: help setup check style types test tests test-all demo bench release clean
 

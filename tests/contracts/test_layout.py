@@ -88,10 +88,10 @@ sys.exit(bool(broken))
 """
 
 
-@pytest.mark.parametrize("which", ["one of each folder", pytest.param("all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("which", ["one of every third folder", pytest.param("all", marks=pytest.mark.slow)])
 def test_every_module_can_be_imported_alone(which):
     """Each in an interpreter that has loaded libraries, but nothing of ours: a circle hides behind what came before."""
     ours = modules()
-    names = list(ours) if which == "all" else list({path.parent: name for name, path in ours.items()}.values())
+    names = list(ours) if which == "all" else list({path.parent: name for name, path in ours.items()}.values())[::3]
     done = subprocess.run([sys.executable, "-c", ALONE, *names], check=False, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
