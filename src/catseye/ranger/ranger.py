@@ -1,4 +1,4 @@
-"""One ZY: its state, and the loop that serves commands, schedule, scan, updates and status. No socket here.
+"""One ZY: the loop that serves commands, schedule, scan, updates and status, around its state. No socket here.
 
 A transport gives it lines of connections (`receive`), calls `turn` again and again, and sends what that returns.
 Commands run in the order received, one at a time; one that waits for the hardware gives its turn back and is asked

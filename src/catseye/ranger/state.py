@@ -29,7 +29,7 @@ REFUSED_IN_A_SCAN = (
     *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
 )
 REFUSED_IN_A_STREAM = tuple(name for name in REFUSED_IN_A_SCAN if name != "TRK")
-BITS = tuple(int(bit) for bit in Status)  # in the order of `Ranger.status`
+BITS = tuple(int(bit) for bit in Status)  # in the order of `RangerState.status`
 
 
 @dataclass(frozen=True)
