@@ -170,25 +170,20 @@ def killed(place, folder, kinds, seed, server=None, longest=1.5):
     return killer.times, counts
 
 
-QUICK_OR_MORE = [pytest.param(2, id="quick"), pytest.param(None, id="each kind", marks=pytest.mark.slow)]
-
-
-@pytest.mark.parametrize("kills", QUICK_OR_MORE)
-def test_coordinator_and_rangers_killed_at_any_moment_lose_and_double_nothing(tmp_path, kills):
-    kinds = ["coordinator", "ranger", "starting_coordinator"][:kills]
-    times, (acknowledged, stored, runs, _) = killed(tmp_path / "j.db", tmp_path, kinds, seed=1)
-    most = 1 + kinds.count("coordinator") + 2 * kinds.count("starting_coordinator")
-    assert runs in (most, most - kinds.count("starting_coordinator"))  # killed while it started it may have begun a run
+def test_coordinator_and_rangers_killed_at_any_moment_lose_and_double_nothing(tmp_path):
+    times, (acknowledged, stored, runs, _) = killed(
+        tmp_path / "j.db", tmp_path, ["coordinator", "ranger", "starting_coordinator"], seed=1
+    )
+    assert runs in (3, 4)  # the one killed while it started may have begun a run
     assert 12 <= acknowledged <= stored
     assert max(times["processor until ready"]) < UP  # by the clock on the wall it counts what others do meanwhile
 
 
-@pytest.mark.parametrize("kills", QUICK_OR_MORE)
-def test_a_database_killed_at_any_moment_loses_and_doubles_nothing(server, tmp_path, kills):
-    kinds = ["backend", "database", "coordinator", "outage"][:kills]
-    place = server.database(f"system-{kills}")
-    _, (acknowledged, stored, runs, _) = killed(place, tmp_path, kinds, seed=2, server=server)
-    assert runs == 1 + kinds.count("coordinator")
+def test_a_database_killed_at_any_moment_loses_and_doubles_nothing(server, tmp_path):
+    _, (acknowledged, stored, runs, _) = killed(
+        server.database("system"), tmp_path, ["outage", "coordinator", "backend", "database"], seed=2, server=server
+    )
+    assert runs == 2
     assert 12 <= acknowledged <= stored
 
 
