@@ -7,11 +7,19 @@ from hypothesis import settings
 
 from repository import ROOT
 
-settings.register_profile("seeded", derandomize=True, deadline=None)  # the same examples on every machine
+settings.register_profile("seeded", derandomize=True, deadline=None, max_examples=50)  # the same on every machine
 settings.register_profile("explore", deadline=None, max_examples=300)  # for `make test-all`
 settings.load_profile("seeded")
 
 gc.set_threshold(20_000, 20, 50)  # what a test leaves is little beside what all the modules hold, which it walks over
+
+
+def pytest_configure(config):
+    """One of several workers."""
+    if hasattr(config, "workerinput"):
+        from kept_scene import compile_once
+
+        compile_once()
 
 
 def pytest_collection_finish():

@@ -71,6 +71,29 @@ def kept_value(function):
     return answer
 
 
+def compile_once() -> None:
+    """A kernel that two workers need is compiled by the first; the second waits and loads what numba kept."""
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.dispatcher import Dispatcher
+
+    compile_here = Dispatcher.compile
+
+    def compile_alone(dispatcher, signature):
+        name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
+        if name in held:  # a recursion
+            return compile_here(dispatcher, signature)
+        with global_compiler_lock, (place() / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            held.add(name)
+            try:
+                return compile_here(dispatcher, signature)
+            finally:
+                held.discard(name)
+
+    held: set[str] = set()
+    Dispatcher.compile = compile_alone
+
+
 @kept_value
 def night_of(seed, **options):
     """A simulated night."""
