@@ -15,25 +15,27 @@ import numpy as np
 from numba import njit
 from threadpoolctl import threadpool_limits
 
-from catseye.geometry.mirror.pointing import Station, aim, counts
+from catseye.geometry.mirror.pointing import MirrorStation, aim, counts
 
 ROUNDS, REPEATS = 9, 3
 RANGERS, POINTS = 18, 100_000
 
 
-def scene() -> tuple[Station, np.ndarray]:
+def scene() -> tuple[MirrorStation, np.ndarray]:
     """Twelve rangers on a ring of 120 m and six in the air, points all over the telescope."""
     rng = np.random.default_rng(5)
     turn = np.arange(RANGERS) * 2.0 * np.pi / 12
     ground = np.stack([120 * np.cos(turn), 120 * np.sin(turn), np.where(np.arange(RANGERS) < 12, 0.0, 70.0)], axis=1)
     alpha = np.stack([np.pi / 2 + turn, *rng.normal(0.0, 1e-3, (2, RANGERS))], axis=1)
     offset = np.array([0.0, 0.247, 0.0]) + rng.normal(0.0, 1e-3, (RANGERS, 3))
-    station = Station(ground, alpha, offset, rng.normal(0, 5e-4, (RANGERS, 2)), rng.integers(-5000, 5000, (RANGERS, 2)))
+    station = MirrorStation(
+        ground, alpha, offset, rng.normal(0, 5e-4, (RANGERS, 2)), rng.integers(-5000, 5000, (RANGERS, 2))
+    )
     points = np.stack([*rng.uniform(-60, 60, (2, POINTS)), rng.uniform(5, 110, POINTS)], axis=1)
     return station, points
 
 
-def whole_arrays(station: Station, points: np.ndarray) -> np.ndarray:
+def whole_arrays(station: MirrorStation, points: np.ndarray) -> np.ndarray:
     """The transformation as a numpy user writes it: one array expression a step."""
     mirror = (points - station.scan_point[:, None]) @ np.swapaxes(station.mirror_from_ground, -1, -2)
     x, y, z = mirror[..., 0], mirror[..., 1], mirror[..., 2]
@@ -44,7 +46,7 @@ def whole_arrays(station: Station, points: np.ndarray) -> np.ndarray:
     return np.stack([na, 1e5 * phi / (4 * np.pi) + station.zeros[:, 1:]], axis=-1)
 
 
-def scipy_rotations(station: Station, points: np.ndarray) -> np.ndarray:
+def scipy_rotations(station: MirrorStation, points: np.ndarray) -> np.ndarray:
     """The same through scipy's rotations, one ranger at a time."""
     from scipy.spatial.transform import Rotation
 
@@ -66,13 +68,13 @@ def _write_only(matrix, points, out):
             out[i, j, 1] = points[j, 1] + points[j, 2]
 
 
-def stream(station: Station, points: np.ndarray) -> np.ndarray:
+def stream(station: MirrorStation, points: np.ndarray) -> np.ndarray:
     out = np.empty((RANGERS, len(points), 2))
     _write_only(station.mirror_from_ground, points, out)
     return out
 
 
-def plain(station: Station, points: np.ndarray) -> np.ndarray:
+def plain(station: MirrorStation, points: np.ndarray) -> np.ndarray:
     found = aim(station[:, None], points)
     return np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
 

@@ -19,7 +19,7 @@ from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.phase import detect
@@ -67,7 +67,7 @@ def detection() -> None:
 
 def adjustment() -> None:
     """The network of night-01: 600 unknowns, correlated ranges."""
-    campaign, settings = read_campaign(EXAMPLE), Settings()
+    campaign, settings = read_campaign(EXAMPLE), ReductionSettings()
     phases = measure_phases(campaign, settings)
     electronics, _ = follow_electronics(campaign, phases)
     network = build_network(campaign, phases, electronics, settings)

@@ -12,7 +12,7 @@ from catseye.atmosphere.index.air import group_refractivity
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.path import bent_ray_excess, travel_time
 from catseye.atmosphere.sound.speed import sound
-from catseye.estimation.shapes.tomography import Prior, Scale
+from catseye.estimation.shapes.tomography import FieldPrior, Scale
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.reduction.air.acoustic import path_temperatures
 from catseye.reduction.air.acoustic_field import sound_field
@@ -71,8 +71,8 @@ def array(count: int, rng: np.random.Generator, wind=(4.0, -2.0, 0.0)):
         1e-5,
         u_position=2e-3,
         **STATION,
-        temperature=Prior(15.0, 8.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.4, (8.0, 8.0, 4.0)))),
-        wind=Prior(0.0, 6.0, (Scale(0.5, (40.0, 40.0, 6.0)),)),
+        temperature=FieldPrior(15.0, 8.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.4, (8.0, 8.0, 4.0)))),
+        wind=FieldPrior(0.0, 6.0, (Scale(0.5, (40.0, 40.0, 6.0)),)),
     )
     told = field.along(*LASER)
     truth = air(LASER[0] + NODES * (LASER[1] - LASER[0]))

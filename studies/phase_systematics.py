@@ -15,7 +15,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.records.night.campaign import REFERENCE, read_campaign
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.drift.walk import estimate_walk, longest_gap, midpoint_uncertainty, walk_test
 from catseye.signal.systematics.amplitude import amplitude_phase
 from catseye.signal.systematics.cyclic import imbalance_range, leakage_range
@@ -110,7 +110,7 @@ def draw(rows: list[tuple[str, float, float, str]]) -> str:
 def night() -> str:
     """What the example night's reference shots say of the random walk that its site gives."""
     campaign = read_campaign(Path(__file__).parents[1] / "examples" / "night-01")
-    phases = measure_phases(campaign, Settings())
+    phases = measure_phases(campaign, ReductionSettings())
     rejected = follow_electronics(campaign, phases)[1]
     shots = campaign.shots
     good = np.array([t == REFERENCE and not r for t, r in zip(shots.target, phases.reason, strict=True)])

@@ -14,7 +14,7 @@ from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
-from catseye.simulator.servo.axis import TRACKING_SAMPLES, ServoAxis, Settling, Trace
+from catseye.simulator.servo.axis import TRACKING_SAMPLES, AxisTrace, ServoAxis, Settling
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign
 from catseye.simulator.servo.tuning import (
@@ -49,14 +49,14 @@ def axis(filter_: Filter, *, design: AxisDesign = AXIS, bits=8, overflow="satura
     )
 
 
-def move(made: ServoAxis, target: int = MOVE, samples: int = 6000) -> Trace:
+def move(made: ServoAxis, target: int = MOVE, samples: int = 6000) -> AxisTrace:
     """A move from where the axis is."""
     made.abp(target)
     made.stt()
     return made.run(samples)
 
 
-def step(made: ServoAxis, size: int = STEP, samples: int = 6000) -> Trace:
+def step(made: ServoAxis, size: int = STEP, samples: int = 6000) -> AxisTrace:
     """A move so fast that the profile is a step."""
     made.abv(size * 65_536)
     made.aba(size * 65_536)

@@ -23,7 +23,7 @@ from catseye.constants import DEGREE
 from catseye.gateways.examples import example_campaign
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
-from catseye.geometry.mirror.pointing import Station, in_mirror_axes
+from catseye.geometry.mirror.pointing import MirrorStation, in_mirror_axes
 from catseye.geometry.mirror.track import apparent_motion, line_bound, longest_interval
 from catseye.geometry.sky.time_tag import TimeTag, tag_step
 from catseye.optics.spot import offset_range, offset_share, steering_range
@@ -75,11 +75,11 @@ class Sample:
     longest: np.ndarray
 
 
-def rangers() -> Station:
+def rangers() -> MirrorStation:
     """The ground rangers of the example night, (12,)."""
     night = read_campaign(example_campaign())
     each = [station_of(night.monuments[n], night.mirror_of(n)) for n in sorted(night.monuments)]
-    return Station.of_parameters(np.stack([s.parameters for s in each]))
+    return MirrorStation.of_parameters(np.stack([s.parameters for s in each]))
 
 
 def dish(step: float = 20.0) -> np.ndarray:

@@ -52,7 +52,7 @@ def ranging_network():
     """A function that makes networks of ranges: stations about targets, all free, stations marked as the datum."""
     import numpy as np
 
-    from catseye.estimation.network.model import Network, Points
+    from catseye.estimation.network.model import NetworkPoints, ObservationNetwork
     from catseye.estimation.observations.kinds import Distances
 
     def made(seed=0, *, stations=6, targets=12, sigma=5e-5, size=100.0, off=0.01, seen=1.0, flat=False):
@@ -79,6 +79,6 @@ def ranging_network():
         given = true + off * size / 100.0 * rng.standard_normal(true.shape)
         datum = np.zeros(true.shape, dtype=bool)
         datum[:stations] = True
-        return Network(Points(names, given, np.zeros_like(datum), datum), (), (ranges,)), true
+        return ObservationNetwork(NetworkPoints(names, given, np.zeros_like(datum), datum), (), (ranges,)), true
 
     return made

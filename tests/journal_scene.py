@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Run, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Document, EpochSolution, Run, SentCommand
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import read_site
 from process_scene import ends_with_us
@@ -56,10 +56,10 @@ def scene_entries(count=20, seed=0):
             LiveWeather(f"WX{k % 2 + 1}", when, 11.4, float("nan") if k % 3 else 930.86, 70.4),
         ]
         if k % 3 == 0:
-            entries.append(Solution(when + 50, {"points": {"ZY105": [0.1 + k, 1 / 3, None]}}, covariance))
+            entries.append(EpochSolution(when + 50, {"points": {"ZY105": [0.1 + k, 1 / 3, None]}}, covariance))
             entries.append(Happening(when, "ZY105", "blocked", "ZY105 lost µ", "warning", {"volts": 0.4, "of": "x"}))
         if k % 5 == 0:
-            entries.append(Command(when, "ZY105", 1000 + k, "CIL 17", "CIL 0, not homed", False))
+            entries.append(SentCommand(when, "ZY105", 1000 + k, "CIL 17", "CIL 0, not homed", False))
             entries.append(Document(when, "plan", "ZY105 -> ZEG41040L\n"))
     return entries
 
@@ -72,7 +72,7 @@ def plainly(entry):
         samples = None if entry.shot.samples is None else np.asarray(entry.shot.samples, "<i2").tobytes()
         shot = {**vars(entry.shot), "samples": samples}
         return repr((sorted(shot.items()), entry.status, entry.text, entry.range_, entry.u_range, entry.misfit))
-    if isinstance(entry, Solution):
+    if isinstance(entry, EpochSolution):
         return repr((entry.ticks, entry.text, None if entry.covariance is None else entry.covariance.tobytes()))
     return repr(entry)
 

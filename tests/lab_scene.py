@@ -12,7 +12,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, norm
 
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 from repository import ROOT
 
 ARC = np.pi / 180 / 3600
@@ -32,7 +32,7 @@ def table(kind, numbers, words=None, left_out=None, **sheet):
     """Readings of a RECIPE, as `read_readings` would give them."""
     layout = kind.layout
     m = len(next(iter({**numbers, **(words or {})}.values())))
-    return Readings(
+    return SheetReadings(
         file="t.csv",
         sheet=layout.sheet.model_validate({"kind": layout.kind, **WHO, **sheet}),
         sheet_file="t.toml",

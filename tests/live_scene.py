@@ -11,7 +11,7 @@ from catseye.reduction.live.live import EpochAnswer, Live, LiveSettings
 from catseye.reduction.live.shots import ShotAnswer
 from catseye.reduction.site.motion import ground_from
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.site import Twin
 from repository import ROOT
 
@@ -32,7 +32,7 @@ def site() -> SiteFolder:
 
 def twin(motion: str = "track 145.3 45", *, seed: int = 1, faults: tuple[str, ...] = (), **more) -> Twin:
     board = FaultBoard(Fault.parse(text) for text in faults)
-    return Twin(site(), seed=seed, start_mjd=START, motion=Motion.parse(motion), faults=board, **more)
+    return Twin(site(), seed=seed, start_mjd=START, motion=AxisMotion.parse(motion), faults=board, **more)
 
 
 def sights(world: Twin, seconds: float, *, rangers: tuple[str, ...] = ()) -> dict[str, list[str]]:

@@ -22,7 +22,7 @@ from catseye.ranger.head import Buffer
 from catseye.ranger.line import nanoseconds_to_ticks
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import REFERENCE, SiteFolder, read_site
-from catseye.records.site.target import Target
+from catseye.records.site.target import TargetRow
 from catseye.simulator.clock.world_clock import SystemClock
 from process_scene import ends_with_us
 from repository import ROOT
@@ -46,7 +46,7 @@ def load_site(rangers=18, targets=None):
         turns = TWO_PI * np.arange(targets) / targets
         places = np.stack([5e3 * np.cos(turns), 5e3 * np.sin(turns), np.full(targets, 4e4)], axis=1)
         values["targets"] = {
-            f"L{k}": Target(name=f"L{k}", type="hollow", frame="ground", position_mm=tuple(at.tolist()))
+            f"L{k}": TargetRow(name=f"L{k}", type="hollow", frame="ground", position_mm=tuple(at.tolist()))
             for k, at in enumerate(places, 1)
         }
         values["triplets"], values["benchmarks"] = {}, ()

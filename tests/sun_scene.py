@@ -6,20 +6,20 @@ The mount's turns come from scipy's rotations, the Sun from astropy, the axes' p
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.geometry.mirror.slew import Pace
 from catseye.records.files.reading import read_record
 from catseye.records.site.keep_out import KeepOut
-from catseye.reduction.site.earth_rotation import Place
+from catseye.reduction.site.earth_rotation import FramePlace
 from catseye.reduction.steering.guard import Guard
 from repository import ROOT
 
 DEGREE = np.pi / 180
 LATITUDE_DEG, LONGITUDE_DEG, HEIGHT = 38.433, -79.84, 807.0
-GREEN_BANK = Place(LATITUDE_DEG * DEGREE, LONGITUDE_DEG * DEGREE, HEIGHT)
+GREEN_BANK = FramePlace(LATITUDE_DEG * DEGREE, LONGITUDE_DEG * DEGREE, HEIGHT)
 MORNING = 52889.65  # 2003-09-07, 15:36 UTC: the Sun 50 degrees high in the south-east
 ALPHA, BETA, ZEROS = (-0.2492780, 9e-7, 5.31e-5), (-6.37e-4, 1.21e-4), (5931.0, 3062.0)
-STATION = Station([29.503743, 115.941781, 0.148752], ALPHA, [-7.5e-5, 0.247425, -8.51e-4], BETA, ZEROS)
+STATION = MirrorStation([29.503743, 115.941781, 0.148752], ALPHA, [-7.5e-5, 0.247425, -8.51e-4], BETA, ZEROS)
 STOPS = (-18_069.0, 78_931.0)
 PACE = Pace((10_000.0, 5_000.0), (20_000.0, 10_000.0))
 

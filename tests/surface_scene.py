@@ -8,11 +8,11 @@ from catseye.optics.aperture import cos_incidence
 from catseye.optics.zernike import zernike
 from catseye.records.site.folder import read_site
 from catseye.reduction.surface.actuators import actuators_of
-from catseye.reduction.surface.shape import Aperture, Prisms
+from catseye.reduction.surface.shape import LitAperture, Prisms
 from repository import ROOT
 
 SITE = read_site(ROOT / "examples" / "sites" / "gbt")
-APERTURE = Aperture.of(SITE.site.paraboloid)
+APERTURE = LitAperture.of(SITE.site.paraboloid)
 NAMES, PLACES = actuators_of(SITE)
 OWN = Transform("reflector", "reflector", np.eye(3), np.zeros(3))
 NORMAL = np.column_stack([-PLACES[:, :2] / 120.0, np.ones(len(PLACES))])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from catseye.coordinator.journal.entries import AnsweredShot, Command, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, SentCommand
 from catseye.errors import EstimationError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from coordinator.link_scene import COMMANDS, MemoryJournal, run, until
@@ -27,7 +27,7 @@ def test_rounds_are_shot_reduced_journalled_and_acknowledged():
             }
             assert all(s.shot.samples is not None for s in shots)
             assert all(s.status == ("reference" if s.shot.target == "ZRG" else "used") for s in shots)
-            solutions = of(site.journal.rows, Solution)
+            solutions = of(site.journal.rows, EpochSolution)
             assert [s.answer["number"] for s in solutions][:3] == [1, 2, 3]
             used = [n for s in solutions for n in s.answer["used"]]
             assert used == list(range(1, len(used) + 1))  # each shot in one epoch, and in order
@@ -60,8 +60,8 @@ def test_what_was_commanded_is_journalled_with_what_came_of_it():
         async with Site() as site:
             await until(lambda: site.live.epochs >= 2)
             await site.served["ZY102"].stop()  # what is under way there has no reply
-            await until(lambda: any(c.ok is None for c in of(site.journal.rows, Command)))
-            told = of(site.journal.rows, Command)
+            await until(lambda: any(c.ok is None for c in of(site.journal.rows, SentCommand)))
+            told = of(site.journal.rows, SentCommand)
         for ranger in site.names:
             mine = [c for c in told if c.ranger == ranger]
             words = [c.line.rpartition("\t")[2].split()[0] for c in mine]

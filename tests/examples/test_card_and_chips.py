@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.simulator.servo.motor import AxisDesign
 from examples.byte_chip import ByteChip, Hardware, IrigClock
 from ranger.head_conformance import HeadConformance
@@ -144,7 +144,7 @@ def test_a_track_is_followed_however_often_the_server_looks(look):
 
 def test_the_card_is_asked_for_what_the_sampling_says():
     head, hardware = made()
-    head.trigger(Sampling(64, 16, 500))
+    head.trigger(SamplingSettings(64, 16, 500))
     assert hardware.started == (1024, 32_000)
     hardware.pass_time(0.0319)
     assert head.buffer() is None

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.records.night.live import Happening
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.service.comparison import EpochComparison, TwinComparison
@@ -18,7 +18,7 @@ from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.simulation import addresses_of
 from catseye.service.warm import WarmingClock
-from catseye.service.world import World, twin_heads
+from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
 from repository import ROOT
 
@@ -61,7 +61,7 @@ class Told:
         elif isinstance(entry, AnsweredShot):
             self.comparison.shot(entry)
             self.shots.append((self.seconds_of(entry.shot.ticks), entry))
-        elif isinstance(entry, Solution):
+        elif isinstance(entry, EpochSolution):
             compared = self.comparison.epoch(entry)
             self.epochs.append((self.seconds_of(entry.ticks), dict(entry.answer or {}), compared))
 
@@ -87,12 +87,12 @@ class Told:
 
 def night(*faults: str, seconds: float, seed: int = 1, motion: str = "track 145.3 45", conditions="night") -> Told:
     """A run of so long, its rangers ready at its start."""
-    world = World(START, seed=seed, motion=motion, conditions=conditions, faults=faults)
+    world = TwinWords(START, seed=seed, motion=motion, conditions=conditions, faults=faults)
     with asyncio.Runner(loop_factory=FastLoop) as runner:
         return runner.run(_night(world, seconds))
 
 
-async def _night(world: World, seconds: float) -> Told:
+async def _night(world: TwinWords, seconds: float) -> Told:
     loop = asyncio.get_running_loop()
     twin = world.twin(site())
     clock, network = VirtualClock(loop, world.start_mjd), MemoryNetwork(LATENCY)

@@ -15,7 +15,7 @@ import numpy as np
 
 from catseye.ranger.server import LOOPBACK
 from catseye.service.warm import WarmingClock, warm
-from catseye.service.world import World, twin_heads
+from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.world_clock import SystemClock
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.feed import SiteFeed
@@ -26,7 +26,7 @@ from load_scene import MOTION, NOISE, START_MJD, VARIANTS, FastHead, load_site
 async def serve(site, offset, twin):
     clock = SystemClock(offset)
     warming = WarmingClock(clock)
-    world = World(START_MJD, motion=MOTION, offset=offset).twin(site)
+    world = TwinWords(START_MJD, motion=MOTION, offset=offset).twin(site)
     if twin:
         heads = {name: _counting(head) for name, head in twin_heads(world, site.rangers, warming).items()}
     else:

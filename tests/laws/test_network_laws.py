@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.model import Network, Parameter, Points
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
 from catseye.estimation.observations.kinds import (
-    Coordinates,
     Directions,
     Distances,
     HeightDifferences,
     Joint,
+    ObservedCoordinates,
     Vectors,
     ZenithAngles,
 )
@@ -60,13 +60,18 @@ def mixed(seed, *, datum="fixed"):
         "vectors", (true[[3, 8]] - true[[2, 4]] + 1e-3 * rng.standard_normal((2, 3))).ravel(), cofactor,
         3 * np.array([2, 4]), 3 * np.array([3, 8]),
     )  # fmt: skip
-    survey = Coordinates.of_points("survey", true[[6]] + 1e-3, np.full(3, 4e-6), np.array([18]))
+    survey = ObservedCoordinates.of_points("survey", true[[6]] + 1e-3, np.full(3, 4e-6), np.array([18]))
     fixed, marked = np.zeros((9, 3), dtype=bool), np.zeros((9, 3), dtype=bool)
     (fixed if datum == "fixed" else marked)[[2, 5, 8]] = True
     given_ = true + 0.02 * rng.standard_normal(true.shape) * ~fixed
-    parameters = (*(Parameter(f"orientation {i}", 0.4, unit="rad") for i in range(2)), Parameter("scale", 0.0, 1e-5))
+    parameters = (
+        *(NetworkParameter(f"orientation {i}", 0.4, unit="rad") for i in range(2)),
+        NetworkParameter("scale", 0.0, 1e-5),
+    )
     groups = (directions, zenith, ranges, heights, vectors, *((survey,) if datum == "fixed" else ()))
-    return Network(Points(tuple(f"P{i}" for i in range(9)), given_, fixed, marked), parameters, groups)
+    return ObservationNetwork(
+        NetworkPoints(tuple(f"P{i}" for i in range(9)), given_, fixed, marked), parameters, groups
+    )
 
 
 def subset(group, keep):
@@ -108,7 +113,7 @@ def test_the_order_of_observations_groups_and_points_does_not_matter(seed):
         shuffled = rng.permutation(len(group.observed))
         groups.append(subset(moved, shuffled) if isinstance(group, Directions | ZenithAngles) else moved)
     p = network.points
-    points = Points(tuple(p.names[i] for i in order), p.xyz[order], p.fixed[order], p.datum[order])
+    points = NetworkPoints(tuple(p.names[i] for i in order), p.xyz[order], p.fixed[order], p.datum[order])
     groups = [groups[i] for i in rng.permutation(len(groups))]
     one, two = adjust_network(network), adjust_network(replace(network, points=points, groups=tuple(groups)))
     assert one.status.split(":")[0] == two.status.split(":")[0]
@@ -144,7 +149,9 @@ def test_a_network_of_ranges_and_vectors_moves_and_turns_as_a_whole(seed):
     def made(r, s):
         along = Vectors("vector", r @ vector, r @ cofactor @ r.T, np.array([0]), np.array([3]))
         names = tuple(f"P{i}" for i in range(12))
-        return Network(Points(names, given_ @ r.T + s, np.zeros_like(datum), datum), (), (ranges, along))
+        return ObservationNetwork(
+            NetworkPoints(names, given_ @ r.T + s, np.zeros_like(datum), datum), (), (ranges, along)
+        )
 
     here, there = adjust_network(made(np.eye(3), np.zeros(3))), adjust_network(made(turn, shift))
     if not np.isfinite(here.covariance).all():

@@ -17,11 +17,11 @@ from catseye.coordinator.plan.value import Knowledge
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.visibility.sweep import nearest
 from catseye.coordinator.visibility.vantage import Vantage
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
 from catseye.records.night.live import TICK_SECONDS, LivePosture
-from catseye.reduction.site.earth_rotation import Place
+from catseye.reduction.site.earth_rotation import FramePlace
 from coordinator.round_scene import DEGREE, angle, axes, beams, gbt, hits, keep_out, origin, stands, state, walk
 from draws import draws
 from ranger.ranger_scene import ready
@@ -29,7 +29,7 @@ from sun_scene import astropy_sun
 
 CONE = 5 * DEGREE
 MODES = ("together", "azimuth first", "elevation first")
-PLACE = Place(38.433121 * DEGREE, -79.839835 * DEGREE, 806.42)  # no air: astropy's Sun has none either
+PLACE = FramePlace(38.433121 * DEGREE, -79.839835 * DEGREE, 806.42)  # no air: astropy's Sun has none either
 DAY = 100_000_000
 # Between astropy's Suns a round apart it runs straight within 0.1"; the site's corner is 0.5" from sun_scene's.
 SLACK = 2 / 3600 * DEGREE
@@ -165,7 +165,7 @@ class Blind(KeepClear):
 
     def around(self, vantage, since_ticks, until_ticks, **options):
         if self.forgets == "the ranger's own turn":
-            turned = Station.of_parameters(vantage.station.parameters + np.eye(13)[3] * 0.3)
+            turned = MirrorStation.of_parameters(vantage.station.parameters + np.eye(13)[3] * 0.3)
             vantage = Vantage(vantage.name, vantage.frame, turned, vantage.mirror, vantage.pace)
         found = super().around(vantage, since_ticks, until_ticks, **options)
         if self.forgets == "the boxes":

@@ -8,14 +8,20 @@ from hypothesis import strategies as st
 from catseye.errors import ValidityError
 from catseye.signal.detection.frequency_plan import FrequencyPlan
 from catseye.signal.detection.phase import detect
-from catseye.signal.detection.sampling import Sampling, aliasing_harmonics, buffer_mean, motion_effect, tone_response
+from catseye.signal.detection.sampling import (
+    SamplingPlan,
+    aliasing_harmonics,
+    buffer_mean,
+    motion_effect,
+    tone_response,
+)
 from catseye.signal.detection.spectral import bin_phasor, strongest_tone
 from catseye.signal.detection.zero_crossing import crossing_phase, phase_between
 
 phases = st.floats(0.0, 2 * np.pi, exclude_max=True)
 per_cycle = st.integers(3, 40)
 cycles = st.integers(1, 12)
-samplings = st.builds(Sampling, per_cycle, cycles, st.floats(1.0, 2000.0))
+samplings = st.builds(SamplingPlan, per_cycle, cycles, st.floats(1.0, 2000.0))
 sides = st.sampled_from(["above", "below"])
 
 
@@ -27,13 +33,13 @@ def turned(phase, other):
 @given(st.integers(-5, 70_000), st.integers(-5, 70_000), st.floats(-10.0, 20_000.0))
 def test_a_sampling_keeps_the_instruments_limits_or_is_refused(n, m, f):
     allowed = n >= 3 and m >= 1 and 0 < f <= 10_000 and n * m <= 65_536 and n * f <= 100_000
-    usual = Sampling()
+    usual = SamplingPlan()
     if allowed:
-        assert usual.with_(samples_per_cycle=n, cycles=m, intermediate_hz=f) == Sampling(n, m, f)
+        assert usual.with_(samples_per_cycle=n, cycles=m, intermediate_hz=f) == SamplingPlan(n, m, f)
     else:
         with pytest.raises(ValidityError):
             usual.with_(samples_per_cycle=n, cycles=m, intermediate_hz=f)
-    assert usual == Sampling(64, 128, 1000.0)
+    assert usual == SamplingPlan(64, 128, 1000.0)
 
 
 @given(samplings, st.floats(-100.0, 100.0), phases, st.floats(0.01, 10.0))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from catseye.geometry.clearance.keep_out import TOUCH
-from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.search_pattern import spiral
 from catseye.geometry.mirror.slew import trapezoid
-from catseye.reduction.site.earth_rotation import Place
+from catseye.reduction.site.earth_rotation import FramePlace
 from draws import draws
 from sun_scene import (
     DEGREE,
@@ -106,9 +106,11 @@ def test_no_accepted_slew_of_twenty_thousand_comes_into_the_cone():
 
 
 WRONG = {
-    "a Sun one degree of longitude off": {"place": Place(GREEN_BANK.latitude, GREEN_BANK.longitude + DEGREE, 807.0)},
-    "a Sun of the other hemisphere": {"place": Place(-GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0)},
-    "west longitudes counted positive": {"place": Place(GREEN_BANK.latitude, -GREEN_BANK.longitude, 807.0)},
+    "a Sun one degree of longitude off": {
+        "place": FramePlace(GREEN_BANK.latitude, GREEN_BANK.longitude + DEGREE, 807.0)
+    },
+    "a Sun of the other hemisphere": {"place": FramePlace(-GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0)},
+    "west longitudes counted positive": {"place": FramePlace(GREEN_BANK.latitude, -GREEN_BANK.longitude, 807.0)},
     "a cone given its whole angle for the half": {"half_angle": 2.5 * DEGREE},
     "a mount turned the wrong way": {"alpha": 0.2492780},
     "encoder zeros with the wrong sign": {"zeros": [-ZEROS[0], -ZEROS[1]]},
@@ -120,9 +122,9 @@ def test_the_check_finds_a_planted_bug(bug):
     changes = dict(WRONG[bug])
     if "alpha" in changes:
         alpha = [changes.pop("alpha"), *STATION.alpha[1:]]
-        changes["station"] = Station(STATION.fixed_point, alpha, STATION.offset, STATION.beta, STATION.zeros)
+        changes["station"] = MirrorStation(STATION.fixed_point, alpha, STATION.offset, STATION.beta, STATION.zeros)
     if "zeros" in changes:
-        changes["station"] = Station(
+        changes["station"] = MirrorStation(
             STATION.fixed_point, STATION.alpha, STATION.offset, STATION.beta, changes.pop("zeros")
         )
     wrong = replace(guard(), **changes)

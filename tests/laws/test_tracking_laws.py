@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
-from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.search_pattern import raster, spiral_offsets
 from catseye.geometry.mirror.track import count_line, line_bound, longest_interval, miss
 
-FLAT = Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0.0, 0.0])
+FLAT = MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0.0, 0.0])
 ROUNDING = 2e-10  # counts, of 50 000
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
 from catseye.optics import abcd, gaussian_beam
-from catseye.optics.ray_trace import Plane, Rays, Sphere
+from catseye.optics.ray_trace import Plane, Rays, SphericalSurface
 
 LIGHT = 0.78e-6
 lengths = st.floats(0.01, 10.0)
@@ -36,7 +36,7 @@ def test_a_thick_lens_sends_rays_near_the_axis_where_exact_rays_go(r1, r2):
     def surface(vertex, radius):
         if np.isinf(radius):
             return Plane((0.0, 0.0, vertex), (0.0, 0.0, 1.0))
-        return Sphere((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
+        return SphericalSurface((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
 
     start = np.array([[height - 0.05 * slope, 0.0, -0.05]])
     direction = np.array([[slope, 0.0, 1.0]]) / np.hypot(slope, 1.0)

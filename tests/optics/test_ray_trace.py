@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.optics.ray_trace import Plane, Rays, Sphere, beam, corner, half_path, through_ball, through_prism
+from catseye.optics.ray_trace import Plane, Rays, SphericalSurface, beam, corner, half_path, through_ball, through_prism
 from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.cats_eye import BallCatsEye
 from catseye.optics.retroreflector.dihedral import LEVER, ORDERS, deviations, equal_errors
@@ -183,7 +183,7 @@ def test_a_ray_that_misses_or_cannot_leave_is_nan_and_spoils_no_other():
     face = Plane((0, 0, 0), (0, 0, 1))
     steep = Rays(np.zeros((2, 3)), np.array([[0, 0, 1.0], [np.sin(1.0), 0, np.cos(1.0)]]), np.zeros(2))
     assert np.isnan(steep.refracted(face, 1.5).direction[:, 2]).tolist() == [False, True]
-    behind = Sphere((0, 0, -1), 0.5).distance(np.zeros((1, 3)), np.array([[0, 0, 1.0]]))
+    behind = SphericalSurface((0, 0, -1), 0.5).distance(np.zeros((1, 3)), np.array([[0, 0, 1.0]]))
     assert np.isnan(behind).all()
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 
 VELOCITY, ACCELERATION = 400_000, 1_000
-SHORT = Sampling(samples=64, cycles=4, frequency_hz=1000)
+SHORT = SamplingSettings(samples=64, cycles=4, frequency_hz=1000)
 
 
 class HeadConformance:
@@ -136,7 +136,9 @@ class HeadConformance:
         begin = head.now()
         assert not head.follow((np.zeros(2), np.ones(2)), (begin, begin.after(1.0)))
 
-    @pytest.mark.parametrize("sampling", [Sampling(), Sampling(3, 1, 1000), Sampling(10, 1, 10_000)])
+    @pytest.mark.parametrize(
+        "sampling", [SamplingSettings(), SamplingSettings(3, 1, 1000), SamplingSettings(10, 1, 10_000)]
+    )
     def test_any_sampling_gives_its_words_and_no_sooner(self, sampling):
         head = self.head()
         head.trigger(sampling)

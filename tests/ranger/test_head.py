@@ -3,7 +3,7 @@
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from ranger.head_conformance import HeadConformance
 from ranger.scripted_head import ScriptedHead
 
@@ -17,8 +17,8 @@ class TestScriptedHead(HeadConformance):
 
 
 def test_the_default_is_8192_words_in_128_ms():
-    assert Sampling().samples * Sampling().cycles == 8192
-    assert Sampling().duration == 0.128
+    assert SamplingSettings().samples * SamplingSettings().cycles == 8192
+    assert SamplingSettings().duration == 0.128
 
 
 @pytest.mark.parametrize(
@@ -27,9 +27,9 @@ def test_the_default_is_8192_words_in_128_ms():
 )
 def test_the_quoted_limits(values, said):
     with pytest.raises(ValidityError, match=said):
-        Sampling(*values)
+        SamplingSettings(*values)
 
 
 def test_the_limits_themselves_are_legal():
-    assert Sampling(64, 1024, 1562).samples == 64  # 65 536 words, 99 968 samples a second
-    assert Sampling(10, 1, 10_000).duration == pytest.approx(1e-4)
+    assert SamplingSettings(64, 1024, 1562).samples == 64  # 65 536 words, 99 968 samples a second
+    assert SamplingSettings(10, 1, 10_000).duration == pytest.approx(1e-4)

@@ -23,7 +23,7 @@ from catseye.ranger.initialisation import (
 )
 from catseye.ranger.line import format_request
 from catseye.ranger.ranger import Ranger
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.records.site.folder import read_site
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.site.stations import station_in
@@ -60,7 +60,7 @@ def test_a_ranger_that_was_told_looks_where_the_records_say_its_targets_are(gbt,
     Base point, places and angles travel with 0.1 um, 1 um and 1e-9 rad: 2e-7 rad and 3e-3 counts at 5 m and more.
     """
     ranger = told_everything(gbt, name)
-    assert Status.INITIALISED in ranger.status()
+    assert StatusWord.INITIALISED in ranger.status()
     assert len(ranger.cubes.by_number) == len(gbt.target_names) - 1  # all but itself, ZRG included
     station, places = station_in(gbt, name), places_of(gbt)
     mirror = gbt.mirror_of(name)

@@ -12,7 +12,7 @@ from catseye.geometry.mirror.pointing import beam
 from catseye.ranger.handlers.table import replace_file
 from catseye.ranger.line import TICK_NS, format_reply, nanoseconds_of, stamp_text, ticks_of
 from catseye.ranger.ranging import HALF_WAVE_MM, distance_mm, group_index
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from ranger.ranger_scene import CUBES, GEOMETRY, PLACES, READY, REFERENCE_PHASE, Told, phase_of, ready
 
 
@@ -223,7 +223,7 @@ def test_the_status_word_is_pushed_on_any_change_and_only_then():
     told.ranger.receive(1, "AXIS 0, 1")
     heard = told.turns(5)
     words = [o.reply.text for o in heard if o.reply.command == "STW"]
-    assert words == [f"0x{Status.AUTO | Status.AZIMUTH_ENABLED:08x}"]
+    assert words == [f"0x{StatusWord.AUTO | StatusWord.AZIMUTH_ENABLED:08x}"]
     told.head.locked = False
     assert [o.reply.tid for o in told.turns(3) if o.reply.command == "STW"] == [0]
 
@@ -326,7 +326,7 @@ def test_the_ranger_refuses_the_sun_by_vector_and_by_its_own_knowledge():
     at = np.array(PLACES[1][1]) - [0, 0, 250.0]
     sun = at / np.linalg.norm(at)
     assert told.say("SUN " + ", ".join(f"{v:.9f}" for v in sun), "CIL 1")[-1].text.endswith("or wait")
-    assert Status.SUN_REFUSED in told.ranger.status()
+    assert StatusWord.SUN_REFUSED in told.ranger.status()
     assert told.say("SUN 0, 0, -1", "CIL 1")[-1].ok
     alone = ready(sun=lambda mjd: sun)
     assert alone.say("SUN 0, 0, -1", "CIL 1")[-1].ok is False  # a lying vector adds a cone and takes none away
@@ -390,7 +390,7 @@ def test_reset_is_a_cold_boot():
     told = ready()
     told.say("CYC 10", "RST")
     assert told.one("CYC").text == "128"
-    assert told.ranger.status() == Status.AUTO
+    assert told.ranger.status() == StatusWord.AUTO
     assert told.say(*READY)[-1].ok
 
 
@@ -421,7 +421,7 @@ def test_a_stream_fires_the_next_buffer_before_it_tells_the_last():
                 taking = told.head.taking is not None
                 assert taking == (told.head.fired - fired < 4 or len(lines) <= 6)
         if len(lines) == 4:
-            assert Status.STREAMING in told.ranger.status()
+            assert StatusWord.STREAMING in told.ranger.status()
     told.turns(100)
     lines += [o for o in told.heard if o.reply.command in ("CMEAS", "BUF") and o not in lines]
     assert [o.reply.command for o in lines] == ["CMEAS", "BUF"] * 4
@@ -433,7 +433,7 @@ def test_a_stream_fires_the_next_buffer_before_it_tells_the_last():
     assert [o.reply.ticks for o in lines if o.reply.command == "BUF"] == stamps
     gaps = np.diff(stamps) * TICK_NS * 1e-9
     assert np.all((gaps >= 0.127) & (gaps < 0.128 + 2 * 0.002 + 0.001))  # two strides of the test's time, a tick
-    assert Status.STREAMING not in told.ranger.status()
+    assert StatusWord.STREAMING not in told.ranger.status()
     assert told.ranger.idle
 
 
@@ -545,7 +545,7 @@ def test_a_clock_that_is_set_back_stops_neither_updates_nor_the_watch():
     assert len(heard(told, "D0")) == 2
     sun[:] = beam_of(told)
     told.turns(30)
-    assert Status.LASER_OFF in told.ranger.status()
+    assert StatusWord.LASER_OFF in told.ranger.status()
 
 
 def test_amplitude_and_phase_are_those_of_the_signal_s_own_detection():
@@ -563,12 +563,12 @@ def test_amplitude_and_phase_are_those_of_the_signal_s_own_detection():
         told.say("TRG")
         told.head.last.samples[:2] = ends
         told.say("MPC")
-        assert (Status.CLIPPED in told.ranger.status()) == clipped
+        assert (StatusWord.CLIPPED in told.ranger.status()) == clipped
 
 
 def test_each_bit_of_the_status_word_is_the_one_documented():
     told = Told()
-    assert told.ranger.status() == Status.AUTO
+    assert told.ranger.status() == StatusWord.AUTO
     head, z = told.head, told.ranger
     z.auto = False
     changes = {
@@ -598,7 +598,7 @@ def test_each_bit_of_the_status_word_is_the_one_documented():
         assert int(z.status()) == 1 << bit
         setattr(whose, name, before)
     z.in_sun = True
-    assert z.status() == Status.SUN_REFUSED
+    assert z.status() == StatusWord.SUN_REFUSED
 
 
 def beam_of(told):
@@ -690,14 +690,14 @@ def test_a_beam_that_the_sun_comes_to_goes_dark_says_so_once_and_drives_away():
     assert "4.9 deg" in line.text
     assert "driving away" in line.text
     assert not told.head.laser
-    assert {Status.LASER_OFF, Status.SUN_REFUSED} <= set(told.ranger.status())
+    assert {StatusWord.LASER_OFF, StatusWord.SUN_REFUSED} <= set(told.ranger.status())
     told.turns(60)
     after = told.ranger.here
     assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
     assert np.arccos(beam_of(told) @ sun) >= 20.0 * DEGREE
     assert len(heard(told, "SUN")) == 1
     told.turns(30)
-    assert Status.SUN_REFUSED not in told.ranger.status()
+    assert StatusWord.SUN_REFUSED not in told.ranger.status()
     assert told.say("PS 1", "CMEAS 1, 2")[-1].ok
     assert "of the Sun" in told.one("CIL 1").text
 
@@ -743,7 +743,7 @@ def test_a_move_that_leads_out_of_the_cone_is_not_stopped_and_a_track_that_stays
 def test_a_ranger_that_turns_with_the_telescope_moves_only_under_a_fresh_vector():
     told = ready(turning=True)
     assert "not told for 60 s" in told.one("CIL 1").text
-    assert Status.SUN_REFUSED in told.ranger.status()
+    assert StatusWord.SUN_REFUSED in told.ranger.status()
     assert told.say("SUN 0, 0, -1", "CIL 1")[-1].ok
     told.head.advance(50.0)
     assert told.one("CIL 2").ok

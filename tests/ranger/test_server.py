@@ -12,7 +12,7 @@ from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
 from catseye.ranger.ranger import Ranger
-from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, Connection, ZyServer
+from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, ClientConnection, ZyServer
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from ranger.clocked_head import ClockedHead
 from ranger.ranger_scene import READY, REFERENCE_PHASE, ready
@@ -269,7 +269,7 @@ def test_a_client_that_does_not_read_is_cut_off_and_costs_the_other_nothing():
     async def story():
         async with Site() as site:
             other = await site.client(1)
-            slow, full = Connection(site.server, 0), FullTransport()
+            slow, full = ClientConnection(site.server, 0), FullTransport()
             slow.connection_made(full)
             assert (await site.answered(other.ask("CYC", 1024))).ok
             assert (await site.answered(other.ask("TRG"))).ok

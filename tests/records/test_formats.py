@@ -10,7 +10,7 @@ from catseye.records.files.record import Record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import AcousticSheet
-from catseye.records.night.shot import Shot, read_buffers
+from catseye.records.night.shot import ShotRow, read_buffers
 from catseye.records.night.weather import WeatherSample
 from catseye.records.panels.actuators import ActuatorCorrection, ActuatorPosition
 from catseye.records.panels.instrument import PanelInstrument
@@ -19,25 +19,25 @@ from catseye.records.site.beam import BeamTrain
 from catseye.records.site.interlock import Interlocks
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import Mirror, MirrorGeometry
-from catseye.records.site.monument import Monument, MonumentGeometry
+from catseye.records.site.monument import MonumentGeometry, MonumentRecord
 from catseye.records.site.pointing_model import PointingModel
-from catseye.records.site.site import Site
+from catseye.records.site.site import SiteRecord
 from catseye.records.site.solids import Solids
 from catseye.records.site.structural_model import StructuralModel
-from catseye.records.site.target import Benchmark, FeedArm, Targets
-from catseye.records.site.triplet import Triplet
+from catseye.records.site.target import BenchmarkRow, FeedArm, Targets
+from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.air.refractometer_night import PathSheet
 from repository import TESTS
 
 FORMATS = TESTS / "vectors" / "formats"
 RECORDS: dict[str, type[Record]] = {
-    "site-1.toml": Site,
-    "monument-1.toml": Monument,
-    "monument-1-signed.toml": Monument,
+    "site-1.toml": SiteRecord,
+    "monument-1.toml": MonumentRecord,
+    "monument-1-signed.toml": MonumentRecord,
     "mirror-1.toml": Mirror,
     "mirror-1-signed.toml": Mirror,
-    "triplet-1.toml": Triplet,
-    "triplet-1-signed.toml": Triplet,
+    "triplet-1.toml": TripletRecord,
+    "triplet-1-signed.toml": TripletRecord,
     "targets-1.toml": Targets,
     "feedarm-1.toml": FeedArm,
     "monument-1-pointing.toml": MonumentGeometry,
@@ -54,9 +54,9 @@ RECORDS: dict[str, type[Record]] = {
     "pointing-series-1.toml": PointingModel,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
-    "benchmarks-1.csv": (Benchmark, 6),
+    "benchmarks-1.csv": (BenchmarkRow, 6),
     "weather-1.csv": (WeatherSample, 5),
-    "shots-1.csv": (Shot, 5),
+    "shots-1.csv": (ShotRow, 5),
     "path-temperatures-1.csv": (PathTemperature, 3),
     "panel-layout-1.csv": (PanelCorner, 8),
     "actuators-1.csv": (ActuatorCorrection, 4),

@@ -13,9 +13,9 @@ from catseye.reduction.budget.explanation import budget_of, scatter_of
 from catseye.reduction.budget.inputs import items_of
 from catseye.reduction.budget.scene import Assumptions, scene_of
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import places_of
-from catseye.simulator.night.air import Conditions
+from catseye.simulator.night.air import AirConditions
 from catseye.simulator.night.sheets import write_night
 from catseye.simulator.night.simulate import simulate_night
 
@@ -58,7 +58,7 @@ def shots(night_01, reduced_night_01):
 
 def scene_in(reduced, campaign, row, *, phases=None, settings=None, keep=None, assumptions=None):
     """A scene of night-01 with other records, phases, or without some references; ends as adjusted."""
-    settings = settings or Settings()
+    settings = settings or ReductionSettings()
     phases = phases or reduced.phases
     coordinates = reduced.coordinates
     names = campaign.shots.ranger[row], campaign.shots.target[row]
@@ -115,7 +115,7 @@ def one_of(kind, shots, reduced, campaign):
         weak = int(row[first((ranger == "ZY116") & dish)])
         return scene_in(reduced, campaign, weak, phases=weakened(reduced, weak, 0.03))
     if kind == "tilted by degrees":
-        wide = Settings(u_plate_normal=np.radians(1.0), u_normal=np.radians(1.0))
+        wide = ReductionSettings(u_plate_normal=np.radians(1.0), u_normal=np.radians(1.0))
         return scene_in(reduced, campaign, int(row[plain["large incidence"]]), settings=wide)
     if kind == "before any reference":
         return scene_in(reduced, campaign, usual, keep=lambda rows: rows[-1:])
@@ -209,7 +209,7 @@ TIED, APART = 2, 7  # independent values that a night's dozen shots are worth, w
 def any_night(seed):
     """A night of any profile of temperature, as in the scatter of whole nights."""
     rng = np.random.default_rng(seed)
-    conditions = Conditions(
+    conditions = AirConditions(
         temperature_c=rng.uniform(-12.0, 28.0),
         gradient_c_per_m=rng.normal(0.0, 0.01),
         surface_layer_c=rng.normal(0.0, 0.2),
@@ -228,7 +228,7 @@ def squares_of_night(seed, directory, count=12):
     """
     night = any_night(seed)
     campaign = read_campaign(write_night(night, directory / f"night-{seed}"))
-    phases = measure_phases(campaign, Settings())
+    phases = measure_phases(campaign, ReductionSettings())
     wrong = follow_electronics(campaign, phases)[1]
     places = places_of(campaign)
     good = [
@@ -244,7 +244,9 @@ def squares_of_night(seed, directory, count=12):
         names = campaign.shots.ranger[row], campaign.shots.target[row]
         ends = tuple(night.truth.points[name] for name in names)
         place, row = places[names[1]], int(row)
-        scene = scene_of(campaign, phases, wrong, row, ends=ends, place=place, settings=Settings(), assumptions=PERFECT)
+        scene = scene_of(
+            campaign, phases, wrong, row, ends=ends, place=place, settings=ReductionSettings(), assumptions=PERFECT
+        )
         # the twin's air follows the notes' formula to the digit: its own uncertainty is none here
         items = tuple(i for i in items_of(scene) if i.key != "formula")
         error = scene.range_ - float(np.linalg.norm(ends[0] - ends[1]))

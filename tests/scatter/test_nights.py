@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.simulator.night.air import Conditions
+from catseye.simulator.night.air import AirConditions
 from catseye.simulator.night.sheets import write_night
 from catseye.simulator.night.simulate import simulate_night
 
@@ -20,7 +20,7 @@ MANY = range(2201, 2265)
 def any_night(seed):
     """Weather and posture drawn from the seed: winter to summer, inversion to lapse, horizon to zenith."""
     rng = np.random.default_rng(seed)
-    conditions = Conditions(
+    conditions = AirConditions(
         temperature_c=rng.uniform(-12.0, 28.0),
         gradient_c_per_m=rng.normal(0.0, 0.01),
         surface_layer_c=rng.normal(0.0, 0.2),

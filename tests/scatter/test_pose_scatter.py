@@ -6,7 +6,7 @@ import pytest
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.estimation.shapes.pose import fit_pose
 from catseye.geometry.antenna.pointing_series import TERMS, published
-from catseye.records.laboratory.tilts import Tilts
+from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
 from catseye.reduction.pose.track_profile import joined_tilt, track_profile
 from draws import draws
@@ -80,7 +80,7 @@ def test_track_profiles_scatter_as_their_covariance_says():
     sample = []
     for _ in range(count):
         turn = rng.multivariate_normal(np.zeros(2), q[0], len(azimuth))
-        tilts = Tilts(np.zeros(50), at, zero + rng.normal(size=(50, 2)) * 0.2 * ARCSECOND, u, "")
+        tilts = TiltReadings(np.zeros(50), at, zero + rng.normal(size=(50, 2)) * 0.2 * ARCSECOND, u, "")
         found = track_profile(azimuth, turn, q, tilts, harmonics=2)
         sample.append(np.concatenate([found.series.values, found.zero[0] - zero]))
     sample = np.array(sample)

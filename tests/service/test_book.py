@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.gateways.writers.objects import json_line
 from catseye.records.night.live import Happening, LivePosture, LiveShot
 from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.objects import epoch_line, simulation_object, summary
 from catseye.service.screen import LinesView, ScreenView
-from catseye.service.world import World
+from catseye.service.world import TwinWords
 
 NAN3 = np.full(3, math.nan)
 
@@ -60,7 +60,7 @@ def epoch(number, **rejected):
         "used": [1, 2],
         "rejected": {str(k): v for k, v in enumerate(rejected.values())},
     }
-    return Solution(number, answer)
+    return EpochSolution(number, answer)
 
 
 def filled(**other):
@@ -79,7 +79,7 @@ def filled(**other):
     )
     book.entry(Happening(7, "ZY104", "hung", "VER was not answered", "alarm"))
     book.entry(Happening(8, "ZY104", "ready", "made ready"))
-    book.entry(Solution(9, {}))
+    book.entry(EpochSolution(9, {}))
     return book, judge
 
 
@@ -97,7 +97,7 @@ def test_it_counts_what_comes():
 
 def test_programs_get_numbers_and_null_for_what_is_not_known():
     book, _ = filled()
-    world = World(60635.125, faults=("dead-ranger ZY104 1 2",))
+    world = TwinWords(60635.125, faults=("dead-ranger ZY104 1 2",))
     text = json_line(simulation_object(book, world, "night.db", seconds=60.0, rangers=18))
     told = json.loads(text, parse_constant=lambda name: pytest.fail(name))
     assert (told["shots"], told["acknowledged"], told["used"], told["journal"]) == (3, 3, 2, "night.db")
@@ -110,12 +110,12 @@ def test_programs_get_numbers_and_null_for_what_is_not_known():
 
 def test_people_are_told_first_what_is_of_more_than_one_shot():
     book, _ = filled()
-    passages = dict(summary(book, World(60635.125), None, seconds=60.0, rangers=18))
+    passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18))
     assert passages["Noticed"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
     assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
     assert "In 1 of 1 epochs" in passages["Truth"]
     assert "none was kept" in passages["Journal"]
-    assert "none was solved" in dict(summary(LiveBook(), World(60635.125), None, seconds=1.0, rangers=1))["Epochs"]
+    assert "none was solved" in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1))["Epochs"]
 
 
 @pytest.mark.parametrize(

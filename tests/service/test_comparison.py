@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.records.night.live import LiveShot
 from catseye.service.comparison import TwinComparison
 from simulator.living_scene import only, site, twin
@@ -32,7 +32,7 @@ def solution(world, x, covariance, *, at=5.0, number=1, names=NAMES, count=3, po
         "elevation": told.elevation,
         "pose": pose,
     }
-    return Solution(world.ticks(at), answer, covariance)
+    return EpochSolution(world.ticks(at), answer, covariance)
 
 
 def compared(world, x, covariance, **how):
@@ -89,7 +89,7 @@ def test_points_with_too_few_shots_or_that_do_not_last_are_left_out():
 
 def test_an_epoch_that_gave_nothing_is_not_compared():
     judge = TwinComparison(site(), still("fixed 145.3 30"), reference_after=1)
-    assert judge.epoch(Solution(0, {})) is None
+    assert judge.epoch(EpochSolution(0, {})) is None
 
 
 def test_the_beams_truth_is_what_the_telescope_did_since_the_reference_epoch():

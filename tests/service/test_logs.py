@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.records.night.live import Happening, LiveWeather
 from catseye.service.logs import LiveLog
 from catseye.simulator.clock.world_clock import ManualClock
@@ -51,6 +51,6 @@ def test_colour_is_for_what_is_wrong_and_ends_with_the_line():
 
 def test_an_epoch_is_a_line_and_one_that_gave_nothing_a_warning():
     answer = {"number": 3, "names": ["A", "B"], "used": [1, 2, 3], "rejected": {"4": "no"}, "variance_factor": 0.5}
-    good, empty, _ = lines(Solution(0, answer), Solution(0, {}))
+    good, empty, _ = lines(EpochSolution(0, answer), EpochSolution(0, {}))
     assert good.endswith("epoch 3: 2 points from 3 shots, 1 not used, variance factor 0.50")
     assert "warning" in empty

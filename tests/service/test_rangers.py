@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.service.rangers import LateSockets, RangersServed
 from catseye.service.warm import WarmingClock
-from catseye.service.world import World, twin_heads
+from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork
 from catseye.simulator.clock.world_clock import ManualClock
 from simulator.living_scene import site
@@ -48,7 +48,7 @@ def test_a_port_that_another_took_meanwhile_is_named():
 
 def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is_the_worlds():
     names = ("ZY102", "ZY113")
-    world = World(60635.125)
+    world = TwinWords(60635.125)
     twin, clock = world.twin(site()), ManualClock(60635.125)
     warming = WarmingClock(clock)
     heads = twin_heads(twin, names, warming)
@@ -63,8 +63,8 @@ def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is
         rangers = served._served.rangers
         for ranger in rangers.values():
             word = ranger.status()
-            assert Status.INITIALISED | Status.AZIMUTH_HOMED | Status.ELEVATION_HOMED in word
-            assert Status.LASER_OFF not in word
+            assert StatusWord.INITIALISED | StatusWord.AZIMUTH_HOMED | StatusWord.ELEVATION_HOMED in word
+            assert StatusWord.LASER_OFF not in word
             assert abs(ranger.now_ns() - clock.now_ns()) < 10**6  # a head's clock is off by half a millisecond at most
         assert rangers["ZY113"].sun_vector is not None
         assert np.linalg.norm(rangers["ZY113"].sun_vector) == pytest.approx(1.0, abs=1e-6)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.live.live import LiveSettings
 from catseye.service.settings import live_settings, settings_object
 
@@ -19,7 +19,7 @@ REAL = st.floats(1e-6, 1e6)
 def test_any_settings_come_back_from_json_as_they_were(u, jitter, after, kind):
     usual = LiveSettings()
     told = LiveSettings(
-        reduction=Settings(critical=u),
+        reduction=ReductionSettings(critical=u),
         filter=kind,
         loosening=replace(usual.loosening, body_mm={"arm": u}, profile_s=jitter),
         u_flexure_mm=u,

@@ -5,7 +5,7 @@ import pytest
 import typer
 
 from catseye.errors import InputError
-from catseye.service.world import World
+from catseye.service.world import TwinWords
 from simulator.living_scene import site
 
 
@@ -14,11 +14,13 @@ def test_its_options_say_the_same_world_to_another_process(monkeypatch):
     from catseye.cli.commands import app, join_commands
 
     join_commands()
-    world = World(60635.1234567891, seed=5, offset=-1.25e8 - 1e-7, motion="slew 10 30 40 50", faults=("dew * 5 9 0.1",))
+    world = TwinWords(
+        60635.1234567891, seed=5, offset=-1.25e8 - 1e-7, motion="slew 10 30 40 50", faults=("dew * 5 9 0.1",)
+    )
     made = []
 
     def noted(*given, **named):
-        made.append(World(*given, **named))
+        made.append(TwinWords(*given, **named))
         raise InputError("enough")
 
     monkeypatch.setattr("catseye.service.world.World", noted)
@@ -29,7 +31,7 @@ def test_its_options_say_the_same_world_to_another_process(monkeypatch):
 
 
 def test_two_of_the_same_words_tell_the_same_truth_and_time():
-    one, two = (World(60635.125, seed=3, offset=12.5) for _ in "ab")
+    one, two = (TwinWords(60635.125, seed=3, offset=12.5) for _ in "ab")
     a, b = one.twin(site()).point("ZEG41040L", 7.0), two.twin(site()).point("ZEG41040L", 7.0)
     assert np.array_equal(a, b)
     first, second = one.clock(), two.clock()
@@ -38,7 +40,7 @@ def test_two_of_the_same_words_tell_the_same_truth_and_time():
 
 
 def test_one_that_starts_now_reads_its_start_and_one_that_is_late_reads_earlier():
-    world = World.starting_now(52889.25)
+    world = TwinWords.starting_now(52889.25)
     assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
     late = world.late(100.0)
     assert (world.clock().now_ns() - late.clock().now_ns()) * 1e-9 == pytest.approx(100.0, abs=5.0)
@@ -47,7 +49,7 @@ def test_one_that_starts_now_reads_its_start_and_one_that_is_late_reads_earlier(
 @pytest.mark.parametrize("words", [{"motion": "dance"}, {"faults": ("sleepy ZY101",)}, {"conditions": "nice"}])
 def test_what_there_is_not_is_refused(words):
     with pytest.raises(InputError, match="expected"):
-        World(60635.125, **words)
+        TwinWords(60635.125, **words)
 
 
 @pytest.mark.parametrize(
@@ -63,9 +65,9 @@ def test_what_there_is_not_is_refused(words):
 )
 def test_a_fault_on_nobody_is_refused(fault, said):
     with pytest.raises(InputError, match=said):
-        World(60635.125, faults=(fault,)).twin(site())
+        TwinWords(60635.125, faults=(fault,)).twin(site())
 
 
 @pytest.mark.parametrize("fault", ["dead-ranger *", "blocked-beam ZY101:ZEG41040L", "lost-index ZY101:1", "dew *"])
 def test_a_fault_on_somebody_is_not(fault):
-    assert World(60635.125, faults=(fault,)).twin(site()).faults.faults[0].whom == fault.split()[1]
+    assert TwinWords(60635.125, faults=(fault,)).twin(site()).faults.faults[0].whom == fault.split()[1]

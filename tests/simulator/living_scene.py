@@ -9,7 +9,7 @@ import numpy as np
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.simulator.night.faults import EFFECTS
 from catseye.simulator.twin.conditions import LIVING_EFFECTS, LIVING_NIGHT, LivingPlanted
-from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.site import Twin
 from repository import ROOT
 
@@ -41,7 +41,7 @@ def twin(motion="fixed 145.3 30", *, seed=1, planted=None, conditions=LIVING_NIG
         site() if at is None else at,
         seed=seed,
         start_mjd=START,
-        motion=Motion.parse(motion),
+        motion=AxisMotion.parse(motion),
         conditions=conditions,
         faults=faults,
         planted=planted,

@@ -18,7 +18,7 @@ from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_o
 from catseye.reduction.pose.pose import pose_of_group
 from catseye.reduction.site.places import nominal_frame
 from catseye.reduction.surface.change import change_between
-from catseye.reduction.surface.shape import Aperture, Prisms, ShapeSettings
+from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings
 from catseye.simulator.night.faults import Planted
 from catseye.simulator.night.simulate import simulate_night
 
@@ -127,7 +127,7 @@ def test_astigmatism_of_0_3_mm_is_found_from_samples(written, before, count):
 
     names = [n for n in before.points.names if n.startswith("DP")]
     moved = planted(before, names, bent)
-    aperture = Aperture.of(before.campaign.site.paraboloid)
+    aperture = LitAperture.of(before.campaign.site.paraboloid)
     settings = ShapeSettings(terms=10)
     values, u = [], 0.0
     for later in nights(written, before, moved, count):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations.kinds import Coordinates, Distances, Linear
+from catseye.estimation.observations.kinds import Distances, Linear, ObservedCoordinates
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.reduction.triplet.ties import (
     BALL,
@@ -134,7 +134,9 @@ def ground_groups(site, night, first_ground, first_ball, stride):
     zero = first_ground + 3 * g
     at = site.seen[:, 0], site.seen[:, 1]
     return (
-        Coordinates.of_points("ground", site.ground, np.full(3 * g, U_GROUND**2), first_ground + 3 * np.arange(g)),
+        ObservedCoordinates.of_points(
+            "ground", site.ground, np.full(3 * g, U_GROUND**2), first_ground + 3 * np.arange(g)
+        ),
         Linear("ground zeros", np.zeros(g), np.full(g, U_ZERO**2), zero + np.arange(g), np.eye(g)),
         Distances(
             "ground to balls",

@@ -10,7 +10,7 @@ GREATEST_SPREAD = 1e4  # standard uncertainties, in each quantity's unit
 
 
 @dataclass(frozen=True)
-class Limit:
+class ValidInterval:
     """The closed interval in which a formula holds for one quantity.
 
     quantity   the word for it in messages
@@ -53,4 +53,6 @@ class Limit:
 def check_spreads(**spreads) -> None:
     """Raise ValidityError for a standard uncertainty, by name, that is below zero, no number or without end."""
     for name, value in spreads.items():
-        Limit(name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty").check(value)
+        ValidInterval(
+            name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty"
+        ).check(value)

@@ -13,7 +13,7 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.records.laboratory.baseline import Baseline, Heights, Observations
+    from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights
     from catseye.reduction.baseline.instrument import BaselineCalibration
     from catseye.reduction.baseline.lengths import BaselineSettings
 
@@ -188,7 +188,7 @@ def _calibrated(
     from catseye.records.laboratory.baseline import digest_of, read_baseline, read_heights, read_observations
     from catseye.reduction.baseline.instrument import calibrate_baseline
 
-    seen: Observations = read_observations(observations)
+    seen: BaselineShots = read_observations(observations)
     inputs = {observations.name: seen.digest}
     tops: Heights | None = None
     if heights is not None:

@@ -9,7 +9,7 @@ import typer
 
 from catseye import __version__
 from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 if TYPE_CHECKING:
     from catseye.reduction.epoch.epoch import Reduction
@@ -97,7 +97,7 @@ def reduce(
             help="Directory to write: new, empty, or an earlier output of catseye. Needed unless --json.",
         ),
     ] = None,
-    air_model: AirModel = Settings.air_model,
+    air_model: AirModel = ReductionSettings.air_model,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -127,7 +127,7 @@ def demo(
     """The bundled night of measurements, reduced and explained."""
     from catseye.gateways.examples import example_campaign
 
-    reduction = _reduced(example_campaign(), directory, Settings.air_model, quiet)
+    reduction = _reduced(example_campaign(), directory, ReductionSettings.air_model, quiet)
     if json:
         _say_reduction(reduction)
     elif not quiet:
@@ -147,7 +147,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
         from catseye.reduction.epoch.epoch import reduce_epoch
 
         night = read_campaign(campaign)
-        reduction = reduce_epoch(night, Settings(air_model=air_model), progress)
+        reduction = reduce_epoch(night, ReductionSettings(air_model=air_model), progress)
         if out is not None:
             from catseye.gateways.epoch.files import write_reduction
 

@@ -8,7 +8,7 @@ import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
@@ -37,7 +37,7 @@ def explain(
         int, typer.Option("--monte-carlo", metavar="N", callback=_draws, help="Draws of the Monte Carlo; 0 for none.")
     ] = 200_000,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 1,
-    air_model: AirModel = Settings.air_model,
+    air_model: AirModel = ReductionSettings.air_model,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -47,7 +47,7 @@ def explain(
         from catseye.records.night.campaign import read_campaign
         from catseye.reduction.budget.explanation import explain_shot
 
-        settings = Settings(air_model=air_model)
+        settings = ReductionSettings(air_model=air_model)
         with _page(page) as pieces:  # refused before the work, not after it
             night = read_campaign(campaign)
             found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)

@@ -11,10 +11,10 @@ from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
-    from catseye.estimation.network.model import Network
+    from catseye.estimation.network.model import ObservationNetwork
     from catseye.gateways.network.findings import Findings
     from catseye.gateways.network.plan import PlanFindings
-    from catseye.reduction.network import Adjusted
+    from catseye.reduction.network import AdjustedNetwork
 
 DATUMS = "free|fixed"
 METHODS = "huber|l1|biweight|igg3"
@@ -153,14 +153,14 @@ def _pair(text: str) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def _read(reader: "Callable[[Path], Network]", source: Path) -> "Network":
+def _read(reader: "Callable[[Path], ObservationNetwork]", source: Path) -> "ObservationNetwork":
     if not source.exists():
         raise InputError(f"{source}: missing (expected {SUFFIXES})")
     return reader(source)
 
 
 def _write_adjusted(
-    treated: "Adjusted", found: "Findings", source: Path, out: Path | None, progress: ProgressLine
+    treated: "AdjustedNetwork", found: "Findings", source: Path, out: Path | None, progress: ProgressLine
 ) -> None:
     if out is None:
         return
@@ -171,7 +171,7 @@ def _write_adjusted(
         write_network(found, directory, input_hashes(source), progress, treated=treated)
 
 
-def _tell_adjusted(treated: "Adjusted", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
+def _tell_adjusted(treated: "AdjustedNetwork", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
         from catseye.gateways.network.objects import network_json
 
@@ -208,7 +208,7 @@ def _compared(
     progress: ProgressLine,
 ) -> None:
     from catseye.estimation.deformation.comparison import compare
-    from catseye.gateways.network.comparison import Comparison, comparison_object
+    from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
     from catseye.gateways.writers.objects import json_line
 
     for one, source in zip(found, sources, strict=True):
@@ -216,7 +216,7 @@ def _compared(
             raise EstimationError(f"{source}: {one.solution.status}")
     names = None if points is None else [p.strip() for p in points.split(",") if p.strip()]
     moved = compare(found[0].solution, found[1].solution, points=names, level=level)
-    compared = Comparison(found[0], found[1], moved)
+    compared = ComparedEpochs(found[0], found[1], moved)
     if out is not None:
         from catseye.gateways.network.files import input_hashes, write_comparison
         from catseye.gateways.writers.output import whole_directory

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from catseye.coordinator.herald import Herald
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Command, Document, Solution
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution, SentCommand
 from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
@@ -68,12 +68,12 @@ class Intake:
             return self._journal.trouble
         return "what was measured is not durable yet" if self._held or self._late else None
 
-    def take(self, item: LiveShot | LiveWeather | LivePosture | Happening | Command) -> None:
+    def take(self, item: LiveShot | LiveWeather | LivePosture | Happening | SentCommand) -> None:
         """Something has come; what comes within 2 ms is handled together."""
         if self.trouble is not None:
             self._see_to_journal()
             if isinstance(item, LiveWeather | LivePosture) or (
-                isinstance(item, Happening | Command) and len(self._held) + len(self._arrived) > MOST_HELD
+                isinstance(item, Happening | SentCommand) and len(self._held) + len(self._arrived) > MOST_HELD
             ):
                 self.dropped += 1
                 return
@@ -122,7 +122,7 @@ class Intake:
             self._solving = False
         self.flush()
         answer = self._live.take_in(job, found)
-        self._write((Solution.of(ticks, answer),))
+        self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
             self._herald.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
         return answer

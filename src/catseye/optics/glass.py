@@ -23,8 +23,8 @@ from catseye.optics.glass_table import GLASSES, SUPPORT_C, Glass
 __all__ = [
     "GLASSES",
     "Glass",
+    "GlassSlopes",
     "Index",
-    "Slopes",
     "absolute_index",
     "glass_named",
     "group_index",
@@ -47,7 +47,7 @@ class Index(NamedTuple):
     group: Array
 
 
-class Slopes(NamedTuple):
+class GlassSlopes(NamedTuple):
     """Derivatives of phase and group index, by what the function that gives them says."""
 
     phase: Array
@@ -88,7 +88,7 @@ def group_index(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
     return n - first / (2.0 * n)
 
 
-def slopes(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Slopes:
+def slopes(wavelength_um: ArrayLike, glass: str = "BK7-old") -> GlassSlopes:
     """Derivatives of phase and group index, relative to standard air, by the wavelength, 1/um.
 
     wavelength_um    wavelength in air, um
@@ -103,7 +103,7 @@ def slopes(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Slopes:
     n, wavelength = np.sqrt(square), np.asarray(wavelength_um, dtype=float)
     n1 = first / (2.0 * n)  # l dn/dl
     n2 = second / (2.0 * n) - first**2 / (4.0 * n**3)  # (l d/dl) twice
-    return Slopes(n1 / wavelength, (n1 - n2) / wavelength)
+    return GlassSlopes(n1 / wavelength, (n1 - n2) / wavelength)
 
 
 def group_wavelength(frequency: ArrayLike, wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
@@ -170,7 +170,7 @@ def absolute_index(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: 
     return Index(phase + warmed.phase, group + warmed.group)
 
 
-def temperature_slopes(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: ArrayLike = 20.0) -> Slopes:
+def temperature_slopes(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: ArrayLike = 20.0) -> GlassSlopes:
     """Derivatives of the absolute phase and group index by the temperature, 1/K.
 
     vacuum_um       wavelength in vacuum, um
@@ -184,7 +184,7 @@ def temperature_slopes(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature
     """
     t = np.asarray(temperature_c, dtype=float)
     above, below = (absolute_index(vacuum_um, glass, t + step) for step in (STEP_C, -STEP_C))
-    return Slopes((above.phase - below.phase) / (2.0 * STEP_C), (above.group - below.group) / (2.0 * STEP_C))
+    return GlassSlopes((above.phase - below.phase) / (2.0 * STEP_C), (above.group - below.group) / (2.0 * STEP_C))
 
 
 def index_over_air(

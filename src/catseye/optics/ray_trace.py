@@ -44,7 +44,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Sphere:
+class SphericalSurface:
     """A round surface.
 
     centre   (3,) m
@@ -71,7 +71,7 @@ class Sphere:
         return (position - np.asarray(self.centre)) / self.radius
 
 
-Surface = Plane | Sphere
+Surface = Plane | SphericalSurface
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +206,7 @@ def through_ball(rays: Rays, *, r1: float, r2: float, phase: float, group: float
     r1, r2         m
     phase, group   index of the glass over that of the air
     """
-    small, mirror = Sphere((0.0, 0.0, 0.0), r1), Sphere((0.0, 0.0, 0.0), r2, far=True)
+    small, mirror = SphericalSurface((0.0, 0.0, 0.0), r1), SphericalSurface((0.0, 0.0, 0.0), r2, far=True)
     inside = rays.to(small, 1.0).refracted(small, 1.0 / phase).to(mirror, group).reflected(mirror)
-    out = Sphere((0.0, 0.0, 0.0), r1, far=True)
+    out = SphericalSurface((0.0, 0.0, 0.0), r1, far=True)
     return inside.to(out, group).refracted(out, phase)

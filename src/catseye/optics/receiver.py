@@ -140,12 +140,12 @@ def traced_lens(
     Source: exact rays, see `ray_trace`.
     """
     from catseye.optics.abcd import thick_lens
-    from catseye.optics.ray_trace import Plane, Rays, Sphere
+    from catseye.optics.ray_trace import Plane, Rays, SphericalSurface
 
-    def surface(vertex: float, radius: float) -> Plane | Sphere:
+    def surface(vertex: float, radius: float) -> Plane | SphericalSurface:
         if np.isinf(radius):
             return Plane((0.0, 0.0, vertex), (0.0, 0.0, 1.0))
-        return Sphere((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
+        return SphericalSurface((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
 
     whole = thick_lens(r1, r2, thickness=thickness, index=phase)
     image = Plane((0.0, 0.0, thickness - float(whole[0, 0] / whole[1, 0])), (0.0, 0.0, 1.0))

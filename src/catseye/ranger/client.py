@@ -20,7 +20,7 @@ from catseye.ranger.line import (
     next_tid,
     parse_reply,
 )
-from catseye.ranger.network import Network, Sockets
+from catseye.ranger.network import ConnectionMaker, Sockets
 
 SECOND_CLIENT_TID = 2**31 + FIRST_CLIENT_TID  # for the client on 5241
 MOST_OUTSTANDING = 4096
@@ -66,7 +66,7 @@ class ZyClient(asyncio.Protocol):
         first_tid: int = FIRST_CLIENT_TID,
         heard: Listener | None = None,
         clock: Callable[[], float] = time.monotonic,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
     ) -> "ZyClient":
         """A client that is connected, by sockets unless told otherwise.
 

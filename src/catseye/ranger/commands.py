@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from catseye.errors import InputError
 from catseye.ranger.line import Request
 from catseye.ranger.motion_units import LIMITS
-from catseye.ranger.values import Parameter, Value
+from catseye.ranger.values import CommandParameter, Value
 
 MOST_CUBES = 4096
 FARTHEST_MM = 1e7
 COUNTS_LIMIT = 2**30
-Form = tuple[Parameter, ...]
+Form = tuple[CommandParameter, ...]
 
 
 @dataclass(frozen=True)
-class Command:
+class CommandRow:
     """A row of the table.
 
     name     as on the line, upper case
@@ -66,17 +66,17 @@ class Command:
         return len(request.parameters) in self.asks
 
 
-def _real(name: str, low: float = -FARTHEST_MM, high: float = FARTHEST_MM, unit: str = "mm") -> Parameter:
-    return Parameter(name, "real", low, high, unit)
+def _real(name: str, low: float = -FARTHEST_MM, high: float = FARTHEST_MM, unit: str = "mm") -> CommandParameter:
+    return CommandParameter(name, "real", low, high, unit)
 
 
-def _of(name: str, low: int, high: int, unit: str = "") -> Parameter:
-    return Parameter(name, "whole", low, high, unit)
+def _of(name: str, low: int, high: int, unit: str = "") -> CommandParameter:
+    return CommandParameter(name, "whole", low, high, unit)
 
 
 AXIS = _of("axis", 0, 1, "(0 azimuth, 1 elevation)")
 SWITCH = _of("state", 0, 1, "(0 off, 1 on)")
-CUBE = Parameter("cube", "cube")
+CUBE = CommandParameter("cube", "cube")
 XYZ = (_real("x_mm"), _real("y_mm"), _real("z_mm"))
 PLACE = _of("place", 1, MOST_CUBES)
 COUNTS = _real("counts", -COUNTS_LIMIT, COUNTS_LIMIT - 1, "counts")
@@ -85,20 +85,20 @@ TURN = 2.0 * math.pi
 PART = tuple(_real(f"{axis}_unit", -1.0, 1.0, "") for axis in "xyz")
 
 
-def _chip(command: str) -> Parameter:
+def _chip(command: str) -> CommandParameter:
     limits = LIMITS[command]
-    return Parameter(limits.name.replace(" ", "_"), "whole", limits.low, limits.high, limits.unit)
+    return CommandParameter(limits.name.replace(" ", "_"), "whole", limits.low, limits.high, limits.unit)
 
 
 def _angles(count: int, name: str) -> Form:
     return tuple(_real(f"{name}{k}_rad", -TURN, TURN, "rad") for k in range(1, count + 1))
 
 
-def _row(name: str, help_: str, *forms: Form, asks: tuple[int, ...] = (), chosen: bool = False) -> Command:
-    return Command(name, forms or ((),), frozenset(asks), help_, chosen)
+def _row(name: str, help_: str, *forms: Form, asks: tuple[int, ...] = (), chosen: bool = False) -> CommandRow:
+    return CommandRow(name, forms or ((),), frozenset(asks), help_, chosen)
 
 
-def _setting(name: str, help_: str, *values: Parameter, before: Form = (), chosen: bool = False) -> Command:
+def _setting(name: str, help_: str, *values: CommandParameter, before: Form = (), chosen: bool = False) -> CommandRow:
     """Asked without its values, set with them."""
     return _row(name, help_, before, (*before, *values), asks=(len(before),), chosen=chosen)
 
@@ -149,7 +149,7 @@ ROWS = (
         (),
         (CUBE,),
         (CUBE, *XYZ),
-        (CUBE, *XYZ, Parameter("cube_name", "name")),
+        (CUBE, *XYZ, CommandParameter("cube_name", "name")),
         asks=(0, 1),
     ),
     _row("INI", "allocate n cubes, dropping those there were", (_of("cubes", 0, MOST_CUBES),)),
@@ -169,13 +169,13 @@ ROWS = (
         "scan: ask, stop (0) or start (1), from a time on, so many rounds",
         (),
         (SWITCH,),
-        (SWITCH, Parameter("start_mjd", "stamp")),
-        (SWITCH, Parameter("start_mjd", "stamp"), _of("rounds", 0, 1_000_000)),
+        (SWITCH, CommandParameter("start_mjd", "stamp")),
+        (SWITCH, CommandParameter("start_mjd", "stamp"), _of("rounds", 0, 1_000_000)),
         asks=(0,),
     ),
     _row("STW", "status word", asks=(0,)),
     _row("VER", "name and version", asks=(0,)),
-    _row("STI", "set the clock", (), (Parameter("mjd", "stamp"),), asks=(0,)),
+    _row("STI", "set the clock", (), (CommandParameter("mjd", "stamp"),), asks=(0,)),
     _row("RST", "cold boot: everything as when power comes on"),
     _row("PS", "power supplies, V; or the laser's power on and off", (), (SWITCH,), asks=(0,)),
     _row("INITZY", "run the initialisation files"),
@@ -187,7 +187,7 @@ ROWS = (
         "KND",
         "kind of a cube: S standard with its constant, B benchmark with its certified distance",
         (CUBE,),
-        (CUBE, Parameter("kind", "name"), _real("value_mm")),
+        (CUBE, CommandParameter("kind", "name"), _real("value_mm")),
         asks=(1,),
         chosen=True,
     ),
@@ -197,9 +197,9 @@ ROWS = (
         "follow a cube from x0 at t0 to x1 at t1",
         (
             CUBE,
-            Parameter("t0_mjd", "stamp"),
+            CommandParameter("t0_mjd", "stamp"),
             *(_real(f"{axis}0_mm") for axis in "xyz"),
-            Parameter("t1_mjd", "stamp"),
+            CommandParameter("t1_mjd", "stamp"),
             *(_real(f"{axis}1_mm") for axis in "xyz"),
         ),
         chosen=True,
@@ -215,7 +215,9 @@ ROWS = (
     ),
     _row("LST", "scheduled commands of this connection", asks=(0,), chosen=True),
     _row("CLR", "clear the scheduled commands of this connection", chosen=True),
-    _row("HLP", "commands, or one command's forms", (), (Parameter("command", "name"),), asks=(0, 1), chosen=True),
+    _row(
+        "HLP", "commands, or one command's forms", (), (CommandParameter("command", "name"),), asks=(0, 1), chosen=True
+    ),
 )
 COMMANDS = {row.name: row for row in ROWS}
 
@@ -234,7 +236,7 @@ def schedule_of(parameters: tuple[str, ...]) -> tuple[int, int, float, Request]:
         raise InputError(
             f"AT: {len(parameters)} parameters do not fit (expected AT start, repeats, interval, CMD P1, ...)"
         )
-    start = Parameter("start_mjd", "stamp").read("AT", parameters[0])
+    start = CommandParameter("start_mjd", "stamp").read("AT", parameters[0])
     repeats = _of("repeats", 1, 1_000_000).read("AT", parameters[1])
     interval = _real("interval_s", 0.0, 86_400.0, "s").read("AT", parameters[2])
     word, _, first = parameters[3].partition(" ")

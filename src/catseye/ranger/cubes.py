@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.mirror.encoder import choice, prime_counts
-from catseye.geometry.mirror.pointing import Station, aim
+from catseye.geometry.mirror.pointing import MirrorStation, aim
 from catseye.ranger.values import Value
 
 REFERENCE = "ZRG"
@@ -20,7 +20,7 @@ GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
 
 
 @dataclass(frozen=True)
-class Shot:
+class RangerShot:
     """What one measurement gave: V, rad, mm (of a benchmark the group index; None without a reference), ticks."""
 
     amplitude: float
@@ -45,7 +45,7 @@ class Cube:
     place_mm: tuple[float, float, float]
     kind: str = "S"
     value_mm: float = 0.0
-    shot: Shot | None = None
+    shot: RangerShot | None = None
 
 
 class Cubes:
@@ -67,15 +67,15 @@ class Cubes:
         self.by_number: dict[int, Cube] = {0: Cube(0, REFERENCE, (0.0, 0.0, 0.0), "R")}
         self._numbers = {REFERENCE: 0}  # by name in capitals
         self._counts: dict[int, list[float | None]] = {0: [None, None]}
-        self._station: Station | None = None
+        self._station: MirrorStation | None = None
         self.computed = 0  # times that encoder values were computed
 
     @property
-    def station(self) -> Station:
+    def station(self) -> MirrorStation:
         """The mirror on its monument. Source: [PARKER04] section 2.2."""
         if self._station is None:
             g = self.geometry
-            self._station = Station(
+            self._station = MirrorStation(
                 np.array(g["BP"]) * MILLIMETRE,
                 np.array(g["ALPHA"]),
                 np.array(g["MO"]) * MILLIMETRE,

@@ -22,7 +22,7 @@ Homing = Literal["never", "searching", "home", "failed"]
 
 
 @dataclass(frozen=True)
-class Sampling:
+class SamplingSettings:
     """How a buffer is taken: `SFQ`, `CYC`, `IFF`.
 
     samples        of a cycle, at least 3
@@ -31,7 +31,7 @@ class Sampling:
 
     Raises ValidityError outside these. Source: [CREAGER02] limits of the converter.
 
-    >>> Sampling().duration
+    >>> SamplingSettings().duration
     0.128
     """
 
@@ -71,11 +71,11 @@ class Buffer:
 
     samples: NDArray[np.int16]
     triggered: TimeTag
-    sampling: Sampling
+    sampling: SamplingSettings
     volts_per_code: float
 
 
-class Head(Protocol):
+class RangerHead(Protocol):
     """The hardware of one ranger."""
 
     def now(self) -> TimeTag:
@@ -90,7 +90,7 @@ class Head(Protocol):
         """Whether the clock follows its time signal."""
         ...
 
-    def trigger(self, sampling: Sampling) -> None:
+    def trigger(self, sampling: SamplingSettings) -> None:
         """Begin to take a buffer; one being taken is given up."""
         ...
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.ranger.commands import MOST_CUBES
 from catseye.ranger.line import Request
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.target import FeedArmRanger
-from catseye.reduction.site.places import Place, nominal_frame, places_of
+from catseye.reduction.site.places import RangedPoint, nominal_frame, places_of
 from catseye.reduction.site.stations import offset_of, station_of
 
 FILTER = ("FKP", "FKI", "FKD", "FIL", "FSI")
@@ -61,7 +61,7 @@ def dish_centre(site: SiteFolder) -> NDArray[np.float64]:
     return np.array([x, y, (x**2 + y**2) / (4.0 * site.site.paraboloid.focal_length_mm * MILLIMETRE)])
 
 
-def own_station(site: SiteFolder, ranger: str) -> Station:
+def own_station(site: SiteFolder, ranger: str) -> MirrorStation:
     """The mirror on its mount, in the ranger's own frame, which for the feed arm is the reflector's.
 
     Source: [PARKER04] section 2.2.
@@ -70,7 +70,7 @@ def own_station(site: SiteFolder, ranger: str) -> Station:
     if ranger in site.monuments:
         return station_of(site.monuments[ranger], mirror)
     record = _feed_arm_record(site, ranger)
-    return Station.from_matrix(
+    return MirrorStation.from_matrix(
         np.array(record.nominal_scan_point_mm) * MILLIMETRE,
         mount_from_reflector(site, ranger),
         offset=offset_of(mirror),
@@ -100,7 +100,7 @@ def cubes_commands(
     ranger: str,
     targets: Iterable[str] | None = None,
     *,
-    places: Mapping[str, Place] | None = None,
+    places: Mapping[str, RangedPoint] | None = None,
 ) -> list[Request]:
     """INI, then COO and KND of the targets, all of them unless told which; ZRG and the ranger itself have none.
 
@@ -160,7 +160,9 @@ def commands_of_ranger(site: SiteFolder, ranger: str, targets: Iterable[str] | N
     ]
 
 
-def files_of_ranger(site: SiteFolder, ranger: str, *, places: Mapping[str, Place] | None = None) -> dict[str, str]:
+def files_of_ranger(
+    site: SiteFolder, ranger: str, *, places: Mapping[str, RangedPoint] | None = None
+) -> dict[str, str]:
     """CUBES.INI, ZYnnn.INI and the head's file, text by name, in the order in which INITZY runs them.
 
     places   of the site, where the caller has them already
@@ -177,7 +179,7 @@ def files_of_ranger(site: SiteFolder, ranger: str, *, places: Mapping[str, Place
     }
 
 
-def _in_own_frame(site: SiteFolder, ranger: str, places: Mapping[str, Place]) -> dict[str, NDArray[np.float64]]:
+def _in_own_frame(site: SiteFolder, ranger: str, places: Mapping[str, RangedPoint]) -> dict[str, NDArray[np.float64]]:
     names = [name for name in places if name != ranger]
     points = np.array([places[name].start for name in names])
     if frame_of(site, ranger) == "reflector":

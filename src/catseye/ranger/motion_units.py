@@ -26,7 +26,7 @@ LARGEST_ERROR_LIMIT = 25_000  # of the ZY; the chip's own is 32 767
 
 
 @dataclass(frozen=True)
-class Limits:
+class ValueLimits:
     """What one command accepts: the name of its value, lowest, highest, unit."""
 
     name: str
@@ -36,15 +36,15 @@ class Limits:
 
 
 LIMITS = {
-    "ABA": Limits("acceleration", 0, LARGEST_RATE, "1/65536 count per sample squared"),
-    "ABV": Limits("velocity", 0, LARGEST_RATE, "1/65536 count per sample"),
-    "ABP": Limits("target position", POSITION_LOW, POSITION_HIGH, "counts"),
-    "FKP": Limits("proportional gain", 0, LARGEST_GAIN, "an integer of the filter"),
-    "FKI": Limits("integral gain", 0, LARGEST_GAIN, "an integer of the filter"),
-    "FKD": Limits("derivative gain", 0, LARGEST_GAIN, "an integer of the filter"),
-    "FIL": Limits("integration limit", 0, LARGEST_GAIN, "1/256 of a step of the 8-bit converter"),
-    "FSI": Limits("derivative interval", 0, LONGEST_INTERVAL, "samples less one"),
-    "ERL": Limits("position error limit", 0, LARGEST_ERROR_LIMIT, "counts"),
+    "ABA": ValueLimits("acceleration", 0, LARGEST_RATE, "1/65536 count per sample squared"),
+    "ABV": ValueLimits("velocity", 0, LARGEST_RATE, "1/65536 count per sample"),
+    "ABP": ValueLimits("target position", POSITION_LOW, POSITION_HIGH, "counts"),
+    "FKP": ValueLimits("proportional gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FKI": ValueLimits("integral gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FKD": ValueLimits("derivative gain", 0, LARGEST_GAIN, "an integer of the filter"),
+    "FIL": ValueLimits("integration limit", 0, LARGEST_GAIN, "1/256 of a step of the 8-bit converter"),
+    "FSI": ValueLimits("derivative interval", 0, LONGEST_INTERVAL, "samples less one"),
+    "ERL": ValueLimits("position error limit", 0, LARGEST_ERROR_LIMIT, "counts"),
 }
 
 

@@ -17,7 +17,7 @@ class Listener(Protocol):
         ...
 
 
-class Network(Protocol):
+class ConnectionMaker(Protocol):
     """Makes connections between protocols."""
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> Listener:

@@ -14,10 +14,10 @@ from catseye.errors import CatseyeError, InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.handlers.table import HANDLERS, scan_rounds, stream_shots, watch_sun
-from catseye.ranger.head import Head
+from catseye.ranger.head import RangerHead
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks, parse_request
 from catseye.ranger.state import VERSION, Outgoing, RangerState, Values, Work
-from catseye.ranger.status import Status, word_text
+from catseye.ranger.status import StatusWord, word_text
 from catseye.ranger.sun_watch import SunSource
 
 MOST_QUEUED = 256  # commands of all connections
@@ -50,7 +50,7 @@ class Ranger(RangerState):
     def __init__(
         self,
         name: str,
-        head: Head,
+        head: RangerHead,
         *,
         limits: tuple[float, float],
         files: Path | None = None,
@@ -62,7 +62,7 @@ class Ranger(RangerState):
         self._waiting: deque[tuple[int, Request]] = deque()
         self._running: tuple[int, Request, Work] | None = None
         self._ask_at: dict[str, int | None] = {}  # by what waits for the head: when to ask it again
-        self._word: Status | None = None
+        self._word: StatusWord | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
         self._next_update = 0
 

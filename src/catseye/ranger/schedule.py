@@ -10,7 +10,7 @@ MOST_ENTRIES = 64  # of one connection
 
 
 @dataclass
-class Entry:
+class ScheduledCommand:
     """A command of a connection, due at nanoseconds since MJD 0, so many times, so far apart."""
 
     client: int
@@ -24,7 +24,7 @@ class Scheduler:
     """Entries of all connections; the turn goes round."""
 
     def __init__(self) -> None:
-        self.entries: list[Entry] = []
+        self.entries: list[ScheduledCommand] = []
 
     def add(self, client: int, request: Request, due_ns: int, repeats: int = 1, interval: float = 0.0) -> None:
         """One more; `interval` in s.
@@ -33,9 +33,9 @@ class Scheduler:
         """
         if sum(e.client == client for e in self.entries) >= MOST_ENTRIES:
             raise InputError(f"{MOST_ENTRIES} commands wait already (expected fewer: CLR, or let some run)")
-        self.entries.append(Entry(client, request, due_ns, repeats, round(interval * PER_SECOND)))
+        self.entries.append(ScheduledCommand(client, request, due_ns, repeats, round(interval * PER_SECOND)))
 
-    def take(self, now_ns: int) -> Entry | None:
+    def take(self, now_ns: int) -> ScheduledCommand | None:
         """The next that is due, which goes to the back of the row; None where none is.
 
         A repeated command keeps its times: one that comes late does not move those after it.
@@ -46,7 +46,9 @@ class Scheduler:
             del self.entries[at]
             if entry.repeats > 1:
                 later = entry.due_ns + entry.interval_ns
-                self.entries.append(Entry(entry.client, entry.request, later, entry.repeats - 1, entry.interval_ns))
+                self.entries.append(
+                    ScheduledCommand(entry.client, entry.request, later, entry.repeats - 1, entry.interval_ns)
+                )
             return entry
         return None
 

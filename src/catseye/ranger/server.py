@@ -14,7 +14,7 @@ from functools import partial
 
 from catseye.errors import InputError
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
-from catseye.ranger.network import Listener, Network, Sockets
+from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.state import Outgoing
 
@@ -28,7 +28,7 @@ MOST_UNSENT = 4 * 2**20  # bytes
 LOG = logging.getLogger(__name__)
 
 
-class Connection(asyncio.Protocol):
+class ClientConnection(asyncio.Protocol):
     """One client; `number` is its place among the ports."""
 
     def __init__(self, server: "ZyServer", number: int):
@@ -108,11 +108,11 @@ class ZyServer:
         ports: tuple[int, int] = PORTS,
         *,
         clock: Callable[[], float] = time.monotonic,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
     ):
         self.ranger, self.host, self.ports, self.clock = ranger, host, ports, clock
-        self.network: Network = network or Sockets()
-        self.connections: dict[int, Connection] = {}
+        self.network: ConnectionMaker = network or Sockets()
+        self.connections: dict[int, ClientConnection] = {}
         self._listeners: list[Listener] = []
         self._waker: asyncio.Future[None] | None = None
         self._last_keep_alive = self._last_rate = clock()
@@ -121,7 +121,9 @@ class ZyServer:
         """Listen. Raises InputError where a port cannot be had."""
         for number, port in enumerate(self.ports):
             try:
-                self._listeners.append(await self.network.serve(partial(Connection, self, number), self.host, port))
+                self._listeners.append(
+                    await self.network.serve(partial(ClientConnection, self, number), self.host, port)
+                )
             except OSError as problem:
                 await self.stop()
                 raise InputError(
@@ -187,7 +189,7 @@ class ZyServer:
                     if reply.command == "BYE" and reply.ok and connection.transport is not None:
                         connection.transport.close()
 
-    def joined(self, connection: Connection) -> None:
+    def joined(self, connection: ClientConnection) -> None:
         """A connection begins; a second one on a port is turned away."""
         port = self.ports[connection.number]
         if connection.number in self.connections:
@@ -204,7 +206,7 @@ class ZyServer:
         for out in self.ranger.greeting(port):
             connection.tell(out.reply)
 
-    def left(self, connection: Connection) -> None:
+    def left(self, connection: ClientConnection) -> None:
         """A connection is over: what it had queued and scheduled is dropped, and its port is free."""
         if self.connections.get(connection.number) is connection:
             del self.connections[connection.number]

@@ -11,11 +11,11 @@ from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.cubes import Cubes
-from catseye.ranger.head import Buffer, Head, Sampling
+from catseye.ranger.head import Buffer, RangerHead, SamplingSettings
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks
 from catseye.ranger.ranging import NOMINAL_INDEX
 from catseye.ranger.schedule import Scheduler
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.ranger.sun_watch import SunSource, refusal
 
 Values = tuple[str, ...]
@@ -29,7 +29,7 @@ REFUSED_IN_A_SCAN = (
     *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
 )
 REFUSED_IN_A_STREAM = tuple(name for name in REFUSED_IN_A_SCAN if name != "TRK")
-BITS = tuple(int(bit) for bit in Status)  # in the order of `RangerState.status`
+BITS = tuple(int(bit) for bit in StatusWord)  # in the order of `RangerState.status`
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class AxisSettings:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredBuffer:
     """A buffer and what was computed from it: amplitude in V and phase in rad, None before MPC; whose it is."""
 
     buffer: Buffer
@@ -88,7 +88,7 @@ class RangerState:
     def __init__(
         self,
         name: str,
-        head: Head,
+        head: RangerHead,
         handlers: Mapping[str, Callable[..., Any]],
         *,
         limits: tuple[float, float],
@@ -113,12 +113,12 @@ class RangerState:
         """Everything but hardware and queues as when power comes on."""
         self.cubes = Cubes(self.limits)
         self.axes = (AxisSettings(), AxisSettings())
-        self.sampling = Sampling()
+        self.sampling = SamplingSettings()
         self.d0_mm, self.index = 0.0, NOMINAL_INDEX
         self.auto, self.updates = True, False
         self.given: set[str] = set()
         self.reads, self.tolerance, self.timeout, self.strict = 5, 5, 18.0, True
-        self.measured: Measured | None = None
+        self.measured: MeasuredBuffer | None = None
         self.aimed: int | None = None
         self.reference_phase: float | None = None
         self.sun_vector: tuple[float, ...] | None = None
@@ -147,7 +147,7 @@ class RangerState:
         """The stamp of now."""
         return nanoseconds_to_ticks(self.now_ns())
 
-    def status(self) -> Status:
+    def status(self) -> StatusWord:
         """The status word of now."""
         head, measured = self.head, self.measured
         on = (
@@ -168,7 +168,7 @@ class RangerState:
             self.sun_refused or self.in_sun,
             self.initialised,
         )
-        return Status(sum(bit for bit, is_on in zip(BITS, on, strict=True) if is_on))
+        return StatusWord(sum(bit for bit, is_on in zip(BITS, on, strict=True) if is_on))
 
     @property
     def initialised(self) -> bool:

@@ -7,7 +7,7 @@ on, initialised, and nothing wrong.
 from enum import IntFlag
 
 
-class Status(IntFlag):
+class StatusWord(IntFlag):
     """Bits of STW; those that are not named are zero."""
 
     AUTO = 1 << 0
@@ -28,10 +28,10 @@ class Status(IntFlag):
     INITIALISED = 1 << 16  # BP, ALPHA, BETA, MO, EZ and D0 have been given
 
 
-def word_text(status: Status) -> str:
+def word_text(status: StatusWord) -> str:
     """As it travels.
 
-    >>> word_text(Status.AUTO | Status.INITIALISED)
+    >>> word_text(StatusWord.AUTO | StatusWord.INITIALISED)
     '0x00010001'
     """
     return f"0x{int(status):08x}"

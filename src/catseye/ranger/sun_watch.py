@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.geometry.clearance.keep_out import servo_margin
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
-from catseye.geometry.mirror.pointing import Station, beam
+from catseye.geometry.mirror.pointing import MirrorStation, beam
 from catseye.geometry.sky.sun import EARLIEST_MJD, altitude_azimuth
 from catseye.records.site.site import Location
-from catseye.reduction.site.earth_rotation import Place, place_of, rotation_at, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, place_of, rotation_at, sun_at
 
 HALF_ANGLE = 5.0 * DEGREE
 MARGIN = servo_margin([20.0, 20.0])  # overshoot
@@ -33,7 +33,7 @@ class OwnSun:
     place   of the ground frame's origin
     """
 
-    def __init__(self, place: Place):
+    def __init__(self, place: FramePlace):
         self._place = place
         self._second = -1
         self._seen: NDArray[np.float64] | None = None
@@ -55,7 +55,7 @@ def own_sun(site: Location) -> OwnSun:
 
 
 def nearest_sun(
-    station: Station, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike], *, exact: bool = False
+    station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike], *, exact: bool = False
 ) -> float:
     """Least angle, rad, that the beam can come to any of the Suns while both axes move between counts; inf without one.
 
@@ -77,7 +77,7 @@ def nearest_sun(
     return float(np.min(_angles(station, looks, suns))) - servo_margin(half)
 
 
-def refusal(station: Station, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike]) -> str | None:
+def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike]) -> str | None:
     """Why a move must not be made, in words; None where it may.
 
     station, start, end, suns   as for `nearest_sun`
@@ -105,7 +105,7 @@ def refusal(station: Station, start: ArrayLike, end: ArrayLike, suns: Sequence[A
 
 
 def way_out(
-    station: Station, here: ArrayLike, suns: Sequence[ArrayLike], limits: tuple[float, float]
+    station: MirrorStation, here: ArrayLike, suns: Sequence[ArrayLike], limits: tuple[float, float]
 ) -> tuple[int, int] | None:
     """Counts to drive to from inside a cone: the shortest free move of one axis that ends 20 deg from every Sun.
 
@@ -128,7 +128,7 @@ def way_out(
     return None
 
 
-def _angles(station: Station, looks: NDArray[np.float64], suns: Sequence[ArrayLike]) -> NDArray[np.float64]:
+def _angles(station: MirrorStation, looks: NDArray[np.float64], suns: Sequence[ArrayLike]) -> NDArray[np.float64]:
     """(n, suns) rad between beams (n, 3) in the mirror's axes and the Suns."""
     inside: NDArray[np.float64] = np.stack([np.asarray(s, dtype=float) for s in suns])
     turned = inside / np.linalg.norm(inside, axis=-1, keepdims=True) @ station.mirror_from_ground.T

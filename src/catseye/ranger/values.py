@@ -16,7 +16,7 @@ Kind = Literal["whole", "real", "cube", "name", "stamp", "text"]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class CommandParameter:
     """One parameter of a command.
 
     name      as messages and help call it, its unit in it
@@ -39,7 +39,7 @@ class Parameter:
 
         Raises InputError: not of this kind, or outside its limits.
 
-        >>> Parameter("axis", low=0, high=1).read("STT", "1")
+        >>> CommandParameter("axis", low=0, high=1).read("STT", "1")
         1
         """
         if self.kind == "cube":

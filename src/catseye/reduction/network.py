@@ -7,11 +7,11 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
+from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
 from catseye.estimation.network.adjustment import adjust_network, with_datum
 from catseye.estimation.network.approximate.start import approximate
-from catseye.estimation.network.model import Network, NetworkSolution, points_of
-from catseye.estimation.network.monte_carlo import Disturbance, Scatter, scatter
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
+from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
 from catseye.estimation.observations.kinds import Distances
 from catseye.estimation.quality.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
@@ -24,7 +24,7 @@ Placed = tuple[tuple[str, ...], tuple[str, ...]]  # names of points that were pl
 
 
 @dataclass(frozen=True, eq=False)
-class Adjusted:
+class AdjustedNetwork:
     """A network with its answer and how observations were treated.
 
     solution     of the adjustment, with the treatment below
@@ -48,7 +48,7 @@ class Adjusted:
 
 
 def adjusted(
-    network: Network,
+    network: ObservationNetwork,
     *,
     datum: str | None = None,
     reject: bool = False,
@@ -56,7 +56,7 @@ def adjusted(
     level: float = 0.05,
     components: str | None = None,
     progress: Progress | None = None,
-) -> Adjusted:
+) -> AdjustedNetwork:
     """A network's coordinates, every observation used as claimed unless asked otherwise.
 
     network      from `records.network.any_file.read_network`
@@ -77,12 +77,12 @@ def adjusted(
     plain = replace(adjust_network(network, diagnose=not treated), approximate=placed[0], assumed=placed[1])
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
-    result = Adjusted(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
+    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
     if not treated or not np.isfinite(plain.covariance).all():
         return result
     count, engine = 0, _engine(plain)
 
-    def solve(inflation: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+    def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...]:
         nonlocal count
         count += 1
         if progress is not None:
@@ -126,12 +126,12 @@ def adjusted(
     return result
 
 
-def _places(network: Network) -> list[np.ndarray]:
+def _places(network: ObservationNetwork) -> list[np.ndarray]:
     """For the search at single points: the target of each range, -1 for other observations."""
     return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
-def _placed(network: Network) -> tuple[Network, Placed]:
+def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:
     """The network with places found once for points that have none, and who these are."""
     if np.isfinite(network.points.xyz).all():
         return network, ((), ())
@@ -148,17 +148,21 @@ def _engine(solution: NetworkSolution) -> str | None:
     return "ranging" if isinstance(solution.q, RangingCovariance) else None
 
 
-def _final(network: Network, inflation: Sequence[np.ndarray], placed: Placed, *, alone: bool) -> NetworkSolution:
+def _final(
+    network: ObservationNetwork, inflation: Sequence[np.ndarray], placed: Placed, *, alone: bool
+) -> NetworkSolution:
     return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=placed[0], assumed=placed[1])
 
 
-def _with_components(network: Network, result: Adjusted, by: str, progress: Progress | None) -> Adjusted:
+def _with_components(
+    network: ObservationNetwork, result: AdjustedNetwork, by: str, progress: Progress | None
+) -> AdjustedNetwork:
     """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
     placed = (result.solution.approximate, result.solution.assumed)
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
     count, engine = 0, _engine(result.solution)
 
-    def scaled(scales: Sequence[np.ndarray]) -> tuple[Fit, ...]:
+    def scaled(scales: Sequence[np.ndarray]) -> tuple[GroupFit, ...]:
         nonlocal count
         count += 1
         if progress is not None:
@@ -180,7 +184,7 @@ def _with_components(network: Network, result: Adjusted, by: str, progress: Prog
     return replace(result, solution=solution, components=found, notes=notes)
 
 
-def _ranger_model(network: Network, solution: NetworkSolution) -> RowModel:
+def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:
     """sigma^2 = a^2 + (b D)^2 of each point that ranges, over all groups of ranges; other groups as claimed."""
     ranging = [points_of(g)[0] if isinstance(g, Distances) and g.covariance.ndim == 1 else None for g in network.groups]
     used = [o for o in ranging if o is not None]
@@ -214,7 +218,7 @@ def _ranger_model(network: Network, solution: NetworkSolution) -> RowModel:
 
 
 def measured_on_paper(
-    network: Network,
+    network: ObservationNetwork,
     *,
     runs: int,
     seed: int,
@@ -223,7 +227,7 @@ def measured_on_paper(
     refraction: float = 0.0,
     blunders: float = 0.0,
     progress: Progress | None = None,
-) -> Scatter:
+) -> MonteCarloScatter:
     """A planned network measured many times with what goes wrong outside, and adjusted each time; see `scatter`.
 
     network      with its datum as it will be; its coordinates are taken for the truth
@@ -235,7 +239,7 @@ def measured_on_paper(
     """
     disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, refraction=refraction, blunders=blunders)
 
-    def solve(drawn: Network) -> NetworkSolution:
+    def solve(drawn: ObservationNetwork) -> NetworkSolution:
         return adjusted(drawn, reject=blunders > 0.0).solution
 
     return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)

@@ -4,7 +4,7 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.records.night.live import Happening, LivePosture
 from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.logs import epoch_of
@@ -59,7 +59,7 @@ class LiveBook:
         """One more."""
         if isinstance(entry, AnsweredShot):
             self._shot(entry)
-        elif isinstance(entry, Solution):
+        elif isinstance(entry, EpochSolution):
             self._solution(entry)
         elif isinstance(entry, LivePosture):
             self.posture = entry
@@ -86,7 +86,7 @@ class LiveBook:
         if self._comparison is not None:
             self._comparison.shot(answered)
 
-    def _solution(self, solution: Solution) -> None:
+    def _solution(self, solution: EpochSolution) -> None:
         compared = None if self._comparison is None else self._comparison.epoch(solution)
         answer = solution.answer
         self.events.append(epoch_of(solution))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.estimation.shapes.motions import motions
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.bodies import bodies_of, lasting_names
@@ -82,7 +82,7 @@ class TwinComparison:
             del self._middles[next(iter(self._middles))]
         self._middles[shot.number] = self._twin.seconds_of_ticks(shot.ticks) + 0.5 * shot.duration
 
-    def epoch(self, solution: Solution) -> EpochComparison | None:
+    def epoch(self, solution: EpochSolution) -> EpochComparison | None:
         """The epoch beside the truth; None where nothing was solved, or too little of it can be compared."""
         answer = solution.answer
         middles, numbers = self._middles, [*answer.get("used", ()), *map(int, answer.get("rejected") or ())]

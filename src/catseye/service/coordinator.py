@@ -25,7 +25,7 @@ from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT
-from catseye.ranger.network import Network
+from catseye.ranger.network import ConnectionMaker
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
 from catseye.records.site.folder import SiteFolder
@@ -128,7 +128,7 @@ class LiveCoordinator:
         feed: Feed,
         clock: Clock,
         seed: int | None = None,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
         virtual: bool = False,
         tell: Callable[[str, bool], None] = lambda text, alarm: None,
     ):

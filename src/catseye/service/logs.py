@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.gateways.writers.objects import plain
 from catseye.geometry.sky.time_tag import MJD_EPOCH
@@ -31,7 +31,7 @@ class LiveLog:
         """What was made durable: happenings and solutions have a line."""
         if isinstance(entry, Happening):
             self.happened(entry)
-        elif isinstance(entry, Solution):
+        elif isinstance(entry, EpochSolution):
             self.happened(epoch_of(entry))
 
     def tell(self, who: str, kind: str, text: str, severity: Any = "note") -> None:
@@ -57,7 +57,7 @@ class LiveLog:
         self._write(f"{colour}{line}{PLAIN}" if colour else line)
 
 
-def epoch_of(solution: Solution) -> Happening:
+def epoch_of(solution: EpochSolution) -> Happening:
     """An epoch as something that happened."""
     answer = solution.answer
     if not answer:

@@ -9,7 +9,7 @@ from catseye.coordinator.firing import OF_THE_LINE
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.book import GOOD, LiveBook
 from catseye.service.comparison import EpochComparison
-from catseye.service.world import World
+from catseye.service.world import TwinWords
 
 TOLD = 5  # troubles that people are told of: first those that are of more than single shots
 OFFSETS = (
@@ -20,7 +20,7 @@ OFFSETS = (
 
 
 def simulation_object(
-    book: LiveBook, world: World, journal: str | None, *, seconds: float, rangers: int
+    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int
 ) -> dict[str, Any]:
     """What `catseye simulate --json` prints.
 
@@ -96,7 +96,7 @@ def beam_lines(compared: EpochComparison) -> Iterator[str]:
 
 
 def summary(
-    book: LiveBook, world: World, journal: str | None, *, seconds: float, rangers: int
+    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int
 ) -> list[tuple[str, str]]:
     """Title and text of each passage."""
     bad = {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD}

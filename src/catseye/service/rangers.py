@@ -11,8 +11,8 @@ from typing import Any
 
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
-from catseye.ranger.head import Head
-from catseye.ranger.network import Network, SocketListener, Sockets
+from catseye.ranger.head import RangerHead
+from catseye.ranger.network import ConnectionMaker, SocketListener, Sockets
 from catseye.records.site.folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
 from catseye.simulator.clock.world_clock import Clock
@@ -80,7 +80,7 @@ class RangersServed:
     def __init__(
         self,
         site: SiteFolder,
-        heads: Mapping[str, Head],
+        heads: Mapping[str, RangerHead],
         *,
         clock: Clock,
         twin: Twin | None = None,
@@ -88,7 +88,7 @@ class RangersServed:
         host: str | None = None,
         ports: tuple[int, int] | None = None,
         files: Path | None = None,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
         warming: WarmingClock | None = None,
     ):
         self._site, self._twin, self._warming = site, twin, warming
@@ -135,7 +135,7 @@ class RangersServed:
             await self._served.stop()
 
 
-def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, Head]:
+def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
     """A real head for each ranger: `package.module:factory` is called with the ranger's name.
 
     The current directory is looked in, too. Raises InputError: no such module or factory, or it gives no head.
@@ -151,13 +151,13 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, Head]:
         raise InputError(f"--head {factory}: cannot be had: {problem} (expected package.module:factory)") from problem
     if not callable(made):
         raise InputError(f"--head {factory}: {name} cannot be called (expected a function of a ranger's name)")
-    heads: dict[str, Head] = {}
+    heads: dict[str, RangerHead] = {}
     for ranger in rangers:
         try:
             head = made(ranger)
         except (CatseyeError, OSError) as problem:
             raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
-        missing = [each for each in dir(Head) if not each.startswith("_") and not hasattr(head, each)]
+        missing = [each for each in dir(RangerHead) if not each.startswith("_") and not hasattr(head, each)]
         if missing:
             raise InputError(f"--head {factory}: what it gives for {ranger} has no {missing[0]} (expected a Head)")
         heads[ranger] = head

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
 from catseye.errors import InputError
@@ -103,7 +103,7 @@ def _compare(found: ReplayFound, each: Replayed, off: dict[str, list[np.ndarray]
         off[name].append(after[name] - before[name])
 
 
-def _places(solution: Solution) -> dict[str, np.ndarray]:
+def _places(solution: EpochSolution) -> dict[str, np.ndarray]:
     names, x = solution.answer.get("names") or [], solution.answer.get("x") or []
     return {name: np.array(place, dtype=float) for name, place in zip(names, x, strict=False)}
 

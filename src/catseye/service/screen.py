@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from catseye.constants import DEGREE
 from catseye.coordinator.firing import OF_THE_LINE
-from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.gateways.writers.interruption import undone_when_interrupted
 from catseye.records.night.live import Happening
 from catseye.service.book import GOOD, LiveBook
@@ -62,7 +62,7 @@ class LinesView(SilentView):
         self._book = book
 
     def entry(self, entry: Any) -> None:
-        if isinstance(entry, Solution) and self._book is not None:
+        if isinstance(entry, EpochSolution) and self._book is not None:
             latest = self._book.latest
             if latest is not None and latest.number == entry.answer.get("number"):
                 self._say(f"{time_text(entry.ticks)}  {epoch_line(latest)}")
@@ -100,7 +100,7 @@ class ScreenView(SilentView):
 
     def entry(self, entry: Any) -> None:
         now = time.monotonic()
-        if self._live is not None and (now >= self._next or isinstance(entry, Solution)):
+        if self._live is not None and (now >= self._next or isinstance(entry, EpochSolution)):
             self._next = now + EVERY
             self._live.update(self.picture(), refresh=True)
 

@@ -18,7 +18,7 @@ from catseye.service.coordinator import LiveCoordinator, Orders
 from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.warm import WarmingClock
-from catseye.service.world import World, twin_heads
+from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
 
 LONGEST_QUIET = 120.0  # s until the first round: rangers that were not warmed take half a minute
@@ -59,7 +59,7 @@ class Simulation:
 
     site: SiteFolder
     name: str
-    world: World
+    world: TwinWords
     orders: Orders
     minutes: float
     view: View
@@ -171,7 +171,7 @@ class Simulation:
         self.view.entry(entry)
 
 
-def twin_arguments(name: str, world: World, port_base: int) -> list[str]:
+def twin_arguments(name: str, world: TwinWords, port_base: int) -> list[str]:
     """Of `catseye`, for a child that serves all rangers of a twin and says where in one JSON line."""
     return ["zy", name, *world.options(), f"--port-base={port_base}", "--json", "--leave-with-stdin"]
 

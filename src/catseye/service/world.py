@@ -11,7 +11,7 @@ from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DA
 from catseye.simulator.twin.faults import Fault, FaultBoard
 from catseye.simulator.twin.head import TwinHead
 from catseye.simulator.twin.mirror import MirrorTuning, travel_of
-from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.site import Twin
 
 CONDITIONS = {"night": LIVING_NIGHT, "windy-day": WINDY_DAY, "dewy-night": DEWY_NIGHT}
@@ -19,7 +19,7 @@ MOTION = "track 145.3 45"
 
 
 @dataclass(frozen=True)
-class World:
+class TwinWords:
     """A twin in words.
 
     start_mjd    UTC, where its seconds begin
@@ -40,18 +40,18 @@ class World:
     faults: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        Motion.parse(self.motion)
+        AxisMotion.parse(self.motion)
         for text in self.faults:
             Fault.parse(text)
         if self.conditions not in CONDITIONS:
             raise InputError(f"conditions {self.conditions!r} (expected one of {', '.join(CONDITIONS)})")
 
     @staticmethod
-    def starting_now(start_mjd: float, **others: Any) -> "World":
+    def starting_now(start_mjd: float, **others: Any) -> "TwinWords":
         """One whose time is `start_mjd` at this moment."""
-        return World(start_mjd, offset=SystemClock.starting_at(start_mjd).offset, **others)
+        return TwinWords(start_mjd, offset=SystemClock.starting_at(start_mjd).offset, **others)
 
-    def late(self, seconds: float) -> "World":
+    def late(self, seconds: float) -> "TwinWords":
         """The same, its time so much earlier: what is made ready until then is ready at the start."""
         return replace(self, offset=self.offset - seconds)
 
@@ -68,7 +68,7 @@ class World:
             site,
             seed=self.seed,
             start_mjd=self.start_mjd,
-            motion=Motion.parse(self.motion),
+            motion=AxisMotion.parse(self.motion),
             conditions=CONDITIONS[self.conditions],
             faults=FaultBoard(faults),
         )

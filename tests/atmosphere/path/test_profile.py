@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from catseye.atmosphere.path.mean import covariance_over_height, nodes_along
-from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, TEMPERATURE, Coefficient, Prior, Profile, Readings
+from catseye.atmosphere.path.profile import (
+    HUMIDITY,
+    MOST_READINGS,
+    TEMPERATURE,
+    Coefficient,
+    Profile,
+    ProfilePrior,
+    ProfileReadings,
+)
 from catseye.atmosphere.path.suspect_readings import suspect_readings
 from catseye.errors import EstimationError, ValidityError
 
@@ -18,7 +26,9 @@ def readings(seconds, heights, value):
     """One reading a station and second: `value` (seconds, stations)."""
     t, s = np.meshgrid(np.asarray(seconds, float), np.arange(len(heights)), indexing="ij")
     flat = np.asarray(value, float).ravel()
-    return Readings(t.ravel(), np.asarray(heights, float)[s.ravel()], s.ravel(), flat, np.ones(flat.size, dtype=int))
+    return ProfileReadings(
+        t.ravel(), np.asarray(heights, float)[s.ravel()], s.ravel(), flat, np.ones(flat.size, dtype=int)
+    )
 
 
 def matern_path(rng, coefficient, seconds):
@@ -102,8 +112,8 @@ def test_without_time_and_offsets_it_is_the_weighted_straight_line():
     rng = np.random.default_rng(2)
     z, value = rng.uniform(1, 60, 20), rng.normal(15, 1, 20)
     count = rng.integers(1, 5, 20)
-    prior = Prior(Coefficient(300, 0, 60), Coefficient(10, 0, 60), STILL, offset=0.0, noise=0.2)
-    profile = Profile.of(Readings(np.zeros(20), z, np.arange(20), value, count), prior, ground=0.0)
+    prior = ProfilePrior(Coefficient(300, 0, 60), Coefficient(10, 0, 60), STILL, offset=0.0, noise=0.2)
+    profile = Profile.of(ProfileReadings(np.zeros(20), z, np.arange(20), value, count), prior, ground=0.0)
     design, weight = np.stack([np.ones(20), z], axis=1), np.diag(count / 0.04)
     covariance = np.linalg.inv(design.T @ weight @ design)
     line = covariance @ design.T @ weight @ value
@@ -162,8 +172,8 @@ def test_a_reading_more_never_makes_anything_less_certain(seed):
     rng = np.random.default_rng(seed)
     n = 12
     columns = rng.uniform(0, 7200, n), rng.uniform(1, 50, n), rng.integers(0, 4, n), rng.normal(15, 2, n)
-    all_of = Readings(*columns, np.ones(n, dtype=int))
-    less = Readings(*(c[:-1] for c in columns), np.ones(n - 1, dtype=int))
+    all_of = ProfileReadings(*columns, np.ones(n, dtype=int))
+    less = ProfileReadings(*(c[:-1] for c in columns), np.ones(n - 1, dtype=int))
     asked = rng.uniform(-3600, 10_800, 5), rng.uniform(0, 120, 5)
     more, fewer = (Profile.of(r, TEMPERATURE, ground=0.0) for r in (all_of, less))
     basis = more.basis(asked[1])
@@ -252,7 +262,7 @@ def test_leaving_out_wild_readings_by_turns_is_the_profile_without_them():
     all_of = scene(5, wrong)
     kept = np.arange(240) != 17 * 4 + 2
     found = suspect_readings(Profile.of(all_of, TEMPERATURE, ground=0.0))
-    rest = Readings(*(getattr(all_of, f)[kept] for f in ("seconds", "z", "station", "value", "count")))
+    rest = ProfileReadings(*(getattr(all_of, f)[kept] for f in ("seconds", "z", "station", "value", "count")))
     again = suspect_readings(Profile.of(rest, TEMPERATURE, ground=0.0))
     # the readings' mean moves by 6/240 °C beside a prior of 20 °C, and the mean height by 0.02 m
     np.testing.assert_allclose(found.w[kept], again.w, atol=0.02)
@@ -261,7 +271,7 @@ def test_leaving_out_wild_readings_by_turns_is_the_profile_without_them():
 def test_what_cannot_be_is_refused():
     some = readings([0.0, 60.0], [2.0], [[15.0], [15.0]])
     with pytest.raises(EstimationError, match="no reading at all"):
-        Profile.of(Readings(*(np.zeros(0) for _ in range(5))), TEMPERATURE, ground=0.0)
+        Profile.of(ProfileReadings(*(np.zeros(0) for _ in range(5))), TEMPERATURE, ground=0.0)
     with pytest.raises(ValidityError, match="height above the ground -1 m"):
         Profile.of(some, TEMPERATURE, ground=3.0)
     with pytest.raises(ValidityError, match="height above the ground"):
@@ -270,6 +280,6 @@ def test_what_cannot_be_is_refused():
         Profile.of(readings([0.0], [2.0], [[np.nan]]), HUMIDITY, ground=0.0)
     many = np.zeros(MOST_READINGS + 1)
     with pytest.raises(EstimationError, match="average them over blocks"):
-        Profile.of(Readings(many, many, many.astype(int), many, many + 1), TEMPERATURE, ground=0.0)
+        Profile.of(ProfileReadings(many, many, many.astype(int), many, many + 1), TEMPERATURE, ground=0.0)
     with pytest.raises(ValidityError, match="block of 0"):
         some.averaged(0.0)

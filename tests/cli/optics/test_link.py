@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from catseye.reduction.optics.link import Link, Reflector
+from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.reduction.optics.link_budget import link_budget
 
 
@@ -60,7 +60,7 @@ def test_every_option_is_taken_in_the_unit_of_its_name(catseye):
     )
     expected = link_budget(
         head,
-        Reflector(aperture=15e-3, height=28e-3, index=1.6),
+        LinkReflector(aperture=15e-3, height=28e-3, index=1.6),
         80.0,
         offset=3e-3,
         incidence=math.radians(12.0),

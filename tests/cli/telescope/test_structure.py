@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.coordinator.journal.writer import Journal
 from catseye.gateways.writers.samplers_fits import read_samplers
 from catseye.geometry.antenna.frames import ground_from_reflector
@@ -144,7 +144,7 @@ def journal(tmp_path):
         entries.append(LiveWeather("WX1", ticks, 10.0 + k % 3, 930.0, 50.0))
         x = epoch(rng, e * DEGREE, 10.0 + k % 3)
         answer = {"number": k + 1, "names": list(NAMES), "x": x.tolist(), "azimuth": 2.5, "elevation": e * DEGREE}
-        entries.append(Solution(ticks + 10, answer, 2.5e-9 * np.eye(15)))
+        entries.append(EpochSolution(ticks + 10, answer, 2.5e-9 * np.eye(15)))
     for n in range(1600):
         for ranger, late, gain in (("ZY101", 0, 1.0), ("ZY102", 60, -0.7)):
             ticks = START + 10_000_000 + n * 148 + late

@@ -8,7 +8,7 @@ import pytest
 from catseye.coordinator.clients.board import HELP
 from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers
 from catseye.coordinator.clients.server import KINDS, MOST_CLIENTS, MOST_UNSENT, ZiyServer
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import LONGEST_REQUEST, parse_reply
 from catseye.ranger.server import LOOPBACK
@@ -215,7 +215,7 @@ def test_samplers_keep_the_last_values_with_their_times():
     assert samplers.last("POSTURE", 9) == [("52889.00000000", "1.5", "0.5", "0.0", "0.0")]
     samplers.add(Happening(1, "ZY101", "lost", "gone, for good\n", "alarm"))
     assert samplers.last("EVENTS", 1)[0][1:] == ("alarm", "ZY101", "lost", "gone; for good?")
-    samplers.add(Solution.of(7, Answer(3, 7, used=(1, 2))))
+    samplers.add(EpochSolution.of(7, Answer(3, 7, used=(1, 2))))
     assert samplers.last("EPOCHS", 1)[0][1:] == ("3", "1", "2", "0", "1.1", "none", "none")
     assert samplers.last("POINTS", 1)[0][1:] == ("3", "ZG11", "1.0", "2.0", "3.0")
     for name, columns in COLUMNS.items():

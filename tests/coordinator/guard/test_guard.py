@@ -8,7 +8,7 @@ from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.errors import InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.interlock import Interlock, Interlocks
 from coordinator.round_scene import DAY, DEGREE, MORNING, NIGHT, angle, beams, gbt, keep_out, posture, stands
@@ -131,8 +131,8 @@ def test_a_motor_that_went_off_puts_the_mirror_anywhere_on_its_last_way(guard):
     """It was taken to have arrived, and then its status word says otherwise."""
     sun = toward("ZY101", SUN)
     corner, far = (sun[0] - 3000, sun[1] + 1500), (sun[0] + 3000, sun[1] + 1500)
-    word = Status.AUTO | Status.AZIMUTH_HOMED | Status.ELEVATION_HOMED
-    for off, free in ((Status(0), True), (Status.AZIMUTH_OFF, False), (Status.ELEVATION_OFF, False)):
+    word = StatusWord.AUTO | StatusWord.AZIMUTH_HOMED | StatusWord.ELEVATION_HOMED
+    for off, free in ((StatusWord(0), True), (StatusWord.AZIMUTH_OFF, False), (StatusWord.ELEVATION_OFF, False)):
         guard.stands("ZY101", (sun[0] - 3000, sun[1] - 1500))
         assert said(guard, "ZY101", cil(corner)) is None
         later = MORNING + round(5 * SECOND)
@@ -154,10 +154,10 @@ def test_an_unknown_stand_and_homing(guard):
     for axis in "01":
         fresh.heard("ZY102", Reply("FHM", True, (axis,)))
     assert "ACP" not in (said(fresh, "ZY102", "CIL 0, 100, 100") or "")
-    fresh.heard("ZY102", Reply("STW", True, (f"0x{int(Status.AUTO | Status.AZIMUTH_HOMED):08x}",)))
+    fresh.heard("ZY102", Reply("STW", True, (f"0x{int(StatusWord.AUTO | StatusWord.AZIMUTH_HOMED):08x}",)))
     assert "ACP" in said(fresh, "ZY102", "CIL 0, 100, 100")
     dark = SafetyGuard(gbt())
-    dark.heard("ZY102", Reply("STW", True, (f"0x{int(Status.LASER_OFF):08x}",)))
+    dark.heard("ZY102", Reply("STW", True, (f"0x{int(StatusWord.LASER_OFF):08x}",)))
     assert said(dark, "ZY102", "FHM 0") is None
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.coordinator.journal.writer import Journal
@@ -90,7 +90,7 @@ def recorded(path, solves=6, gain=1.1):
             shot = scene_shot(k)
             journal.append(AnsweredShot.of(shot, live.shot(shot)), Happening(when, "ZY105", "x", "y"))
             if k % 7 == 6:
-                journal.append(Document(when, EPOCH_BEGUN, ""), Solution.of(when, live.solve(when)))
+                journal.append(Document(when, EPOCH_BEGUN, ""), EpochSolution.of(when, live.solve(when)))
         journal.append().result(MOST_WAIT)
     return path
 
@@ -153,7 +153,7 @@ def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
                 journal.append(AnsweredShot(shot, "refused", str(problem)))
             if k % 3 == 2:
                 begun = Document(shot.ticks, EPOCH_BEGUN, "")
-                journal.append(begun, Solution.of(shot.ticks, live.solve(shot.ticks)))
+                journal.append(begun, EpochSolution.of(shot.ticks, live.solve(shot.ticks)))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Failing(site, 1.1)))
     assert len(found) == 13
@@ -180,15 +180,15 @@ def test_the_factory_gets_the_runs_site_and_settings(tmp_path):
 @pytest.mark.parametrize("part", ["ticks", "answer", "covariance", "shape", "none"])
 def test_sameness_is_of_every_part(part):
     answer = {"a": [0.1, None], "b": "x"}
-    one = Solution(5, answer, np.array([[1.0, 2.0], [2.0, 3.0]]))
+    one = EpochSolution(5, answer, np.array([[1.0, 2.0], [2.0, 3.0]]))
     others = {
-        "ticks": Solution(6, answer, one.covariance),
-        "answer": Solution(5, {"a": [np.nextafter(0.1, 1.0).item(), None], "b": "x"}, one.covariance),
-        "covariance": Solution(5, answer, np.array([[1.0, 2.0], [2.0, np.nextafter(3.0, 4.0)]])),
-        "shape": Solution(5, answer, one.covariance.reshape(1, 4)),
-        "none": Solution(5, answer, None),
+        "ticks": EpochSolution(6, answer, one.covariance),
+        "answer": EpochSolution(5, {"a": [np.nextafter(0.1, 1.0).item(), None], "b": "x"}, one.covariance),
+        "covariance": EpochSolution(5, answer, np.array([[1.0, 2.0], [2.0, np.nextafter(3.0, 4.0)]])),
+        "shape": EpochSolution(5, answer, one.covariance.reshape(1, 4)),
+        "none": EpochSolution(5, answer, None),
     }
-    assert one.same(Solution(5, dict(reversed(answer.items())), one.covariance.T.copy()))
+    assert one.same(EpochSolution(5, dict(reversed(answer.items())), one.covariance.T.copy()))
     assert not one.same(others[part])
     assert not others[part].same(one)
     assert not one.same(None)
@@ -216,7 +216,7 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
                 journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
             journal.append(AnsweredShot.of(shot, live.shot(shot)))
             if k % 10 == 8:
-                journal.append(Solution.of(shot.ticks, live.take_in(job, job.solve())))
+                journal.append(EpochSolution.of(shot.ticks, live.take_in(job, job.solve())))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Beside(site, 1.1)))
     assert [replayed.same for replayed in found] == [True] * 3

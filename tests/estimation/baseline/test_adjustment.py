@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from catseye.errors import EstimationError
 from catseye.estimation.baseline.adjustment import adjust_baseline, places_in_line
 from catseye.estimation.baseline.iso17123 import full_test, is_nothing, same_precision, within_claim
-from catseye.estimation.baseline.model import Claim, Extra, Known, Sights
+from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, KnownPlaces
 from draws import draws, same_sigmas
 
 SEVEN = np.array([0.0, 21.0, 87.0, 160.0, 233.0, 402.0, 598.0])
@@ -32,7 +32,7 @@ def sights(x, y, pairs, *, repeats=1, zero=0.0, noise=0.0, systematic=None, effe
     turned = -np.arctan2(y[end] - y[start], x[end] - x[start]) - 0.3 * setup
     direction = np.mod(turned, 2 * np.pi) if aimed else np.full(m, np.nan)
     columns = np.zeros((m, 0)) if systematic is None else systematic(distance)
-    return Sights(start, end, one, setup, distance, np.ones(m), columns, effects, direction, np.full(m, 3e-6))
+    return BaselineSights(start, end, one, setup, distance, np.ones(m), columns, effects, direction, np.full(m, 3e-6))
 
 
 # ---- the full test procedure
@@ -205,7 +205,7 @@ def test_sets_means_give_what_all_shots_together_give():
 def test_known_pillars_tell_scale_and_zero():
     s = sights(SEVEN, OFF, BOTH)
     s = replace(s, distance=s.distance * (1 + 3e-6) - 0.002)
-    known = Known(SEVEN, OFF, np.arange(1, 7), 1e-10 * (np.eye(6) + 0.5))
+    known = KnownPlaces(SEVEN, OFF, np.arange(1, 7), 1e-10 * (np.eye(6) + 0.5))
     found = adjust_baseline(s, SEVEN, OFF, known=known, scale=True, noise=TINY)
     assert found.of("scale")[0] == pytest.approx(3e-6, rel=1e-6)
     assert found.of("zero")[0] == pytest.approx(-0.002, abs=1e-9)

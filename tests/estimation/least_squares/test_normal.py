@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations.kind import Kind
+from catseye.estimation.observations.kind import ObservationKind
 
 
 @dataclass(frozen=True, eq=False)
-class Sums(Kind):
+class Sums(ObservationKind):
     """Each row a sum of its own parameters."""
 
     kind: ClassVar[str] = "linear"

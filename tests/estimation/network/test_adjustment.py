@@ -8,8 +8,15 @@ import pytest
 from catseye.errors import EstimationError
 from catseye.estimation.network import adjustment as network_adjustment
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations.kinds import Azimuths, Coordinates, Directions, Distances, Vectors, ZenithAngles
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
+from catseye.estimation.observations.kinds import (
+    Azimuths,
+    Directions,
+    Distances,
+    ObservedCoordinates,
+    Vectors,
+    ZenithAngles,
+)
 from catseye.estimation.shapes.motions import motions
 
 ENGINES = ("dense", "sparse")
@@ -131,12 +138,12 @@ def test_a_network_in_two_pieces_names_both(ranging_network, engine):
     a, _ = ranging_network(10, stations=5, targets=8)
     b, _ = ranging_network(11, stations=5, targets=9)
     n = len(a.points.names)
-    points = Points(
+    points = NetworkPoints(
         (*a.points.names, *(f"B{name}" for name in b.points.names)),
         *(np.concatenate([getattr(a.points, k), getattr(b.points, k)]) for k in ("xyz", "fixed", "datum")),
     )
     other = replace(b.groups[0], origin=b.groups[0].origin + 3 * n, target=b.groups[0].target + 3 * n)
-    status = adjust_network(Network(points, (), (a.groups[0], other)), engine=engine).status
+    status = adjust_network(ObservationNetwork(points, (), (a.groups[0], other)), engine=engine).status
     assert status.startswith("rank deficient: the network is in 2 pieces")
     assert "S01" in status
     assert "BS01" in status
@@ -194,9 +201,9 @@ def test_a_levelled_theodolite_leaves_shift_turn_and_scale_open():
     zenith = np.arctan2(np.hypot(along[:, 0], along[:, 1]), along[:, 2])
     variance = np.full(21, 1e-10)
     nothing = np.zeros((8, 3), dtype=bool)
-    network = Network(
-        Points(names, true, nothing, nothing),
-        tuple(Parameter(f"orientation {i}", -0.3, unit="rad") for i in range(3)),
+    network = ObservationNetwork(
+        NetworkPoints(names, true, nothing, nothing),
+        tuple(NetworkParameter(f"orientation {i}", -0.3, unit="rad") for i in range(3)),
         (
             Directions("directions", bearing, variance, 3 * origin, 3 * target, columns),
             ZenithAngles("zenith", zenith, variance, 3 * origin, 3 * target),
@@ -232,7 +239,7 @@ def test_stochastic_points_hold_the_datum_with_their_own_uncertainty(ranging_net
     network, true = ranging_network(18)
     nothing = np.zeros_like(network.points.datum)
     u = 2e-3
-    survey = Coordinates.of_points("survey", true[:6], np.full(18, u**2), 3 * np.arange(6))
+    survey = ObservedCoordinates.of_points("survey", true[:6], np.full(18, u**2), 3 * np.arange(6))
     solution = adjust_network(
         replace(network, points=replace(network.points, datum=nothing), groups=(*network.groups, survey))
     )
@@ -253,7 +260,9 @@ def test_zeros_and_scales_are_found_with_their_uncertainty(ranging_network):
     n = true.size
     fixed = np.zeros_like(network.points.fixed)
     fixed[:8] = True
-    parameters = [Parameter(f"zero {i}", unit="m") for i in range(8)] + [Parameter(f"scale {i}") for i in range(8)]
+    parameters = [NetworkParameter(f"zero {i}", unit="m") for i in range(8)] + [
+        NetworkParameter(f"scale {i}") for i in range(8)
+    ]
     changed = replace(ranges, observed=observed, nuisance=(n + station)[:, None], scaling=(n + 8 + station)[:, None])
     points = replace(network.points, xyz=np.where(fixed, true, network.points.xyz), fixed=fixed)
     solution = adjust_network(replace(network, points=points, parameters=tuple(parameters), groups=(changed,)))
@@ -302,7 +311,7 @@ def test_a_target_seen_from_stations_a_millimetre_apart_is_weak_not_floating(eng
     ranges = Distances("ranges", length, np.full(8, 1e-20), 3 * np.arange(8), np.full(8, 24))
     fixed = np.arange(9)[:, None] < np.full(3, 8)
     names = tuple(f"P{i}" for i in range(9))
-    network = Network(Points(names, true, fixed, np.zeros_like(fixed)), (), (ranges,))
+    network = ObservationNetwork(NetworkPoints(names, true, fixed, np.zeros_like(fixed)), (), (ranges,))
     solution = adjust_network(network, engine=engine)
     assert solution.status == "converged"
     along = true[8] / np.linalg.norm(true[8])
@@ -326,7 +335,9 @@ def test_given_coordinates_exchanged_in_the_datum_are_named_though_every_range_f
 def test_points_on_a_line_do_not_turn_about_it():
     true, everywhere = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 3.0]]), np.ones((2, 3), dtype=bool)
     vector = Vectors("v", np.array([10.01, 0.0, 3.0]), np.full(3, 1e-6), np.array([0]), np.array([3]))
-    solution = adjust_network(Network(Points(("A", "B"), true, ~everywhere, everywhere), (), (vector,)))
+    solution = adjust_network(
+        ObservationNetwork(NetworkPoints(("A", "B"), true, ~everywhere, everywhere), (), (vector,))
+    )
     assert solution.status == "converged"
     assert solution.datum.endswith("against shift along x, shift along y, shift along z")
     np.testing.assert_allclose(solution.x, [[-0.005, 0, 0], [10.005, 0, 3]], atol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.errors import EstimationError
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.model import Network, Parameter, Points
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
 from catseye.estimation.network.monte_carlo import Disturbance, measured, scatter
 from catseye.estimation.network.plan import plan, predicted, schedule
 from catseye.estimation.observations.kinds import Vectors, ZenithAngles
@@ -65,7 +65,7 @@ def test_parameters_count_in_the_worth_of_an_observation(ranging_network):
     ranges, n = network.groups[0], network.points.xyz.size
     zeros = replace(ranges, nuisance=(n + ranges.origin // 3)[:, None])
     network = predicted(
-        replace(network, parameters=tuple(Parameter(f"zero {i}", sigma=1e-3) for i in range(8)), groups=(zeros,))
+        replace(network, parameters=tuple(NetworkParameter(f"zero {i}", sigma=1e-3) for i in range(8)), groups=(zeros,))
     )
     worth = plan(network)
     active = np.ones(len(ranges.observed), dtype=bool)
@@ -155,7 +155,7 @@ def test_refraction_lifts_targets_by_its_square_of_distance():
     true = np.array([[0.0, 0.0, 0.0], [300.0, 400.0, 20.0]])
     zenith = ZenithAngles("z", np.zeros(1), np.full(1, 1e-30), np.array([0]), np.array([3]))
     fixed = np.zeros((2, 3), dtype=bool)
-    network = Network(Points(("A", "B"), true, fixed, fixed), (), (zenith,))
+    network = ObservationNetwork(NetworkPoints(("A", "B"), true, fixed, fixed), (), (zenith,))
     draws = [
         measured(network, true.ravel(), np.random.default_rng(seed), Disturbance(refraction=0.2))[0].groups[0].observed
         for seed in range(400)
@@ -170,7 +170,7 @@ def test_correlated_observations_are_drawn_with_their_correlations():
     covariance = lever @ lever.T
     vectors = Vectors("v", np.zeros(6), np.stack([covariance, 4 * covariance]), np.array([0, 0]), np.array([3, 3]))
     nothing = np.zeros((2, 3), dtype=bool)
-    network = Network(Points(("A", "B"), np.zeros((2, 3)), nothing, nothing), (), (vectors,))
+    network = ObservationNetwork(NetworkPoints(("A", "B"), np.zeros((2, 3)), nothing, nothing), (), (vectors,))
     rng = np.random.default_rng(5)
     drawn = np.array([measured(network, np.zeros(6), rng, Disturbance())[0].groups[0].observed for _ in range(3000)])
     found = np.cov(drawn.T)

@@ -7,8 +7,8 @@ import pytest
 
 from catseye.errors import EstimationError
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.model import Parameter
-from catseye.estimation.observations.kinds import Coordinates, Distances, HeightDifferences
+from catseye.estimation.network.model import NetworkParameter
+from catseye.estimation.observations.kinds import Distances, HeightDifferences, ObservedCoordinates
 
 FIELDS = ("active", "residual", "sigma", "redundancy", "standardised", "estimated_error", "detectable_error")
 
@@ -19,12 +19,12 @@ def with_everything(network, true):
     origin = ranges.origin // 3
     zero = np.where(origin < 4, n + origin, -1)[:, None]
     scale = np.where(origin < 4, n + 4 + origin, -1)[:, None]
-    parameters = [Parameter(f"zero {i}", 1e-3, s, "m") for i, s in enumerate((np.inf, 1e-4, 0.0, np.inf))]
-    parameters += [Parameter(f"scale {i}", 0.0, s) for i, s in enumerate((1e-6, np.inf, 1e-6, 0.0))]
+    parameters = [NetworkParameter(f"zero {i}", 1e-3, s, "m") for i, s in enumerate((np.inf, 1e-4, 0.0, np.inf))]
+    parameters += [NetworkParameter(f"scale {i}", 0.0, s) for i, s in enumerate((1e-6, np.inf, 1e-6, 0.0))]
     observed = ranges.observed + np.where(origin < 4, 1e-3, 0.0)
     length = np.linalg.norm(true[6] - true[5])
     between = Distances("between", np.array([length + 2e-5]), np.array([1e-9]), np.array([15]), np.array([18]))
-    survey = Coordinates.of_points(
+    survey = ObservedCoordinates.of_points(
         "survey", true[[1, 2, 12]] + 1e-4, np.array([np.diag([1e-8, 2e-8, 3e-8]) + 5e-9] * 3), 3 * np.array([1, 2, 12])
     )
     changed = replace(ranges, observed=observed, nuisance=zero, scaling=scale)
@@ -113,7 +113,9 @@ def test_other_networks_are_refused_by_name(ranging_network):
         adjust_network(replace(network, groups=(*network.groups, level)), engine="ranging")
     shared = replace(network.groups[0], nuisance=np.full((72, 1), 54))
     with pytest.raises(EstimationError, match="each one station's"):
-        adjust_network(replace(network, parameters=(Parameter("refractivity"),), groups=(shared,)), engine="ranging")
+        adjust_network(
+            replace(network, parameters=(NetworkParameter("refractivity"),), groups=(shared,)), engine="ranging"
+        )
 
 
 def test_a_large_network_takes_it_by_itself_and_falls_back_where_it_has_no_answer(ranging_network):

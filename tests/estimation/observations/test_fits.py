@@ -174,7 +174,7 @@ def test_a_level_set_up_twice_finds_heights_and_lines_of_sight():
 def test_a_two_axis_inclinometer_levels_a_frame_but_does_not_turn_it():
     """Readings of zero on both axes bring the frame's z upright; the turn about it stays where it began."""
     start = (Rotation.from_euler("z", 0.7) * Rotation.from_rotvec([0.2, -0.1, 0.0])).as_matrix()
-    group = kinds.Tilts("tilts", np.zeros(2), np.ones(2), np.eye(3)[:2], np.array([0, 1, -1]), start)
+    group = kinds.ObservedTilts("tilts", np.zeros(2), np.ones(2), np.eye(3)[:2], np.array([0, 1, -1]), start)
     x, _, _, _ = fit([group], np.zeros(3), np.array([0, 1]))
     np.testing.assert_allclose((Rotation.from_rotvec(x).as_matrix() @ start)[:, 2], [0, 0, 1], rtol=0, atol=1e-10)
 
@@ -190,7 +190,7 @@ def test_a_fixed_distance_holds_and_shows_a_contradiction():
 
 def test_errors_common_to_two_kinds_are_taken_once():
     """A height and a height difference with one common error: their difference is known better than either."""
-    height = kinds.Coordinates("height", np.array([10.0]), np.ones(1), np.array([0]), np.array([2]))
+    height = kinds.ObservedCoordinates("height", np.array([10.0]), np.ones(1), np.array([0]), np.array([2]))
     rise = kinds.HeightDifferences("rise", np.array([1.0]), np.ones(1), np.array([0]), np.array([3]))
     covariance = np.array([[1.0, -0.9], [-0.9, 1.0]])
     joint = kinds.Joint.of("joint", (height, rise), covariance)

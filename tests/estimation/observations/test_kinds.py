@@ -46,13 +46,13 @@ def groups(seed):
         kinds.FixedDistances("a", zeros, ones, at, to, shift),
         kinds.Directions("a", rng.uniform(-9, 9, 4), ones, at, to, other[[6, 6, 7, 7]], shift),
         kinds.Azimuths("a", rng.uniform(-9, 9, 4), ones, at, to, shift),
-        kinds.Angles("a", rng.uniform(-9, 9, 4), ones, at, to, third, shift, -shift),
+        kinds.HorizontalAngles("a", rng.uniform(-9, 9, 4), ones, at, to, third, shift, -shift),
         kinds.ZenithAngles("a", ones, ones, at, to, shift, 0.13, missing, True, 50.0),
         kinds.Inclinations("a", zeros, ones, at, to, shift, missing),
-        kinds.Tilts("a", zeros, ones, rng.normal(size=(4, 3)), other[:3], turns[0], missing),
+        kinds.ObservedTilts("a", zeros, ones, rng.normal(size=(4, 3)), other[:3], turns[0], missing),
         kinds.HeightDifferences("a", zeros, ones, at, to, shift),
         kinds.LevelPlanes("a", zeros, ones, at, missing, 0.5),
-        kinds.Coordinates("a", zeros, ones, at, np.array([0, 2, 1, 1])),
+        kinds.ObservedCoordinates("a", zeros, ones, at, np.array([0, 2, 1, 1])),
         kinds.Vectors("a", three[0], np.tile(np.eye(3), (4, 1, 1)), at, to, shift),
         kinds.PointsOnPlane("a", zeros, ones, at, rng.normal(size=3), rng.normal(size=3), other[:3]),
         kinds.PointsOnLine("a", np.zeros(8), np.eye(8), at, rng.normal(size=3), rng.normal(size=3), other[4:8]),
@@ -111,7 +111,7 @@ def test_derivatives_are_those_of_the_values(which, seed):
     made, x = groups(seed)
     group = replace(made[which], observed=made[which].predict(x)[0])  # so that no angle changes its turn on the way
     values, jacobian = group.predict(x)
-    if isinstance(group, kinds.Tilts):  # near the vertical an axis bends faster than differences can follow
+    if isinstance(group, kinds.ObservedTilts):  # near the vertical an axis bends faster than differences can follow
         assume(np.abs(np.sin(values - np.where(group.zero < 0, 0.0, x[group.zero]))).max() < 0.99)
     expected = by_difference(group, x)
     steep = np.maximum(1.0, np.abs(expected).max(axis=1, keepdims=True))
@@ -154,7 +154,7 @@ def test_rows_do_not_know_of_each_other(which):
 
 DIRECTED = (
     kinds.Distances, kinds.HorizontalDistances, kinds.DistanceDifferences, kinds.FixedDistances, kinds.Directions,
-    kinds.Azimuths, kinds.Angles, kinds.ZenithAngles, kinds.Inclinations,
+    kinds.Azimuths, kinds.HorizontalAngles, kinds.ZenithAngles, kinds.Inclinations,
 )  # fmt: skip
 
 
@@ -178,7 +178,7 @@ def test_points_that_coincide_have_no_derivative_in_their_own_row_and_harm_no_ot
 def test_a_point_at_the_centre_of_its_sphere_and_an_upright_axis_have_no_derivative():
     sphere = kinds.PointsOnSphere("s", np.zeros(1), np.ones(1), P[:1], P[1:2], 1.0)
     assert np.isnan(sphere.predict(np.ones(6))[1][0, :6]).all()
-    upright = kinds.Tilts("t", np.zeros(1), np.ones(1), np.array([0.0, 0.0, 1.0]), np.arange(3), np.eye(3))
+    upright = kinds.ObservedTilts("t", np.zeros(1), np.ones(1), np.array([0.0, 0.0, 1.0]), np.arange(3), np.eye(3))
     values, jacobian = upright.predict(np.zeros(3))
     assert np.isnan(values).all()
     assert np.isnan(jacobian[:, :3]).all()
@@ -259,7 +259,7 @@ def test_indices_that_do_not_fit_are_refused():
     with pytest.raises(EstimationError, match=r"row 0 names no point \(column -1\)"):
         kinds.Distances("d", one, one, np.array([-1]), two[1:])
     with pytest.raises(EstimationError, match="an axis is 3, expected 0, 1 or 2"):
-        kinds.Coordinates("c", one, one, two[:1], np.array([3]))
+        kinds.ObservedCoordinates("c", one, one, two[:1], np.array([3]))
 
 
 def test_a_start_that_is_no_rotation_or_no_direction_is_refused():

@@ -39,7 +39,7 @@ def directions(observed=THREE):
 
 
 def corners(observed=THREE):
-    return kinds.Angles("law", observed, ONE, FROM, TO, THIRD)
+    return kinds.HorizontalAngles("law", observed, ONE, FROM, TO, THIRD)
 
 
 def clockwise(x, angle, shift):
@@ -123,7 +123,9 @@ def test_the_angles_round_the_horizon_make_a_full_circle(seed, n):
     targets = np.stack([np.sin(azimuth), np.cos(azimuth), rng.normal(size=n)], axis=1) * rng.uniform(5, 50, (n, 1))
     x = np.concatenate([np.zeros(3), targets.ravel()])
     sighted = 3 * np.arange(1, n + 1)
-    group = kinds.Angles("law", np.full(n, np.pi), np.ones(n), np.zeros(n, int), sighted, np.roll(sighted, -1))
+    group = kinds.HorizontalAngles(
+        "law", np.full(n, np.pi), np.ones(n), np.zeros(n, int), sighted, np.roll(sighted, -1)
+    )
     values = group.predict(x)[0]
     assert np.all((values > 0.0) & (values < 2.0 * np.pi))
     np.testing.assert_allclose(values.sum(), 2.0 * np.pi, rtol=1e-14)
@@ -204,7 +206,7 @@ def test_a_tilt_is_the_inclination_of_the_axis_on_the_ground(seed):
     start = Rotation.random(random_state=rng).as_matrix()
     ground = Rotation.from_rotvec(w).as_matrix() @ start @ axis
     line = kinds.Inclinations("law", np.zeros(1), np.ones(1), np.array([0]), np.array([3]))
-    tilt = kinds.Tilts("law", np.zeros(1), np.ones(1), axis, np.arange(3), start)
+    tilt = kinds.ObservedTilts("law", np.zeros(1), np.ones(1), axis, np.arange(3), start)
     expected = line.predict(np.concatenate([np.zeros(3), ground]))[0]
     np.testing.assert_allclose(tilt.predict(w)[0], expected, rtol=0, atol=1e-13)
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations.kinds import Coordinates, Linear, RigidTriplets
+from catseye.estimation.observations.kinds import Linear, ObservedCoordinates, RigidTriplets
 from catseye.estimation.observations.unit_direction import across
 
 seeds = st.integers(0, 2**32 - 1)
@@ -95,7 +95,7 @@ def test_the_squareness_tells_the_tilt_that_the_prisms_line_can_tell():
     values = body(np.array([0.0, 0.0, 1.0])).predict(x)[0]
     u = np.array([40e-6, 40e-6, 20e-6, 30e-6, 0.25e-3])
     unit = replace(body(np.array([0.0, 0.0, 1.0])), observed=values, covariance=np.diag(u**2)[None])
-    known = Coordinates.of_points("prisms", x[:6], np.full(6, 1e-8), np.array([0, 3]))
+    known = ObservedCoordinates.of_points("prisms", x[:6], np.full(6, 1e-8), np.array([0, 3]))
     prior = Linear("tilts", np.zeros(2), np.full(2, 25e-6), np.array([9, 10]), np.eye(2))
     solution = adjust(x, [unit, known, prior]).require_converged()
     u_tilt = np.sqrt(np.diag(solution.covariance)[9:])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 from catseye.estimation.quality import reliability as r
 
 quick = settings(deadline=None, max_examples=60)
@@ -34,7 +34,9 @@ class Linear:
         on = np.ones(len(errors), dtype=bool) if active is None else active
         u = 1.0 / np.sqrt(self.redundancy)
         v = w[0] / u
-        return Fit("shots", on, v, np.ones(len(v)), self.redundancy, w[0], w[0] * u, NONCENTRALITY * u, float(pvv[0]))
+        return GroupFit(
+            "shots", on, v, np.ones(len(v)), self.redundancy, w[0], w[0] * u, NONCENTRALITY * u, float(pvv[0])
+        )
 
 
 NETWORK = Linear()
@@ -328,7 +330,7 @@ def test_the_unchecked_and_those_left_out_are_named_never_accepted():
     u = 1.0 / np.sqrt(np.maximum(redundancy, 1e-12))
     w = np.array([0.1, -0.4, 1.0, 0.2, 0.0, -9.0, 40.0, 12.0])
     active = np.arange(m) != 7
-    fit = Fit("g", active, w / u, np.ones(m), redundancy, w, w * u, NONCENTRALITY * u, 80.0)
+    fit = GroupFit("g", active, w / u, np.ones(m), redundancy, w, w * u, NONCENTRALITY * u, 80.0)
     tests = r.observation_tests([fit])
     assert tests.tests == 6
     assert tests.verdict[0][6] == r.NOT_CHECKED
@@ -343,7 +345,7 @@ def test_the_unchecked_and_those_left_out_are_named_never_accepted():
 
 def test_an_adjustment_without_any_check_has_no_suspects_and_nothing_accepted():
     u = np.full(3, 1e6)
-    fit = Fit(
+    fit = GroupFit(
         "g", np.ones(3, bool), np.zeros(3), np.ones(3), np.zeros(3), np.zeros(3), np.zeros(3), NONCENTRALITY * u, 0.0
     )
     tests = r.observation_tests([fit])

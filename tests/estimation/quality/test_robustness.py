@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.stats import chi2, norm
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, Fit, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.robustness import WEIGHTS, _Rows, estimate_robustly, snoop
 from draws import draws, same_sigmas
@@ -29,7 +29,7 @@ def fit_of(residual, sigma, inflation, spread):
     error = residual / seen
     u = np.sqrt(np.where(active, variance / seen, variance + spread))
     pvv = float(np.sum((residual**2 / variance)[active]))
-    return Fit("test", active, residual, sigma, r, error / u, error, NONCENTRALITY * u, pvv)
+    return GroupFit("test", active, residual, sigma, r, error / u, error, NONCENTRALITY * u, pvv)
 
 
 class Line:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, Fit
+from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit
 from catseye.estimation.quality.variance_components import (
     GroupFactors,
     RowModel,
@@ -48,7 +48,7 @@ class Dense:
             v, own = c @ p_v @ observed, np.maximum(np.diag(p_v), 1e-30)
             pieces = [np.split(z, cuts) for z in (v, np.sqrt(np.diag(c)), np.diag(p_v @ c), p_v @ observed, own)]
             return [
-                Fit(
+                GroupFit(
                     f"group {i}",
                     np.ones(len(v), bool),
                     v,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.shapes.tomography import LineMeans, Lines, Prior, Scale, line_covariance, tomogram
+from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Scale, line_covariance, tomogram
 
 ROOM = (Scale(1.0, (30.0, 20.0, 5.0)), Scale(0.3, (6.0, 6.0, 3.0)))
 
@@ -70,7 +70,7 @@ def test_points_and_infinite_lengths_are_limits():
 def test_the_estimate_is_that_of_a_fine_grid():
     rng = np.random.default_rng(2)
     at, wanted = lines(rng, 12), lines(rng, 2)
-    prior = Prior(15.0, 3.0, (Scale(1.0, (30.0, 20.0, 9.0)),))
+    prior = FieldPrior(15.0, 3.0, (Scale(1.0, (30.0, 20.0, 9.0)),))
     values, sigma = 15.0 + rng.standard_normal(12), 0.1
     found = tomogram(observed(at, values, sigma), prior).scalar_along(wanted)
     # the same by points: each line as 60 points of a field, their means, ordinary conditioning of Gaussians
@@ -114,8 +114,8 @@ def planted(rng, at, wanted, prior, vector, sigma, design, sigmas):
 def scatter(runs, seed):
     rng = np.random.default_rng(seed)
     prior, vector = (
-        Prior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)),)),
-        Prior(0.0, 4.0, (Scale(0.5, (30.0, 30.0, 30.0)),)),
+        FieldPrior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)),)),
+        FieldPrior(0.0, 4.0, (Scale(0.5, (30.0, 30.0, 30.0)),)),
     )
     at = lines(rng, 20)
     at = Lines(np.vstack([at.start, at.end]), np.vstack([at.end, at.start]))  # both directions
@@ -170,7 +170,7 @@ def test_a_field_of_another_kind_is_found_within_its_claim():
     def mean(at):
         return np.array([np.mean(warm_patch(p + s * (q - p))) for p, q in zip(at.start, at.end, strict=True)])
 
-    prior = Prior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.5, (8.0, 8.0, 4.0))))
+    prior = FieldPrior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.5, (8.0, 8.0, 4.0))))
     ratios, gained = [], []
     for _ in range(12):
         at, wanted = lines(rng, 60), lines(rng, 3)
@@ -187,7 +187,7 @@ def test_a_field_of_another_kind_is_found_within_its_claim():
 def test_a_gross_error_is_named_and_the_rest_is_not():
     rng = np.random.default_rng(6)
     at = lines(rng, 40)
-    prior = Prior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)),))
+    prior = FieldPrior(12.0, 5.0, (Scale(1.0, (25.0, 25.0, 8.0)),))
     k = line_covariance(at, at, prior.scales) + 1e-12 * np.eye(40)
     values = 13.0 + np.linalg.cholesky(k) @ rng.standard_normal(40) + 0.05 * rng.standard_normal(40)
     values[17] += 3.0
@@ -203,7 +203,7 @@ def test_a_gross_error_is_named_and_the_rest_is_not():
 
 def test_lines_far_away_tell_nothing_and_lines_along_tell_all():
     at = Lines(np.array([[0.0, 0.0, 0.0]]), np.array([[50.0, 0.0, 0.0]]))
-    prior = Prior(10.0, 0.0, (Scale(1.0, (10.0, 10.0, 10.0)),))
+    prior = FieldPrior(10.0, 0.0, (Scale(1.0, (10.0, 10.0, 10.0)),))
     found = tomogram(observed(at, [11.0], 1e-6), prior)
     told = found.scalar_along(
         Lines(np.vstack([at.start, [[0.0, 500.0, 0.0]]]), np.vstack([at.end, [[50.0, 500.0, 0.0]]]))
@@ -215,18 +215,22 @@ def test_lines_far_away_tell_nothing_and_lines_along_tell_all():
 @pytest.mark.parametrize(
     ("call", "kind", "complaint"),
     [
-        (lambda at: tomogram(observed(at, [1.0, np.nan], 0.1), Prior(0, 1)), ValidityError, "not a number"),
+        (lambda at: tomogram(observed(at, [1.0, np.nan], 0.1), FieldPrior(0, 1)), ValidityError, "not a number"),
         (
-            lambda at: tomogram(observed(at, [1.0], 0.1), Prior(0, 1)),
+            lambda at: tomogram(observed(at, [1.0], 0.1), FieldPrior(0, 1)),
             ValidityError,
             "start of 1 line means has the shape",
         ),
-        (lambda at: tomogram(observed(at, [1.0, 1.0], 0.1, np.ones(2)), Prior(0, 1)), ValidityError, "vector field"),
-        (lambda at: tomogram(observed(at, [1.0, 1.0], 0.0), Prior(0, 1)), EstimationError, "cannot be told apart"),
+        (
+            lambda at: tomogram(observed(at, [1.0, 1.0], 0.1, np.ones(2)), FieldPrior(0, 1)),
+            ValidityError,
+            "vector field",
+        ),
+        (lambda at: tomogram(observed(at, [1.0, 1.0], 0.0), FieldPrior(0, 1)), EstimationError, "cannot be told apart"),
         (lambda at: Scale(-1.0, (1.0, 1.0, 1.0)), ValidityError, "standard deviation -1"),
         (lambda at: Scale(1.0, (1.0, 0.0, 1.0)), ValidityError, "are not all above 0"),
         (
-            lambda at: tomogram(observed(at, [1.0, 1.0], 0.1), Prior(0, 1)).vector_along(at, np.eye(3)[:2]),
+            lambda at: tomogram(observed(at, [1.0, 1.0], 0.1), FieldPrior(0, 1)).vector_along(at, np.eye(3)[:2]),
             EstimationError,
             "no vector field",
         ),

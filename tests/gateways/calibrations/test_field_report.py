@@ -13,8 +13,8 @@ from catseye.errors import InputError
 from catseye.gateways.calibrations.field_report import MATRIX_CELLS, field_report, mark, sketches
 from catseye.gateways.calibrations.field_report_fields import (
     FORMS,
-    Entry,
-    Field,
+    ReportEntry,
+    ReportField,
     blank_report,
     matrix_uncertainty,
     read_report,
@@ -226,14 +226,14 @@ def test_a_leakage_lost_in_its_u_has_any_phase(full):
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-7, 1e3))
 def test_a_printed_number_is_off_by_a_twentieth_of_its_u_at_most(value, u):
-    text = written_value(Field(Entry("x", "x_mm", "mm"), value, u))
+    text = written_value(ReportField(ReportEntry("x", "x_mm", "mm"), value, u))
     # Two digits of u leave half a unit of the second: 0.05 u at 0.10; 0.0996 is printed 0.10. Floats add 1e-16.
     assert abs(float(text) - value) <= 0.0503 * u + 1e-15 * abs(value)
 
 
 @given(st.floats(-359.0, 359.0))
 def test_degrees_minutes_seconds_read_back(value):
-    text = written_aid(Field(Entry("azimuth", "azimuth_deg", "deg", aid="dms"), value))
+    text = written_aid(ReportField(ReportEntry("azimuth", "azimuth_deg", "deg", aid="dms"), value))
     sign, d, m, s = re.fullmatch(r"(-?)(\d+)° (\d\d)′ (\d\d\.\d)″", text).groups()
     assert int(m) < 60
     assert float(s) < 60.0
@@ -243,18 +243,18 @@ def test_degrees_minutes_seconds_read_back(value):
 
 @pytest.mark.parametrize(("value", "said"), [(-5 * ARCSECOND, "-5.0″"), (30 * ARCSECOND, "+30.0″"), (-1e-9, "+0.0″")])
 def test_small_turns_are_also_said_in_seconds_with_their_sign(value, said):
-    assert written_aid(Field(Entry("α₂", "alpha2_rad", "rad", aid="arcsec"), value)) == said
+    assert written_aid(ReportField(ReportEntry("α₂", "alpha2_rad", "rad", aid="arcsec"), value)) == said
 
 
 def test_a_matrix_has_one_number_of_decimals_and_no_minus_zero():
-    cells = tuple(Field(Entry("γ", "g"), v, u) for v, u in ((-4e-9, 3e-6), (-0.249278, 5e-7), (1.0, 0.0)))
+    cells = tuple(ReportField(ReportEntry("γ", "g"), v, u) for v, u in ((-4e-9, 3e-6), (-0.249278, 5e-7), (1.0, 0.0)))
     assert written_matrix(cells) == ["0.0000000", "-0.2492780", "1.0000000"]
-    assert written_matrix(tuple(Field(Entry("γ", "g"), f.value) for f in cells)) == [
+    assert written_matrix(tuple(ReportField(ReportEntry("γ", "g"), f.value) for f in cells)) == [
         "0.000000",
         "-0.249278",
         "1.000000",
     ]
-    assert written_matrix((Field(Entry("γ", "g"), 0.5, 0.01),)) == ["0.500000"]
+    assert written_matrix((ReportField(ReportEntry("γ", "g"), 0.5, 0.01),)) == ["0.500000"]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal.entries import AnsweredShot, Command, Run, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Run, SentCommand
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
@@ -38,7 +38,7 @@ def rows(path):
 
 def epoch(ticks, covariance):
     answer = {"number": 3, "names": ["ZEG1", "ZEG2"], "x": [[1.0, 2.0, 1 / 3], [4.0, 5.0, None]], "pose": {"a": 1}}
-    return Solution(ticks, {**answer, "variance_factor": 1.1, "degrees_of_freedom": None}, covariance)
+    return EpochSolution(ticks, {**answer, "variance_factor": 1.1, "degrees_of_freedom": None}, covariance)
 
 
 @pytest.fixture(scope="module")
@@ -207,10 +207,10 @@ ENTRIES = {
     "shots": AnsweredShot,
     "weather": LiveWeather,
     "postures": LivePosture,
-    "commands": Command,
+    "commands": SentCommand,
     "happenings": Happening,
-    "solutions": Solution,
-    "coordinates": Solution,
+    "solutions": EpochSolution,
+    "coordinates": EpochSolution,
 }
 
 

@@ -16,7 +16,12 @@ from catseye.errors import EstimationError
 from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.plan import Candidate
-from catseye.gateways.network.comparison import Comparison, comparison_object, comparison_passages, displacements_csv
+from catseye.gateways.network.comparison import (
+    ComparedEpochs,
+    comparison_object,
+    comparison_passages,
+    displacements_csv,
+)
 from catseye.gateways.network.files import input_hashes, write_comparison, write_network
 from catseye.gateways.network.findings import findings
 from catseye.gateways.network.objects import network_json, network_object
@@ -559,7 +564,7 @@ def compared(tmp_path_factory, solution):
     second = adjust_network(read_gama(file))
     names = [n for n in solution.network.points.names if n != "far"]
     moved = compare(solution, second, points=names)
-    return Comparison(findings(solution), findings(second), moved)
+    return ComparedEpochs(findings(solution), findings(second), moved)
 
 
 def test_what_moved_is_told_in_the_axes_of_the_file(compared):

@@ -17,7 +17,7 @@ from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.quality.ellipsoid import PLAN, elevation_view
 from catseye.gateways.network import comparison_report as comparison
 from catseye.gateways.network import figures
-from catseye.gateways.network.comparison import Comparison
+from catseye.gateways.network.comparison import ComparedEpochs
 from catseye.gateways.network.comparison_report import comparison_report
 from catseye.gateways.network.findings import findings
 from catseye.gateways.network.report import network_report
@@ -259,7 +259,7 @@ def compared(tunnel):
     x = solution.x.copy()
     x[solution.index["35"]] += tunnel.network.axes @ (0.0, 0.004, 0.0)
     second = replace(solution, x=x)
-    return Comparison(tunnel, findings(second), compare(solution, second, points=names))
+    return ComparedEpochs(tunnel, findings(second), compare(solution, second, points=names))
 
 
 def test_the_report_of_two_epochs_names_what_moved_and_how_far(compared):

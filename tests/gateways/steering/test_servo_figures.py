@@ -7,7 +7,7 @@ import pytest
 
 from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import SAMPLE_TIME
-from catseye.simulator.servo.axis import Trace
+from catseye.simulator.servo.axis import AxisTrace
 from catseye.simulator.servo.tuning import Plant
 
 
@@ -16,7 +16,7 @@ def trace():
     """A made-up move: a parabola followed with a lag of three counts."""
     t = np.arange(600) * SAMPLE_TIME
     desired = 1e4 * t**2
-    return Trace(t + 5.0, desired, 2e4 * t, np.floor(desired - 3.0), desired * 1e-5, np.sin(t))
+    return AxisTrace(t + 5.0, desired, 2e4 * t, np.floor(desired - 3.0), desired * 1e-5, np.sin(t))
 
 
 def texts(svg: str) -> str:

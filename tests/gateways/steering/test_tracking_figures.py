@@ -7,7 +7,7 @@ import pytest
 
 from catseye.gateways.steering import tracking_figures
 from catseye.gateways.steering.tracking_figures import miss_figure, search_figure, visibility_figure
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.records.site.solids import Solids
 from catseye.reduction.steering.spot_fit import Spot
@@ -23,7 +23,7 @@ from catseye.reduction.steering.tracking import (
 )
 from catseye.reduction.steering.visibility import Sight, frames_at, retroreflectors_of, visibility
 
-STATION = Station([[112.99, 44.28, 0.0]], [[-1.2, 0, 0]], [[0.0, 0.25, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]])
+STATION = MirrorStation([[112.99, 44.28, 0.0]], [[-1.2, 0, 0]], [[0.0, 0.25, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]])
 
 
 def drawn(text):

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import ValidityError
 from catseye.geometry.antenna.deformation import (
-    Motion,
-    Posture,
-    Table,
-    Terms,
+    KnotTable,
+    PostureMotion,
+    PostureTerms,
+    TelescopePosture,
     Validity,
     carried,
     carried_jacobian,
@@ -25,21 +25,23 @@ SIX = st.tuples(*[SMALL] * 6)
 
 def test_terms_are_the_functions_that_their_names_say():
     a, e, t = 1.1, 0.6, -3.0
-    rows = Terms(("1", "sinE", "cos2E", "E^2*t", "sinA", "cos3A*t^2", "t"), 15.0).rows(Posture(a, e, t))
+    rows = PostureTerms(("1", "sinE", "cos2E", "E^2*t", "sinA", "cos3A*t^2", "t"), 15.0).rows(TelescopePosture(a, e, t))
     warm = t - 15.0
     expected = [1.0, np.sin(e), np.cos(2 * e), e**2 * warm, np.sin(a), np.cos(3 * a) * warm**2, warm]
     np.testing.assert_allclose(rows, expected, rtol=1e-15)
 
 
 def test_terms_of_many_postures_have_the_postures_shape():
-    rows = Terms(("1", "cosE", "t"), 15.0).rows(Posture(0.0, np.linspace(0, 1, 5)[:, None], np.array([10.0, 20.0])))
+    rows = PostureTerms(("1", "cosE", "t"), 15.0).rows(
+        TelescopePosture(0.0, np.linspace(0, 1, 5)[:, None], np.array([10.0, 20.0]))
+    )
     assert rows.shape == (5, 2, 3)
 
 
 @pytest.mark.parametrize("term", ["sin", "sinE+1", "E^5", "T", "sinB", "", "cos1E"])
 def test_a_term_that_is_not_known_is_refused_by_name(term):
     with pytest.raises(ValidityError, match="is not known"):
-        Terms((term,), 15.0)
+        PostureTerms((term,), 15.0)
 
 
 def test_a_table_is_the_spline_that_scipy_has():
@@ -48,28 +50,30 @@ def test_a_table_is_the_spline_that_scipy_has():
     values = rng.normal(size=(6, 4))
     spline = RectBivariateSpline(e, t, values, s=0)
     at_e, at_t = np.radians(rng.uniform(0, 95, 50)), rng.uniform(-20, 40, 50)
-    found = Table(e, t).rows(Posture(0.0, at_e, at_t)) @ values.ravel()
+    found = KnotTable(e, t).rows(TelescopePosture(0.0, at_e, at_t)) @ values.ravel()
     np.testing.assert_allclose(found, spline(at_e, at_t, grid=False), rtol=0, atol=1e-12)
 
 
 def test_a_table_gives_its_knots_and_a_cubic_between_them():
     e, t = np.radians(np.linspace(0, 95, 8)), np.array([-10.0, 10.0, 30.0])
-    table = Table(e, t)
+    table = KnotTable(e, t)
 
     def truth(e, t):
         return 1.0 - 0.4 * e + 0.3 * e**3 + 0.01 * t * e + 1e-4 * t**2
 
     values = truth(e[:, None], t).ravel()
-    grid = Posture(0.0, e[:, None], t)
+    grid = TelescopePosture(0.0, e[:, None], t)
     np.testing.assert_allclose(table.rows(grid) @ values, truth(e[:, None], t), rtol=0, atol=1e-13)
-    between = Posture(0.0, np.radians(33.3), 22.2)
+    between = TelescopePosture(0.0, np.radians(33.3), 22.2)
     # a cubic in elevation and a parabola in temperature are in the spline's space
     np.testing.assert_allclose(table.rows(between) @ values, truth(np.radians(33.3), 22.2), rtol=0, atol=1e-12)
 
 
 def test_a_table_of_one_temperature_does_not_depend_on_it():
-    table = Table(np.radians([0.0, 45.0, 90.0]), np.array([15.0]))
-    np.testing.assert_array_equal(table.rows(Posture(0.0, 0.5, -30.0)), table.rows(Posture(0.0, 0.5, 30.0)))
+    table = KnotTable(np.radians([0.0, 45.0, 90.0]), np.array([15.0]))
+    np.testing.assert_array_equal(
+        table.rows(TelescopePosture(0.0, 0.5, -30.0)), table.rows(TelescopePosture(0.0, 0.5, 30.0))
+    )
 
 
 @pytest.mark.parametrize(
@@ -77,25 +81,27 @@ def test_a_table_of_one_temperature_does_not_depend_on_it():
     [(96.0, 0.0, "elevation 96"), (-1.0, 0.0, "elevation"), (50.0, 41.0, "temperature 41 C"), (np.nan, 0.0, "nan")],
 )
 def test_outside_its_range_nothing_is_extrapolated(elevation, temperature, what):
-    table = Table(np.radians([0.0, 50.0, 95.0]), np.array([-20.0, 40.0]))
+    table = KnotTable(np.radians([0.0, 50.0, 95.0]), np.array([-20.0, 40.0]))
     with pytest.raises(ValidityError, match=what):
-        table.rows(Posture(0.0, np.radians(elevation), temperature))
+        table.rows(TelescopePosture(0.0, np.radians(elevation), temperature))
     with pytest.raises(ValidityError, match=what):
         Validity((0.0, np.radians(95.0)), (-20.0, 40.0)).refuse_outside(
-            Posture(0.0, [0.5, np.radians(elevation)], temperature)
+            TelescopePosture(0.0, [0.5, np.radians(elevation)], temperature)
         )
 
 
 def test_the_ends_of_the_range_belong_to_it():
     limits = Validity((np.radians(5.0), np.radians(95.0)), (-20.0, 40.0))
-    limits.refuse_outside(Posture(0.0, 95.0 * np.pi / 180.0, 40.0))
-    table = Table(np.radians([5.0, 95.0]), np.array([-20.0, 40.0]))
-    np.testing.assert_allclose(table.rows(Posture(0.0, np.deg2rad(95.0), 40.0)), [0, 0, 0, 1], rtol=0, atol=1e-12)
+    limits.refuse_outside(TelescopePosture(0.0, 95.0 * np.pi / 180.0, 40.0))
+    table = KnotTable(np.radians([5.0, 95.0]), np.array([-20.0, 40.0]))
+    np.testing.assert_allclose(
+        table.rows(TelescopePosture(0.0, np.deg2rad(95.0), 40.0)), [0, 0, 0, 1], rtol=0, atol=1e-12
+    )
 
 
 def test_knots_that_do_not_rise_are_refused():
     with pytest.raises(ValidityError, match="do not rise"):
-        Table(np.array([0.0, 0.5, 0.4]), np.array([15.0]))
+        KnotTable(np.array([0.0, 0.5, 0.4]), np.array([15.0]))
 
 
 @given(SIX, st.tuples(SMALL, SMALL, SMALL))
@@ -128,10 +134,10 @@ def test_the_left_jacobian_joins_a_change_of_the_vector_to_a_small_turn(turn):
 
 def test_a_motions_covariance_is_the_scatter_of_its_coefficients_and_what_is_left():
     rng = np.random.default_rng(3)
-    basis = Terms(("1", "sinE", "t"), 15.0)
+    basis = PostureTerms(("1", "sinE", "t"), 15.0)
     root = rng.normal(size=(18, 18)) * 1e-4
-    motion = Motion(basis, np.zeros((6, 3)), np.zeros(3), np.full(6, 2e-4), root @ root.T)
-    posture = Posture(0.0, 0.7, 18.0)
+    motion = PostureMotion(basis, np.zeros((6, 3)), np.zeros(3), np.full(6, 2e-4), root @ root.T)
+    posture = TelescopePosture(0.0, 0.7, 18.0)
     draws = (root @ rng.standard_normal((18, 20_000))).T.reshape(-1, 6, 3)
     six = draws @ basis.rows(posture) + 2e-4 * rng.standard_normal((20_000, 6))
     claimed = motion.six_covariance(posture)
@@ -144,4 +150,4 @@ def test_a_motions_covariance_is_the_scatter_of_its_coefficients_and_what_is_lef
 
 def test_a_motion_of_wrong_shape_is_refused():
     with pytest.raises(ValidityError, match="motion of 2 functions"):
-        Motion(Terms(("1", "t"), 15.0), np.zeros((6, 3)), np.zeros(3), np.ones(6))
+        PostureMotion(PostureTerms(("1", "t"), 15.0), np.zeros((6, 3)), np.zeros(3), np.ones(6))

@@ -5,7 +5,15 @@ from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
 from catseye.geometry.clearance import keep_out
-from catseye.geometry.clearance.keep_out import TOUCH, Box, Cone, EntryStatus, clearances, first_entry, servo_margin
+from catseye.geometry.clearance.keep_out import (
+    TOUCH,
+    BoxZone,
+    ConeZone,
+    EntryStatus,
+    clearances,
+    first_entry,
+    servo_margin,
+)
 from catseye.geometry.mirror.pointing import ray
 from catseye.geometry.mirror.slew import straight, trapezoid
 from sun_scene import PACE, STATION, apart, random_counts
@@ -27,14 +35,14 @@ def surface(box, n=60):
 
 
 def test_a_cone_by_hand():
-    cone = Cone([0, 0, 2], 5 * DEGREE)
+    cone = ConeZone([0, 0, 2], 5 * DEGREE)
     d = np.array([[np.sin(a), 0, np.cos(a)] for a in np.array([0, 3, 5, 65, 180]) * DEGREE])
     assert cone.clearance(d) / DEGREE == pytest.approx([-5, -2, 0, 60, 175], abs=1e-6)
 
 
 def test_a_moving_cone_is_at_both_ends_in_time_and_no_faster_than_it_says():
     a, b = unit(np.array([1.0, 0, 0])), unit(np.array([np.cos(0.3), np.sin(0.3), 0]))
-    cone = Cone(a, 0.0, b)
+    cone = ConeZone(a, 0.0, b)
     assert cone.clearance(a, 0.0) == 0
     assert cone.clearance(b, 1.0) == pytest.approx(0, abs=1e-15)
     share = np.linspace(0, 1, 1001)
@@ -45,10 +53,10 @@ def test_a_moving_cone_is_at_both_ends_in_time_and_no_faster_than_it_says():
 
 
 BOXES = [
-    Box([10, 3, 1], [4, 6, 2], 0.4),
-    Box([-5, 0, 0], [0.5, 0.5, 30], -1.0),
-    Box([0, 40, 20], [70, 1, 12], 0.0),
-    Box([3, -4, 2], [6, 6, 3], 0.7),
+    BoxZone([10, 3, 1], [4, 6, 2], 0.4),
+    BoxZone([-5, 0, 0], [0.5, 0.5, 30], -1.0),
+    BoxZone([0, 40, 20], [70, 1, 12], 0.0),
+    BoxZone([3, -4, 2], [6, 6, 3], 0.7),
 ]
 
 
@@ -59,7 +67,7 @@ def test_the_clearance_is_the_least_angle_to_points_of_the_box(box, reach):
     points = surface(box) - origin
     size = np.linalg.norm(points, axis=-1)
     length = np.inf if np.isinf(reach) else (size.min() * reach if reach > 1 else 0.999 * size.min())
-    limited = Box(box.centre, box.size, box.turn, length)
+    limited = BoxZone(box.centre, box.size, box.turn, length)
     d = unit(np.random.default_rng(3).normal(size=(300, 3)))
     d[:100] = unit(unit(points[:: len(points) // 100][:100]) + 0.1 * d[:100])
     found = limited.clearance(origin, d)
@@ -82,7 +90,7 @@ def test_the_clearance_is_the_least_angle_to_points_of_the_box(box, reach):
 
 def test_the_rim_of_a_limited_beam_is_exact():
     # A wide floor 3 m under the scan point and a beam of 5 m: the circle is at acos(3/5) from the nadir.
-    floor = Box([0, 0, -4], [100, 100, 2], 0.0, 5.0)
+    floor = BoxZone([0, 0, -4], [100, 100, 2], 0.0, 5.0)
     angles = np.array([30.0, 53.0, 54.0, 90.0, 180.0]) * DEGREE
     d = np.stack([np.sin(angles), np.zeros(5), -np.cos(angles)], axis=-1)
     expected = np.maximum(angles - np.arccos(3 / 5), 0)
@@ -90,10 +98,10 @@ def test_the_rim_of_a_limited_beam_is_exact():
 
 
 def test_the_length_of_the_beam_ends_it():
-    box = Box([10, 0, 0], [2, 2, 2])
+    box = BoxZone([10, 0, 0], [2, 2, 2])
     forward = np.array([1.0, 0, 0])
     for length, hit in ((8.9, np.inf), (9.1, 0.0)):
-        assert Box(box.centre, box.size, 0.0, length).clearance(np.zeros(3), forward) == hit
+        assert BoxZone(box.centre, box.size, 0.0, length).clearance(np.zeros(3), forward) == hit
     assert box.clearance(np.zeros(3), -forward) == pytest.approx(
         np.pi - np.arctan2(np.hypot(1, 1), 9)
     )  # half-line only
@@ -101,15 +109,15 @@ def test_the_length_of_the_beam_ends_it():
 
 def test_inside_the_box_every_direction_is_refused():
     d = unit(np.random.default_rng(1).normal(size=(50, 3)))
-    assert np.all(Box([0, 0, 0], [2, 2, 2], 0.3).clearance([0.5, 0.5, 0.9], d) == 0)
-    assert np.all(Box([0, 0, 0], [2, 2, 2]).clearance([1.0, 0.0, 0.0], d) == 0)  # on its face
+    assert np.all(BoxZone([0, 0, 0], [2, 2, 2], 0.3).clearance([0.5, 0.5, 0.9], d) == 0)
+    assert np.all(BoxZone([0, 0, 0], [2, 2, 2]).clearance([1.0, 0.0, 0.0], d) == 0)  # on its face
 
 
 def test_a_box_turns_from_x_to_y():
-    box = Box([0, 0, 0], [20, 0.2, 0.2], 90 * DEGREE)
+    box = BoxZone([0, 0, 0], [20, 0.2, 0.2], 90 * DEGREE)
     origin = np.array([0.0, -30.0, 0.0])
     assert box.clearance(origin, [0.0, 1.0, 0.0]) == 0
-    tilted = Box([0, 0, 0], [20, 0.2, 0.2], 30 * DEGREE)
+    tilted = BoxZone([0, 0, 0], [20, 0.2, 0.2], 30 * DEGREE)
     tip = np.array([9.9 * np.cos(30 * DEGREE), 9.9 * np.sin(30 * DEGREE), 0])
     assert tilted.clearance(origin, unit(tip - origin)) == 0
     assert tilted.clearance(origin, unit(tip * [1, -1, 1] - origin)) > 0.05
@@ -118,7 +126,7 @@ def test_a_box_turns_from_x_to_y():
 @given(st.integers(0, 2**31))
 def test_no_clearance_shrinks_faster_than_the_beam_turns(seed):
     rng = np.random.default_rng(seed)
-    box = Box(rng.normal(size=3) * 10, rng.uniform(0.3, 9, 3), rng.uniform(-3, 3), rng.choice([np.inf, 8.0]))
+    box = BoxZone(rng.normal(size=3) * 10, rng.uniform(0.3, 9, 3), rng.uniform(-3, 3), rng.choice([np.inf, 8.0]))
     a = unit(rng.normal(size=(200, 3)))
     b = unit(a + rng.uniform(0, 0.3, (200, 1)) * rng.normal(size=(200, 3)))
     found = [box.clearance(np.zeros(3), d) for d in (a, b)]
@@ -138,7 +146,7 @@ def test_the_sphere_about_a_box_promises_no_more_than_there_is():
 
 
 def test_clearances_are_one_for_each_zone():
-    cone = Cone([0, 0, 1.0], 0.1)
+    cone = ConeZone([0, 0, 1.0], 0.1)
     found = clearances([cone, *BOXES], np.zeros(3), unit(np.ones((7, 3))))
     assert found.shape == (7, 5)
     assert clearances([], np.zeros(3), np.ones((7, 3))).shape == (7, 0)
@@ -149,7 +157,7 @@ def test_a_slew_over_a_cone_enters_when_it_reaches_the_edge():
     ne = STATION.zeros[1] + 12_500
     middle = ray(STATION, [20_000, ne]).direction
     move = straight([0, ne], [40_000, ne], 40.0)
-    found = first_entry(STATION, move, [Cone(middle, 5 * DEGREE)])
+    found = first_entry(STATION, move, [ConeZone(middle, 5 * DEGREE)])
     assert found.status == EntryStatus.ENTERS
     edge = 20 - 5 / 360 * 1e5 / 1000
     assert edge - 0.03 < found.time < edge + 1e-9  # TOUCH, 10", is 0.8 ms; the looks close in on it
@@ -160,10 +168,10 @@ def test_what_passes_beside_a_cone_is_free_and_what_starts_inside_says_so():
     ne = STATION.zeros[1] + 12_500
     beside = ray(STATION, [20_000, ne + 5.01 / 720 * 1e5]).direction
     move = straight([0, ne], [40_000, ne], 40.0)
-    assert first_entry(STATION, move, [Cone(beside, 5 * DEGREE)]).status == EntryStatus.FREE
-    assert first_entry(STATION, move, [Cone(beside, 5.02 * DEGREE)]).status == EntryStatus.ENTERS
-    assert first_entry(STATION, move, [Cone(beside, 5 * DEGREE)], 0.02 * DEGREE).status == EntryStatus.ENTERS
-    inside = first_entry(STATION, move, [Cone(ray(STATION, [10, ne]).direction, 5 * DEGREE)])
+    assert first_entry(STATION, move, [ConeZone(beside, 5 * DEGREE)]).status == EntryStatus.FREE
+    assert first_entry(STATION, move, [ConeZone(beside, 5.02 * DEGREE)]).status == EntryStatus.ENTERS
+    assert first_entry(STATION, move, [ConeZone(beside, 5 * DEGREE)], 0.02 * DEGREE).status == EntryStatus.ENTERS
+    inside = first_entry(STATION, move, [ConeZone(ray(STATION, [10, ne]).direction, 5 * DEGREE)])
     assert inside.status == EntryStatus.STARTS_INSIDE
     assert inside.time == 0
     assert first_entry(STATION, move, []).status == EntryStatus.FREE
@@ -175,12 +183,12 @@ def test_a_zone_that_comes_to_a_standing_beam_is_seen():
     side = unit(np.cross(d, [0, 0, 1.0]))
     away = unit(d + 0.5 * side)
     hold = straight(n, n, 100.0)
-    cone = Cone(away, 0.1, unit(d - 0.5 * side))
+    cone = ConeZone(away, 0.1, unit(d - 0.5 * side))
     found = first_entry(STATION, hold, [cone])
     assert found.status == EntryStatus.ENTERS
     share = found.time / 100.0
     assert cone.clearance(d, share) == pytest.approx(TOUCH, abs=TOUCH)
-    assert first_entry(STATION, hold, [Cone(away, 0.1)]).status == EntryStatus.FREE
+    assert first_entry(STATION, hold, [ConeZone(away, 0.1)]).status == EntryStatus.FREE
 
 
 def batch(n, seed=7):
@@ -190,10 +198,10 @@ def batch(n, seed=7):
     later = unit(sun + 1e-3 * rng.normal(size=(n, 3)))
     half = np.where(rng.random(n) < 0.1, -np.inf, 0.09)
     boxes = [
-        Box(np.add(STATION.scan_point, [30, 10, -5]), [8, 20, 9], 0.3, 200.0),
-        Box(np.add(STATION.scan_point, [0, -20, 4]), [3, 3, 2]),
+        BoxZone(np.add(STATION.scan_point, [30, 10, -5]), [8, 20, 9], 0.3, 200.0),
+        BoxZone(np.add(STATION.scan_point, [0, -20, 4]), [3, 3, 2]),
     ]
-    return moves, [boxes[0], Cone(sun, half, later), boxes[1]]
+    return moves, [boxes[0], ConeZone(sun, half, later), boxes[1]]
 
 
 def test_the_kernel_answers_as_the_plain_form(monkeypatch):
@@ -218,7 +226,7 @@ def test_dense_looks_find_the_same_entries():
         gap = np.min(
             [
                 z[i].clearance(d, time / max(moves.total[i], 1e-9))
-                if isinstance(z, Cone)
+                if isinstance(z, ConeZone)
                 else z.clearance(STATION.scan_point, d)
                 for z in zones
             ],
@@ -244,11 +252,11 @@ def test_the_servo_margin_covers_any_error_of_that_size():
 @pytest.mark.parametrize(
     ("act", "said"),
     [
-        (lambda: Cone([0, 0, 0], 0.1), "points somewhere"),
-        (lambda: Cone([0, 0, 1], 5.0), "check its unit"),
-        (lambda: Box([0, 0, 0], [1, -1, 1]), "sizes"),
-        (lambda: Box([0, 0], [1, 1, 1]), "box"),
-        (lambda: Box([0, 0, 0], [1, 1, 1], 0.0, 0.0), "box"),
+        (lambda: ConeZone([0, 0, 0], 0.1), "points somewhere"),
+        (lambda: ConeZone([0, 0, 1], 5.0), "check its unit"),
+        (lambda: BoxZone([0, 0, 0], [1, -1, 1]), "sizes"),
+        (lambda: BoxZone([0, 0], [1, 1, 1]), "box"),
+        (lambda: BoxZone([0, 0, 0], [1, 1, 1], 0.0, 0.0), "box"),
         (lambda: servo_margin([1.0, -2.0]), "margin"),
         (lambda: first_entry(STATION[None], trapezoid([0, 0], [1, 1], PACE), []), "one ranger"),
     ],

@@ -10,19 +10,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import ValidityError
-from catseye.geometry.clearance.solids import Box, Cone, Dish, Sphere
+from catseye.geometry.clearance.solids import Dish, SolidBox, SolidCone, SolidSphere
 
 STEPS = 4001
 SHARE = np.linspace(0.0, 1.0, STEPS)
 
 
 def inside(solid, x):
-    if isinstance(solid, Box):
+    if isinstance(solid, SolidBox):
         own = Rotation.from_euler("z", -solid.turn).apply(x - np.asarray(solid.centre))
         return np.all(np.abs(own) <= np.asarray(solid.size) / 2, axis=-1)
-    if isinstance(solid, Sphere):
+    if isinstance(solid, SolidSphere):
         return np.linalg.norm(x - np.asarray(solid.centre), axis=-1) <= solid.radius
-    if isinstance(solid, Cone):
+    if isinstance(solid, SolidCone):
         foot, top = np.asarray(solid.start), np.asarray(solid.end)
         share = (x - foot) @ (top - foot) / np.sum((top - foot) ** 2)
         off = np.linalg.norm(np.cross(x - foot, (top - foot) / np.linalg.norm(top - foot)), axis=-1)
@@ -36,15 +36,15 @@ def inside(solid, x):
 def random_solid(rng, kind):
     centre = rng.uniform(-20, 20, 3)
     if kind == "box":
-        return Box(centre, rng.uniform(1, 30, 3), rng.uniform(-4, 4))
+        return SolidBox(centre, rng.uniform(1, 30, 3), rng.uniform(-4, 4))
     if kind == "sphere":
-        return Sphere(centre, rng.uniform(0.5, 20))
+        return SolidSphere(centre, rng.uniform(0.5, 20))
     if kind == "cylinder":
         r = rng.uniform(0.5, 10)
-        return Cone(centre, centre + rng.normal(0, 15, 3), r, r)
+        return SolidCone(centre, centre + rng.normal(0, 15, 3), r, r)
     if kind == "cone":
         r = rng.uniform(0.0, 12, 2)
-        return Cone(centre, centre + rng.normal(0, 15, 3), *(r if rng.random() < 0.7 else (r[0] + 1, 0.0)))
+        return SolidCone(centre, centre + rng.normal(0, 15, 3), *(r if rng.random() < 0.7 else (r[0] + 1, 0.0)))
     return Dish(rng.uniform(5, 60), rng.uniform(-10, 30, 2), rng.uniform(5, 30), below=rng.uniform(0.5, 5), above=0.2)
 
 
@@ -100,7 +100,11 @@ def test_an_infinitely_thin_dish_is_met_on_its_surface():
 
 
 def test_a_path_that_begins_inside_hits_at_once_and_one_that_ends_before_does_not():
-    for solid in (Box((0, 0, 0), (2, 2, 2)), Sphere((0, 0, 0), 1.0), Cone((0, 0, -1), (0, 0, 1), 1.0, 0.5)):
+    for solid in (
+        SolidBox((0, 0, 0), (2, 2, 2)),
+        SolidSphere((0, 0, 0), 1.0),
+        SolidCone((0, 0, -1), (0, 0, 1), 1.0, 0.5),
+    ):
         assert solid.first_hit([0.1, 0.0, 0.2], [9.0, 9.0, 9.0]) == 0.0
         assert np.isinf(solid.first_hit([9.0, 0.0, 0.0], [1.5, 0.0, 0.0]))
         assert np.isinf(solid.first_hit([9.0, 0.0, 0.0], [18.0, 0.0, 0.0]))
@@ -109,13 +113,13 @@ def test_a_path_that_begins_inside_hits_at_once_and_one_that_ends_before_does_no
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Box((0, 0, 0), (1, 0, 1)), "of a box is not above 0"),
-        (lambda: Box((0, 0), (1, 1, 1)), "is not three finite numbers"),
-        (lambda: Sphere((0, 0, np.nan), 1.0), "is not three finite numbers"),
-        (lambda: Sphere((0, 0, 0), -1.0), "radius -1.0 m is not above 0"),
-        (lambda: Cone((1, 1, 1), (1, 1, 1), 1, 1), "same point"),
-        (lambda: Cone((0, 0, 0), (1, 1, 1), 1, -1), "is below 0"),
-        (lambda: Cone((0, 0, 0), (1, 1, 1), 0, 0), "larger radius"),
+        (lambda: SolidBox((0, 0, 0), (1, 0, 1)), "of a box is not above 0"),
+        (lambda: SolidBox((0, 0), (1, 1, 1)), "is not three finite numbers"),
+        (lambda: SolidSphere((0, 0, np.nan), 1.0), "is not three finite numbers"),
+        (lambda: SolidSphere((0, 0, 0), -1.0), "radius -1.0 m is not above 0"),
+        (lambda: SolidCone((1, 1, 1), (1, 1, 1), 1, 1), "same point"),
+        (lambda: SolidCone((0, 0, 0), (1, 1, 1), 1, -1), "is below 0"),
+        (lambda: SolidCone((0, 0, 0), (1, 1, 1), 0, 0), "larger radius"),
         (lambda: Dish(0.0, (0, 0), 1), "focal length"),
         (lambda: Dish(1.0, (0, 0, 0), 1), "aperture centre"),
         (lambda: Dish(1.0, (0, 0), 1, below=-1.0), "thickness"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.clearance.solids import Box, Cone, Dish, Sphere
+from catseye.geometry.clearance.solids import Dish, SolidBox, SolidCone, SolidSphere
 from catseye.geometry.clearance.visibility import first_obstruction, incidence, ranges
 
 
@@ -24,9 +24,9 @@ def test_the_first_of_several_solids_is_named_as_points_along_the_path_find_it()
     """Solids taken one by one, points every 2 mm; the batch must name the one that comes first."""
     rng = np.random.default_rng(5)
     solids = [
-        Sphere((0.0, 0.0, 0.0), 8.0),
-        Box((20.0, 5.0, 0.0), (6.0, 30.0, 10.0), 0.4),
-        Cone((-20.0, 0.0, -30.0), (-20.0, 0.0, 30.0), 3.0, 6.0),
+        SolidSphere((0.0, 0.0, 0.0), 8.0),
+        SolidBox((20.0, 5.0, 0.0), (6.0, 30.0, 10.0), 0.4),
+        SolidCone((-20.0, 0.0, -30.0), (-20.0, 0.0, 30.0), 3.0, 6.0),
         Dish(20.0, (0.0, 0.0), 30.0, below=0.5),
     ]
     s, t = rng.uniform(-60, 60, (12, 3)), rng.uniform(-60, 60, (15, 3))
@@ -53,12 +53,12 @@ def test_the_first_of_several_solids_is_named_as_points_along_the_path_find_it()
 
 
 def _inside(solid, x):
-    if isinstance(solid, Sphere):
+    if isinstance(solid, SolidSphere):
         return np.sum((x - solid.centre) ** 2, axis=1) < solid.radius**2
     if isinstance(solid, Dish):
         g = x[:, 2] - np.sum(x[:, :2] ** 2, axis=1) / (4 * solid.focal_length)
         return (np.hypot(x[:, 0], x[:, 1]) < solid.aperture_radius) & (g < 0.0) & (g > -solid.below)
-    if isinstance(solid, Cone):  # upright, as the one above
+    if isinstance(solid, SolidCone):  # upright, as the one above
         share = (x[:, 2] - solid.start[2]) / (solid.end[2] - solid.start[2])
         radius = solid.start_radius + share * (solid.end_radius - solid.start_radius)
         return (share > 0) & (share < 1) & (np.hypot(x[:, 0] - solid.start[0], x[:, 1] - solid.start[1]) < radius)
@@ -69,7 +69,7 @@ def _inside(solid, x):
 
 
 def test_what_is_near_the_ends_is_not_in_the_way():
-    wall = Box((5.0, 0.0, 0.0), (1.0, 10.0, 10.0))
+    wall = SolidBox((5.0, 0.0, 0.0), (1.0, 10.0, 10.0))
     s, t = [[4.2, 0.0, 0.0]], [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]]
     assert first_obstruction(s, t, [wall])[0].tolist() == [[0, 0]]
     assert first_obstruction(s, t, [wall], clear_start=0.25, clear_end=0.6)[0].tolist() == [[-1, 0]]

@@ -12,7 +12,7 @@ from catseye.geometry.mirror.imperfect import (
     imperfect_ray,
 )
 from catseye.geometry.mirror.mirror_path import beam_angles
-from catseye.geometry.mirror.pointing import Station, counts, in_mirror_axes, ray
+from catseye.geometry.mirror.pointing import MirrorStation, counts, in_mirror_axes, ray
 
 NONE = Imperfections(np.zeros(4), np.zeros(3), np.zeros((2, 0)), np.zeros((2, 0)))
 ALL = Imperfections(
@@ -21,7 +21,7 @@ ALL = Imperfections(
     np.array([[3.0, -1.0], [2.0, 0.5]]),
     np.array([[-2.0, 0.7], [1.5, 0.2]]),
 )
-STATION = Station([5.0, 20.0, 0.0], [1.0, 1e-4, -2e-4], [1e-4, 0.25, -3e-4], [7e-4, -2e-4], [-4195, -4935])
+STATION = MirrorStation([5.0, 20.0, 0.0], [1.0, 1e-4, -2e-4], [1e-4, 0.25, -3e-4], [7e-4, -2e-4], [-4195, -4935])
 
 
 def points(n, seed=0):
@@ -66,14 +66,14 @@ def test_offsets_alone_turn_the_beam_as_the_path_formula_says():
 def test_a_tilted_laser_beam_turns_the_beam_as_its_image_in_the_face_does():
     """Straight ahead (Phi = 0) the beam comes back: leaning in by t it leaves leaning the other way."""
     tilted = Imperfections(np.zeros(4), np.array([0.0, 2e-3, 0.0]), np.zeros((2, 0)), np.zeros((2, 0)))
-    flat = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+    flat = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     u = flat.mirror_from_ground @ imperfect_ray(flat, tilted, [0.0, 0.0]).direction
     np.testing.assert_allclose(u, [-2e-3, 0.0, np.sqrt(1 - 4e-6)], rtol=0, atol=1e-15)
 
 
 def test_a_tilted_face_sends_the_beam_aside_by_twice_its_tilt_towards_the_axis():
     tilted = Imperfections(np.zeros(4), np.array([1e-3, 0.0, 0.0]), np.zeros((2, 0)), np.zeros((2, 0)))
-    flat = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+    flat = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     u = flat.mirror_from_ground @ imperfect_ray(flat, tilted, [0.0, 0.0]).direction
     np.testing.assert_allclose(u, [0.0, np.sin(2e-3), np.cos(2e-3)], rtol=0, atol=1e-15)
     # in the prime setting the face leans the other way: half the difference of the two tells the tilt
@@ -83,7 +83,7 @@ def test_a_tilted_face_sends_the_beam_aside_by_twice_its_tilt_towards_the_axis()
 
 def test_encoder_errors_are_read_where_the_axis_stands():
     waves = Imperfections(np.zeros(4), np.zeros(3), np.array([[3.0], [0.0]]), np.array([[0.0], [5.0]]))
-    flat = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+    flat = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     east = np.array([100.0, 0.0, 0.0])  # Theta = 0, Phi = 90 deg: the mirror itself has turned by 45
     assert imperfect_counts(flat, waves, east) == pytest.approx([3.0, 12_500.0 + 5.0 * np.sin(np.pi / 4)], abs=1e-9)
     assert imperfect_counts(flat, waves, east, prime=True) == pytest.approx(

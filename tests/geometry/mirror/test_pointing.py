@@ -11,7 +11,7 @@ from catseye.geometry.mirror.encoder import prime_counts
 from catseye.geometry.mirror.mount import gamma, lambda_, mount_angles
 from catseye.geometry.mirror.pointing import (
     PARAMETERS,
-    Station,
+    MirrorStation,
     aim,
     counts,
     counts_covariance,
@@ -22,7 +22,7 @@ from catseye.geometry.mirror.pointing import (
 )
 from draws import draws
 
-ZY3 = Station(
+ZY3 = MirrorStation(
     np.array([5586.2, 20850.0, -5.8]) * 1e-3,
     [1.008848, -0.000024, 0.000145],
     np.array([-0.075, 247.459, -0.762]) * 1e-3,
@@ -64,7 +64,7 @@ def test_counts_are_those_of_the_notes_own_program(point):
 
 
 def stations(n, rng, tilt=0.01):
-    return Station(
+    return MirrorStation(
         rng.uniform(-120, 120, (n, 3)),
         np.stack([rng.uniform(-np.pi, np.pi, n), *rng.normal(0, tilt, (2, n))], axis=1),
         np.array([0.0, 0.25, 0.0]) + rng.normal(0, 0.01, (n, 3)),
@@ -122,13 +122,15 @@ def test_angles_come_back_from_a_mount_turned_anyhow():
 def test_a_moving_rangers_station_stands_as_its_matrix_says():
     rng = np.random.default_rng(5)
     g, at = Rotation.random(50, rng=rng).as_matrix(), rng.uniform(-100, 100, (50, 3))
-    station = Station.from_matrix(at, g, offset=[1e-3, 0.25, -2e-3], beta=[1e-3, -5e-4], zeros=[7.0, 8.0])
+    station = MirrorStation.from_matrix(at, g, offset=[1e-3, 0.25, -2e-3], beta=[1e-3, -5e-4], zeros=[7.0, 8.0])
     np.testing.assert_allclose(station.scan_point, at, rtol=0, atol=1e-13)
     np.testing.assert_allclose(station.gamma, g, rtol=0, atol=1e-14)
 
 
 def test_a_mirrors_beam_along_its_axes():
-    flat = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))  # z^ looks south, y^ up, x^ east
+    flat = MirrorStation(
+        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2)
+    )  # z^ looks south, y^ up, x^ east
     for point, theta, phi in (((0, -9, 0), 0, 0), ((9, 0, 0), 0, 90), ((0, 0, 9), 90, 90), ((0, 0, -9), -90, 90)):
         found = aim(flat, np.array(point, float))
         assert [float(found.theta), float(found.phi)] == pytest.approx(np.radians([theta, phi]), abs=1e-15)
@@ -144,7 +146,7 @@ def test_derivatives_are_finite_differences():
         np.testing.assert_allclose(by_point[..., k], slope, rtol=1e-5, atol=1e-4)
     for k in range(len(PARAMETERS)):
         step = 1e-5 * np.eye(13)[k]
-        ahead, behind = (Station.of_parameters(station.parameters + s * step) for s in (1, -1))
+        ahead, behind = (MirrorStation.of_parameters(station.parameters + s * step) for s in (1, -1))
         slope = (counts(ahead, points) - counts(behind, points)) / 2e-5
         np.testing.assert_allclose(by_station[..., k], slope, rtol=1e-5, atol=1e-3, err_msg=PARAMETERS[k])
         at = counts(station, points)
@@ -165,7 +167,7 @@ def test_claimed_covariance_is_the_scatter_of_the_counts():
     point, u_point = np.array([-20.0, 60.0, 50.0]), 3e-3
     claimed = counts_covariance(ZY3, point, of_station=np.diag(u**2), of_points=np.eye(3) * u_point**2)
     n = 100_000
-    drawn = Station.of_parameters(ZY3.parameters + rng.normal(size=(n, 13)) * u)
+    drawn = MirrorStation.of_parameters(ZY3.parameters + rng.normal(size=(n, 13)) * u)
     scattered = np.cov(counts(drawn, point + rng.normal(size=(n, 3)) * u_point).T)
     scale = np.sqrt(np.diag(claimed))
     # 5 sigma of a sample covariance of 10^5 draws
@@ -178,7 +180,7 @@ def test_claimed_covariance_of_a_ray_is_its_scatter():
     at, u_counts = counts(ZY3, np.array([-20.0, 60.0, 50.0])), 0.29
     claimed = ray_covariance(ZY3, at, of_station=np.diag(u**2), of_counts=np.eye(2) * u_counts**2)
     n = 100_000
-    drawn = Station.of_parameters(ZY3.parameters + rng.normal(size=(n, 13)) * u)
+    drawn = MirrorStation.of_parameters(ZY3.parameters + rng.normal(size=(n, 13)) * u)
     scattered = np.cov(np.concatenate(ray(drawn, at + rng.normal(size=(n, 2)) * u_counts), axis=-1).T)
     scale = np.sqrt(np.diag(claimed))
     np.testing.assert_allclose(scattered / np.outer(scale, scale), claimed / np.outer(scale, scale), atol=5 * 0.0045)
@@ -196,7 +198,7 @@ def test_the_compiled_form_gives_what_the_plain_form_gives():
 
 
 def test_the_compiled_form_keeps_quadrants_axes_and_batch_shapes():
-    flat = Station(np.zeros((2, 1, 3)), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+    flat = MirrorStation(np.zeros((2, 1, 3)), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     axes = np.array([[s * v for v in row] for row in np.eye(3) for s in (1, -1)] + [[1, 1, 1], [-1, -2, 3], [0, 0, 0]])
     plain, fast = (counts(flat, axes, compiled=choice) for choice in (False, True))
     assert fast.shape == (2, 9, 2)
@@ -220,14 +222,14 @@ def test_stations_are_indexed_as_arrays_are():
     station = stations(4, np.random.default_rng(9))
     assert station[:, None].shape == (4, 1)
     np.testing.assert_array_equal(station[2].scan_point, station.scan_point[2])
-    np.testing.assert_array_equal(Station.of_parameters(station.parameters).parameters, station.parameters)
+    np.testing.assert_array_equal(MirrorStation.of_parameters(station.parameters).parameters, station.parameters)
 
 
 def test_wrong_shapes_and_numbers_are_refused_in_one_line():
     with pytest.raises(ValidityError, match=r"alpha has shape \(2,\), expected \(..., 3\)"):
-        Station(np.zeros(3), np.zeros(2), np.zeros(3), np.zeros(2), np.zeros(2))
+        MirrorStation(np.zeros(3), np.zeros(2), np.zeros(3), np.zeros(2), np.zeros(2))
     with pytest.raises(ValidityError, match="beta of a station holds a number that is not finite"):
-        Station(np.zeros(3), np.zeros(3), np.zeros(3), [np.nan, 0.0], np.zeros(2))
+        MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), [np.nan, 0.0], np.zeros(2))
     for call in (counts, aim, counts_jacobian):
         with pytest.raises(ValidityError, match=r"points have shape \(2,\)"):
             call(ZY3, np.zeros(2))
@@ -236,4 +238,4 @@ def test_wrong_shapes_and_numbers_are_refused_in_one_line():
     with pytest.raises(ValidityError, match=r"counts have shape \(3,\)"):
         ray(ZY3, np.zeros(3))
     with pytest.raises(ValidityError, match=r"parameters of a station have shape \(12,\)"):
-        Station.of_parameters(np.zeros(12))
+        MirrorStation.of_parameters(np.zeros(12))

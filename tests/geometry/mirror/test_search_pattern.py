@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import Station, beam
+from catseye.geometry.mirror.pointing import MirrorStation, beam
 from catseye.geometry.mirror.search_pattern import (
     count_size,
     counts_of_offsets,
@@ -16,7 +16,7 @@ from catseye.geometry.mirror.search_pattern import (
 )
 
 ZEROS = np.array([2691.0, 1434.0])
-STATION = Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], ZEROS)
+STATION = MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], ZEROS)
 DIRECT, PRIME = np.array([9000.3, 11_000.7]), np.array([59_000.3, 2 * 1434 - 11_000.7])
 OPEN = (-1e6, 1e6)
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import Station, counts, in_mirror_axes
+from catseye.geometry.mirror.pointing import MirrorStation, counts, in_mirror_axes
 from catseye.geometry.mirror.track import (
     BEAM_PER_COUNT,
     apparent_motion,
@@ -21,7 +21,7 @@ from catseye.geometry.mirror.track import (
     miss,
 )
 
-STATION = Station([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
+STATION = MirrorStation([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
 
 
 def test_a_count_is_as_large_as_the_manual_says():
@@ -39,7 +39,7 @@ def test_a_line_passes_through_both_ends_and_its_middle():
 
 @pytest.mark.parametrize("turn", [-np.pi / 2, np.pi / 2])
 def test_a_target_that_crosses_where_theta_wraps_makes_no_jump(turn):
-    flat = Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [500.0, 0.0])
+    flat = MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [500.0, 0.0])
     mirror = np.array([[np.cos(turn + a), np.sin(turn + a), 0.5] for a in (-0.01, 0.01)]) * 100.0
     ends = mirror @ flat.mirror_from_ground
     n = counts(flat, ends)
@@ -117,7 +117,7 @@ def test_the_first_order_estimate_is_what_happens_over_a_short_interval(seed):
     if np.hypot(*p[:2]) < 30.0:
         p[:2] = 40.0
     v, a, h = rng.uniform(-1, 1, 3), rng.uniform(-0.05, 0.05, 3), 0.128
-    flat = Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0.0, 0.0])
+    flat = MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0.0, 0.0])
     points = (p + v * np.array([[0.0], [h / 2], [h]]) + 0.5 * a * np.array([[0.0], [h / 2], [h]]) ** 2) @ (
         flat.mirror_from_ground
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.files.readings import TEXT, Layout, Sheet, read_readings
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, read_readings
 from catseye.records.files.record import Within
 
 
@@ -14,7 +14,7 @@ class Weather(Sheet):
     temperature_c: Annotated[float, Within(-40, 60)] | None = None
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     "thing",
     Weather,
     required={"range_m": Within(0.5, 100)},

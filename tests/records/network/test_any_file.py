@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.estimation.observations.kinds import Coordinates, Distances
+from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.records.files.columns import columns_of
 from catseye.records.network.any_file import read_network
 from repository import ROOT, TESTS
@@ -72,7 +72,7 @@ def test_a_prior_is_an_observation_and_without_error_it_holds(tmp_path):
     points = "point,x,y,z,role,u_x,u_y,u_z\nS1,0,0,0,datum,0.001,0.002,0\nT1,3,4,5,free,,,\n"
     network = read_network(folder(tmp_path, points, "from,to,distance,sigma\nS1,T1,7.07,0.001\n"))
     prior = network.groups[1]
-    assert isinstance(prior, Coordinates)
+    assert isinstance(prior, ObservedCoordinates)
     assert prior.component.tolist() == ["x", "y"]
     assert np.allclose(prior.covariance, [1e-6, 4e-6])
     assert network.points.fixed.tolist() == [[False, False, True], [False] * 3]

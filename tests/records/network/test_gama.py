@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Joint, Vectors
 from catseye.records.network.gama import AXES, gama_network, read_gama
-from catseye.records.network.gama_xml import GON, Element, band_matrix
+from catseye.records.network.gama_xml import GON, XmlElement, band_matrix
 from repository import TESTS
 
 VECTORS = TESTS / "vectors" / "networks"
@@ -251,7 +251,7 @@ def test_a_banded_matrix_is_read_as_it_was_written(size, data):
         for j in range(i, min(size, i + band + 1)):
             matrix[i, j] = matrix[j, i] = next(values)
             words.append(str(int(matrix[i, j])))
-    element = Element("cov-mat", {"dim": str(size), "band": str(band)}, 1, text="\n".join(words))
+    element = XmlElement("cov-mat", {"dim": str(size), "band": str(band)}, 1, text="\n".join(words))
     assert np.array_equal(band_matrix("n.gkf", element, size), matrix)
 
 

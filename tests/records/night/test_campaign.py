@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from catseye.errors import InputError
 from catseye.records.night.campaign import read_campaign, refuse_times
-from catseye.records.night.shot import Shot
+from catseye.records.night.shot import ShotRow
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -112,7 +112,7 @@ def test_a_shot_is_refused_from_an_hour_beside_the_weather(night, late, taken):
     """Late after the last reading of any station, or before the first: s. Until then the air there is carried on."""
     mjd = night.weather.mjd_utc
     when = float(mjd.max() if late > 0.0 else mjd.min()) + late / 86_400.0
-    shot = Shot(shot=1, mjd_utc=when, ranger="ZY101", target="ZRG", cycles=128, samples_per_cycle=64, frame=0)
+    shot = ShotRow(shot=1, mjd_utc=when, ranger="ZY101", target="ZRG", cycles=128, samples_per_cycle=64, frame=0)
     if taken:
         refuse_times(night, [shot])
     else:

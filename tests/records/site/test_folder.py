@@ -18,7 +18,7 @@ from catseye.records.files.toml_text import record_toml
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.folder import SiteFolder, read_site, site_files
 from catseye.records.site.mirror import Mirror
-from catseye.records.site.target import Target, Targets
+from catseye.records.site.target import TargetRow, Targets
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"
@@ -98,7 +98,7 @@ def test_every_optional_key_of_a_record_survives(night_01, tmp_path):
     st.floats(0, 1000, exclude_min=True) | st.none(),
 )
 def test_every_position_survives_the_file_to_the_last_bit(tmp_path_factory, position, u):
-    target = Target(name="T", type="hollow", frame="ground", position_mm=tuple(position), u_position_mm=u)
+    target = TargetRow(name="T", type="hollow", frame="ground", position_mm=tuple(position), u_position_mm=u)
     path = tmp_path_factory.getbasetemp() / "one_target.toml"
     path.write_text(record_toml(Targets(target=(target,))), encoding="utf-8")
     back = read_record(path, Targets).target[0]

@@ -6,7 +6,7 @@ import pytest
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.atmosphere.sound.speed import sound
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.shapes.tomography import Prior, Scale
+from catseye.estimation.shapes.tomography import FieldPrior, Scale
 from catseye.reduction.air.acoustic import NO_TIME, OUTSIDE, USED
 from catseye.reduction.air.acoustic_field import COMMON, sound_field
 
@@ -18,8 +18,8 @@ STATIONS = np.array(
 SOURCE, RECEIVER = np.array([(i, j) for i in range(9) for j in range(9) if i != j]).T
 LASER = np.array([[5.0, 5.0, 3.0], [75.0, 55.0, 12.0]])
 WEATHER = {"pressure_hpa": P, "u_pressure_hpa": 0.3, "humidity_percent": H, "u_humidity_percent": 3.0}
-TEMPERATURE = Prior(15.0, 8.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.4, (8.0, 8.0, 4.0))))
-WIND = Prior(
+TEMPERATURE = FieldPrior(15.0, 8.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.4, (8.0, 8.0, 4.0))))
+WIND = FieldPrior(
     0.0, 6.0, (Scale(0.8, (40.0, 40.0, 6.0)),)
 )  # a layer on the ground: smoother ones make suspects of low paths
 NODES = (np.arange(400) + 0.5) / 400
@@ -122,7 +122,7 @@ def test_every_cause_moves_the_observations_by_its_column(cause):
 
     def seen(places=STATIONS, late=0.0, **weather):
         even = heard(places, lambda q: np.full(q.shape[:-1], 17.0), lambda q: np.broadcast_to(wind, q.shape), **weather)
-        return inverted(even + late, wind=Prior(0.0, 6.0)).tomogram.observations
+        return inverted(even + late, wind=FieldPrior(0.0, 6.0)).tomogram.observations
 
     base, beta = seen(), np.zeros(27 + len(COMMON))
     if cause == "place":
@@ -160,7 +160,7 @@ def test_a_wrong_time_is_named_and_bad_ones_are_left_out():
 
 def test_a_prior_that_does_not_fit_is_said_to_claim_too_little():
     assert inverted(heard(STATIONS)).fit == "fits"
-    stiff = Prior(15.0, 8.0, (Scale(0.05, (80.0, 80.0, 40.0)),))
+    stiff = FieldPrior(15.0, 8.0, (Scale(0.05, (80.0, 80.0, 40.0)),))
     said = inverted(heard(STATIONS), temperature=stiff).fit
     assert said.startswith("chi-square")
     assert "give larger scales" in said
@@ -186,7 +186,7 @@ def test_still_air_needs_no_wind():
 @pytest.mark.parametrize(
     ("change", "kind", "complaint"),
     [
-        ({"temperature": Prior(15.0, 0.0)}, ValidityError, "leaves nothing to find"),
+        ({"temperature": FieldPrior(15.0, 0.0)}, ValidityError, "leaves nothing to find"),
         ({"pressure_hpa": 93300.0}, ValidityError, "pressure 93300 hPa is outside"),
         ({"delay": 0.9}, EstimationError, "no travel time of 72 is that of sound in air"),
     ],
@@ -215,7 +215,7 @@ def test_a_path_from_a_station_to_itself_is_refused():
         ({"u_position": np.nan}, "u_position is not a number"),
         ({"u_humidity_percent": -3.0}, "u_humidity_percent -3"),
         (
-            {"temperature": Prior(15.0, 8.0, (Scale(1.0, (0.01, 0.01, 0.01)),))},
+            {"temperature": FieldPrior(15.0, 8.0, (Scale(1.0, (0.01, 0.01, 0.01)),))},
             "correlation lengths is longer than 500",
         ),
     ],

@@ -9,9 +9,9 @@ from catseye.errors import InputError
 from catseye.records.night.weather import Weather
 from catseye.reduction.air.path_air import site_air, site_readings
 from catseye.reduction.epoch.air import AirField
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import places_of
-from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, Air
+from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, TrueAir
 
 
 def shots_of(campaign, every=5):
@@ -43,7 +43,7 @@ def test_night_01_is_the_same_as_the_campaigns_own_air_within_what_is_claimed(ni
     air = site_air(night_01.site, night_01.weather, model="rueger1990")
     assert air.notes == ()
     found = air.along(when, a, b)
-    other = AirField.of(night_01, Settings()).along(when, a, b, np.zeros(3)).refractivity
+    other = AirField.of(night_01, ReductionSettings()).along(when, a, b, np.zeros(3)).refractivity
     apart = (found.refractivity - other) * 1e6
     u = np.sqrt(np.diag(found.covariance)) * 1e6
     # the module's docstring states these; 0.02 ppm is what every fifth shot may differ from all
@@ -62,7 +62,7 @@ def test_the_simulated_sites_paths_are_found_within_the_claim(night_01, conditio
     every = np.arange(-180.0, 4000.0, 60.0)
     ratios = []
     for _ in range(12):
-        world = Air(
+        world = TrueAir(
             dataclasses.replace(
                 conditions,
                 surface_layer_c=rng.normal(0, 0.5),

@@ -18,7 +18,7 @@ from catseye.reduction.budget.inputs import items_of
 from catseye.reduction.budget.scene import Assumptions, scene_of, walk_of
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.buffers import inspect_buffers
@@ -55,7 +55,7 @@ def sight(reduced_night_01):
 
     def scene(campaign, shot, *, phases=None, settings=None, assumptions=None, place=None):
         row = int(np.flatnonzero(campaign.shots.shot == shot)[0])
-        settings = settings or Settings()
+        settings = settings or ReductionSettings()
         phases = phases or measure_phases(campaign, settings)
         names = campaign.shots.ranger[row], campaign.shots.target[row]
         ends = tuple(coordinates.x[coordinates.index(name)] for name in names)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibration_scene import PROVENANCE
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 
 
 @pytest.fixture(scope="session")
@@ -13,7 +13,7 @@ def table():
 
     def made(layout, numbers, words=None, left_out=None, **sheet):
         m = len(next(iter(numbers.values())))
-        return Readings(
+        return SheetReadings(
             file="t.csv",
             sheet=layout.sheet.model_validate({"kind": layout.kind, **PROVENANCE, **sheet}),
             sheet_file="t.toml",

@@ -4,7 +4,7 @@ from datetime import date
 
 import numpy as np
 
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 
 WHO = {
     "instrument": "G7",
@@ -21,7 +21,7 @@ def readings(sheet, kind, *, numbers=None, words=None, left_out=None, **keys):
     numbers = {name: np.asarray(values, dtype=float) for name, values in (numbers or {}).items()}
     words = {name: tuple(values) for name, values in (words or {}).items()}
     m = len(next(iter({**numbers, **words}.values())))
-    return Readings(
+    return SheetReadings(
         file="readings.csv",
         sheet=sheet(kind=kind, **WHO, **keys),
         sheet_file="readings.toml",

@@ -6,7 +6,7 @@ from scipy import optimize, stats
 
 from calibration_scene import RUNS
 from catseye.errors import EstimationError
-from catseye.reduction.calibrations.fit import Effect, Scatter, fit_readings
+from catseye.reduction.calibrations.fit import Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 
@@ -20,7 +20,7 @@ def test_effects_with_priors_are_a_larger_covariance():
     design, rng = line()
     y = rng.standard_normal(12)
     effects = [Effect("a", design[:, 1] ** 2, 0.7), Effect("b", np.ones(12), 0.4), Effect("none", np.ones(12), 0.0)]
-    fit = fit_readings(y, design, Scatter(0.25 * np.eye(12)), names=["p", "q"], effects=effects)
+    fit = fit_readings(y, design, ObservedScatter(0.25 * np.eye(12)), names=["p", "q"], effects=effects)
     c = 0.25 * np.eye(12) + sum(e.u**2 * np.outer(e.column, e.column) for e in effects)
     w = np.linalg.inv(c)
     q = np.linalg.inv(design.T @ w @ design)
@@ -33,7 +33,7 @@ def test_effects_with_priors_are_a_larger_covariance():
 def test_an_unknown_scatter_is_that_of_least_squares():
     design, rng = line(30)
     y = design @ [1.0, 2.0] + 0.3 * rng.standard_normal(30)
-    fit = fit_readings(y, design, Scatter(np.zeros((30, 30)), {"s": np.eye(30)}), names=["p", "q"])
+    fit = fit_readings(y, design, ObservedScatter(np.zeros((30, 30)), {"s": np.eye(30)}), names=["p", "q"])
     found = stats.linregress(design[:, 1], y)
     assert fit.x == pytest.approx([found.intercept, found.slope], rel=1e-10)
     assert np.sqrt(np.diag(fit.covariance)) == pytest.approx([found.intercept_stderr, found.stderr], rel=1e-6)
@@ -54,7 +54,7 @@ def test_an_unknown_scatter_beside_effects_is_the_top_of_the_restricted_likeliho
         return 0.5 * (np.linalg.slogdet(c)[1] + np.linalg.slogdet(normal)[1] + y @ p @ y)
 
     top = optimize.minimize_scalar(cost, bounds=(-12.0, 2.0), method="bounded", options={"xatol": 1e-8})
-    unknown = Scatter(np.zeros((15, 15)), {"s": np.eye(15)})
+    unknown = ObservedScatter(np.zeros((15, 15)), {"s": np.eye(15)})
     fit = fit_readings(y, design, unknown, names=["p", "q"], effects=[Effect("e", column, u)])
     assert fit.components["s"] == pytest.approx(np.exp(0.5 * top.x), rel=1e-5)
 
@@ -90,7 +90,7 @@ def test_false_alarms_come_as_often_as_the_level_says(runs):
     alarms = {"w": 0, "tau": 0}
     for _ in range(runs):
         y = rng.standard_normal(20)
-        for scatter in (Scatter(np.eye(20)), Scatter(np.zeros((20, 20)), {"s": np.eye(20)})):
+        for scatter in (ObservedScatter(np.eye(20)), ObservedScatter(np.zeros((20, 20)), {"s": np.eye(20)})):
             fit = fit_readings(y, design, scatter, names=["p", "q"], level=0.05)
             alarms[fit.test] += bool(fit.suspects.any())
     # Šidák's level is slightly safe with correlations: less than the slack of the count.
@@ -103,14 +103,14 @@ def test_the_test_of_the_scatter_fails_where_the_claim_is_wrong():
     y = rng.standard_normal(40)
     outcomes = {}
     for claim in (0.5, 1.0, 2.0):
-        fit = fit_readings(y, design, Scatter(claim**2 * np.eye(40)), names=["p", "q"])
+        fit = fit_readings(y, design, ObservedScatter(claim**2 * np.eye(40)), names=["p", "q"])
         outcomes[claim] = fit.decisions()[0].passed
     assert outcomes == {0.5: False, 1.0: True, 2.0: False}
 
 
 def test_readings_that_are_all_the_same_show_no_scatter():
     same = np.full(3, 38.4)  # whose mean is not 38.4 but for rounding
-    unknown = Scatter(np.zeros((3, 3)), {"s": np.eye(3)})
+    unknown = ObservedScatter(np.zeros((3, 3)), {"s": np.eye(3)})
     with pytest.raises(EstimationError, match="do not scatter at all; state the scatter's standard uncertainty"):
         fit_readings(same, np.ones((3, 1)), unknown, names=["p"], effects=[Effect("e", np.ones(3), 0.1)])
 
@@ -119,29 +119,31 @@ def test_what_cannot_be_rejected_is_refused():
     design, rng = line(12, 7)
     y = 50.0 * rng.standard_normal(12)
     with pytest.raises(EstimationError, match="more than 33% of the readings would have to be rejected"):
-        fit_readings(y, design, Scatter(np.eye(12)), names=["p", "q"], reject=True)
+        fit_readings(y, design, ObservedScatter(np.eye(12)), names=["p", "q"], reject=True)
     with pytest.raises(EstimationError, match="rank deficient: p, twice p not held"):
-        fit_readings(y, design[:, [0, 0]], Scatter(np.eye(12)), names=["p", "twice p"])
+        fit_readings(y, design[:, [0, 0]], ObservedScatter(np.eye(12)), names=["p", "twice p"])
 
 
 def test_an_alternative_value_leaves_with_its_partner():
     design, _ = line(12, 8)
     y = np.zeros(12)
     y[3] = 9.0
-    fit = fit_readings(y, design, Scatter(np.eye(12)), names=["p", "q"], reject=True, together=np.tile(np.arange(6), 2))
+    fit = fit_readings(
+        y, design, ObservedScatter(np.eye(12)), names=["p", "q"], reject=True, together=np.tile(np.arange(6), 2)
+    )
     assert np.flatnonzero(~fit.active).tolist() == [3, 9]
     assert fit.state(("",) * 12)[9] == "rejected"
 
 
 def test_groups_of_readings_that_agree_to_the_last_digit_say_what_is_missing():
     same = np.kron(np.eye(3), np.ones((4, 4)))
-    scatter = Scatter(np.zeros((12, 12)), {"one": np.eye(12), "group": same})
+    scatter = ObservedScatter(np.zeros((12, 12)), {"one": np.eye(12), "group": same})
     with pytest.raises(EstimationError, match="of one group agree to the last digit"):
         fit_readings(np.repeat([1.0, 1.1, 0.9], 4), np.ones((12, 1)), scatter, names=["mean"])
 
 
 def test_the_rounding_of_differences_is_no_scatter():
     rounding = np.array([1.0, -2.0, 1.0, 3.0]) * 1e-16
-    scatter = Scatter(np.zeros((4, 4)), {"s": np.eye(4)}, size=3.0)
+    scatter = ObservedScatter(np.zeros((4, 4)), {"s": np.eye(4)}, size=3.0)
     with pytest.raises(EstimationError, match="do not scatter at all"):
         fit_readings(rounding, np.ones((4, 1)), scatter, names=["mean"])

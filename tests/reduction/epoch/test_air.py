@@ -11,7 +11,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.night.weather import Weather
 from catseye.reduction.epoch.air import AirField
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 Z0 = 806.42  # m above sea level, night-01's
 
@@ -47,7 +47,7 @@ def at(start, *seconds):
 def test_a_line_in_time_is_left_a_line_right_up_to_its_ends(night_01):
     campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + i - s / 1800)
     times = (0.0, 1.0, 77.0, 1800.0, 3599.0, 3600.0)
-    smooth = AirField.of(campaign, Settings()).smoothed(at(start, *times))
+    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, *times))
     expected = np.array([[10 - s / 1800, 11 - s / 1800] for s in times])
     # 1e-6 °C: the Modified Julian Day resolves a microsecond
     np.testing.assert_allclose(smooth[:, :, 0], expected, atol=1e-6)
@@ -59,27 +59,29 @@ def test_noise_of_a_reading_every_30_s_falls_to_a_sixth(night_01):
     campaign, start = weathered(
         night_01, [0.0, 40.0], np.arange(0.0, 36001.0, 30.0), lambda s, i: noise.setdefault((s, i), rng.normal())
     )
-    smooth = AirField.of(campaign, Settings()).smoothed(at(start, *np.arange(3000.0, 33000.0, 100.0)))[:, :, 0]
+    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, *np.arange(3000.0, 33000.0, 100.0)))[:, :, 0]
     # theory: sqrt(30 / (2 sqrt(pi) 300)) = 0.168; 2 x 30000 s / 1060 s of independent values: 10 % of scatter
     assert smooth.std() == pytest.approx(0.168, rel=0.25)
 
 
 def test_beyond_the_samples_the_air_stays_as_it_was_last_without_a_jump(night_01):
     campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 1801.0, 30.0), lambda s, i: 10 - s / 600)
-    smooth = AirField.of(campaign, Settings()).smoothed(at(start, -3600, -0.01, 0.01, 1799.99, 1800.01, 1e5))[:, 0, 0]
+    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, -3600, -0.01, 0.01, 1799.99, 1800.01, 1e5))[
+        :, 0, 0
+    ]
     np.testing.assert_allclose(smooth, [10, 10, 10, 7, 7, 7], atol=1e-3)
 
 
 def test_in_a_gap_of_hours_the_nearest_samples_still_count(night_01):
     seconds = [0.0, 30.0, 60.0, 20000.0, 20030.0]
     campaign, start = weathered(night_01, [0.0, 40.0], seconds, lambda s, i: 10 + s / 10000)
-    smooth = AirField.of(campaign, Settings()).smoothed(at(start, 10000.0))[0, 0, 0]
+    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, 10000.0))[0, 0, 0]
     assert smooth == pytest.approx(11.0, abs=1e-6)
 
 
 def test_a_single_sample_holds_for_ever(night_01):
     campaign, start = weathered(night_01, [0.0, 40.0], [100.0], lambda s, i: 7.0 + i)
-    smooth = AirField.of(campaign, Settings()).smoothed(at(start, -5e4, 100.0, 5e4))
+    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, -5e4, 100.0, 5e4))
     np.testing.assert_array_equal(smooth[:, :, 0], [[7.0, 8.0]] * 3)
 
 
@@ -93,7 +95,7 @@ def paths(m=6):
 @pytest.mark.parametrize("heights", [(-2.6, 43.7), (-2.6, 20.0, 43.7), (10.0,), (10.0, 12.0)])
 def test_slopes_are_the_derivatives_of_the_refractivity(night_01, heights):
     campaign, start = weathered(night_01, heights, np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + 0.4 * i - s / 3600)
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     a, b = paths()
     when = at(start, *np.linspace(100, 3000, len(a)))
     base = np.array([*[0.2, -0.1, 0.15][: len(heights)], 0.002])
@@ -109,7 +111,7 @@ def test_slopes_are_the_derivatives_of_the_refractivity(night_01, heights):
 
 def test_two_stations_make_a_straight_profile_and_pressure_falls_by_0_11_hpa_a_metre(night_01):
     campaign, start = weathered(night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 30.0), lambda s, i: 10 + 2.0 * i)
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     # a path of no slope: the value at its height; both stations read 900 hPa, so 900 holds half-way
     for z in (-5.0, 0.0, 20.0, 40.0, 100.0):
         end = np.array([[50.0, 0.0, z]])
@@ -123,7 +125,7 @@ def test_two_stations_make_a_straight_profile_and_pressure_falls_by_0_11_hpa_a_m
 def test_three_stations_are_levelled_by_their_line(night_01):
     line = [5.0, 5.5, 6.5]
     campaign, start = weathered(night_01, [0.0, 10.0, 30.0], [0.0, 3600.0], lambda s, i: line[i])
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     two, start = weathered(night_01, [0.0, 30.0], [0.0, 3600.0], lambda s, i: (5.0, 6.5)[i])
     a, b = paths()
     when = at(start, *[100.0] * len(a))
@@ -136,15 +138,15 @@ def test_three_stations_are_levelled_by_their_line(night_01):
     np.testing.assert_allclose(field.along(when, a, b, np.zeros(4)).refractivity, exact, atol=1e-11)
     assert field.names == ("S0", "S1", "S2", "bend")
     assert field.steepest(np.zeros(3)) == pytest.approx(0.05, abs=1e-12)
-    assert AirField.of(two, Settings()).names == ("S0", "S1", "bend")
+    assert AirField.of(two, ReductionSettings()).names == ("S0", "S1", "bend")
 
 
 @pytest.mark.parametrize("heights", [(5.0,), (5.0, 5.0), (5.0, 9.9)])
 def test_stations_at_one_height_show_no_gradient_so_it_is_a_parameter(night_01, heights):
     campaign, start = weathered(night_01, heights, [0.0, 3600.0], lambda s, i: 10.0 + i)
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     assert field.names[-1] == "gradient"
-    assert field.sigmas[-1] == Settings().u_gradient_c_per_m
+    assert field.sigmas[-1] == ReductionSettings().u_gradient_c_per_m
     assert field.steepest(np.zeros(len(heights))) == 0.0
     a, b = paths(1)
     b[:, 2] = a[:, 2] = 45.0
@@ -157,7 +159,7 @@ def test_stations_at_one_height_show_no_gradient_so_it_is_a_parameter(night_01, 
 
 
 def test_a_path_has_one_air_from_either_end(night_01):
-    field = AirField.of(night_01, Settings())
+    field = AirField.of(night_01, ReductionSettings())
     a, b = paths()
     when = np.full(len(a), night_01.shots.mjd_utc[50])
     there, back = field.along(when, a, b, np.zeros(3)), field.along(when, b, a, np.zeros(3))
@@ -167,7 +169,7 @@ def test_a_path_has_one_air_from_either_end(night_01):
 
 def test_a_bend_of_one_degree_is_one_degree_warmer_half_way_and_nothing_at_the_stations(night_01):
     campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 60.0], lambda s, i: 10.0 + 2.0 * i)
-    field = AirField.of(campaign, Settings(air_model="rueger1990"))
+    field = AirField.of(campaign, ReductionSettings(air_model="rueger1990"))
     level = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 25.0], [0.0, 0.0, 50.0]])
     far = level + np.array([100.0, 0.0, 0.0])
     bent = field.along(at(start, 30.0, 30.0, 30.0), level, far, np.array([0.0, 0.0, 1.0]))
@@ -182,7 +184,7 @@ def test_fog_and_dry_air_are_humidities_too(night_01, humidity, expected):
     campaign, start = weathered(
         night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 37.0), lambda s, i: 10.0, humidity=humidity
     )
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     times = at(start, *np.linspace(0.0, 3600.0, 500))
     assert np.all(np.abs(field.smoothed(times)[:, :, 2] - expected) < 1e-9)
     ends = np.zeros((500, 3)), np.tile([50.0, 0.0, 30.0], (500, 1))
@@ -193,7 +195,7 @@ def lined(campaign, rows):
     """Its field, with path temperatures (mjd, ranger, target, °C, u), and the field of shots ZY101 - T, ZY102 - T."""
     keys = ("mjd_utc", "ranger", "target", "temperature_c", "u_temperature_c")
     table = path_temperature_columns([PathTemperature(**dict(zip(keys, row, strict=True))) for row in rows])
-    return AirField.of(dataclasses.replace(campaign, path_temperatures=table), Settings())
+    return AirField.of(dataclasses.replace(campaign, path_temperatures=table), ReductionSettings())
 
 
 ENDS = [frozenset(("ZY101", "T")), frozenset(("ZY102", "T"))]
@@ -280,21 +282,21 @@ LAST = [[8.0, 903.0, 70.0], [13.0, 903.0, 70.0]]  # at 3600 s, by hand
 def test_before_the_first_reading_and_after_the_last_the_air_is_that_of_the_reading(night_01, seconds, expected):
     """No jump at the ends, and no trend carried on: an hour later a line would say 6 °C, 906 hPa, 90 %."""
     campaign, start = trended(night_01)
-    found = AirField.of(campaign, Settings()).smoothed(at(start, seconds))[0]
+    found = AirField.of(campaign, ReductionSettings()).smoothed(at(start, seconds))[0]
     # 1e-6: the Modified Julian Day resolves a microsecond
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
 def test_a_station_that_falls_silent_keeps_its_last_reading_while_the_other_goes_on(night_01):
     campaign, start = trended(night_01, until=(3600.0, 1800.0))
-    found = AirField.of(campaign, Settings()).smoothed(at(start, 1800.0, 2700.0, 3600.0, 5400.0))
+    found = AirField.of(campaign, ReductionSettings()).smoothed(at(start, 1800.0, 2700.0, 3600.0, 5400.0))
     np.testing.assert_allclose(found[:, 0, 0], [9.0, 8.5, 8.0, 8.0], rtol=0, atol=1e-6)
     np.testing.assert_allclose(found[:, 1], [[14.0, 901.5, 60.0]] * 4, rtol=0, atol=1e-6)
 
 
 def test_a_station_with_one_reading_says_it_before_and_after(night_01):
     campaign, start = trended(night_01, until=(3600.0, 0.0))
-    found = AirField.of(campaign, Settings()).smoothed(at(start, -1800.0, 0.0, 1800.0, 5400.0))
+    found = AirField.of(campaign, ReductionSettings()).smoothed(at(start, -1800.0, 0.0, 1800.0, 5400.0))
     np.testing.assert_allclose(found[:, 1], [FIRST[1]] * 4, rtol=0, atol=1e-6)
 
 
@@ -304,7 +306,7 @@ def test_a_shot_after_the_last_reading_is_ranged_in_the_last_air_and_one_before_
     Colder by 2 °C and denser by 3 hPa the air is later, so the index is the larger; vapour changes it by 0.1 ppm.
     """
     campaign, start = trended(night_01)
-    field = AirField.of(campaign, Settings())
+    field = AirField.of(campaign, ReductionSettings())
     foot = np.array([[0.0, 0.0, 0.0]])
     far = np.array([[100.0, 0.0, 0.0]])
     index = {}

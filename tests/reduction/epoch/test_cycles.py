@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.records.site.target import Target
+from catseye.records.site.target import TargetRow
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.cycles import doubtful_points, resolve_cycles
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.places import places_of
 
@@ -110,7 +110,7 @@ def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_gue
 
 @pytest.mark.slow
 def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, reduced_night_01, adjusted):
-    found = adjusted(night_01, Settings(u_position=0.02))
+    found = adjusted(night_01, ReductionSettings(u_position=0.02))
     before = reduced_night_01.coordinates
     both = np.isin(before.ranges.shot, found.ranges.shot)
     np.testing.assert_array_equal(before.ranges.cycles[both], found.ranges.cycles)
@@ -141,7 +141,7 @@ def test_points_are_doubtful_by_their_own_uncertainty_before_the_settings(night_
     r = reduced_night_01
 
     def doubtful(campaign, **settings):
-        return doubtful_points(build_network(campaign, r.phases, r.electronics, Settings(**settings)))
+        return doubtful_points(build_network(campaign, r.phases, r.electronics, ReductionSettings(**settings)))
 
     assert doubtful(night_01) == set()  # 10 mm, the layout's
     assert doubtful(target_off(night_01, "DP005", u=9.0)) == set()
@@ -160,7 +160,7 @@ def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
     fields = night_01.targets["DP005"].model_dump()
     for bad in (0.0, -1.0, 2000.1):
         with pytest.raises(ValueError, match="u_position_mm"):
-            Target.model_validate(fields | {"u_position_mm": bad})
+            TargetRow.model_validate(fields | {"u_position_mm": bad})
 
 
 def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(night_01, reduced_night_01, part, targets_01, rangers_01):

@@ -18,7 +18,7 @@ from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.head import _axes, head_unknowns
 from catseye.reduction.epoch.ranges import follow_electronics
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.stations import station_in
@@ -142,7 +142,7 @@ def planted(campaign, reduced, effects):
 def solved(campaign, phases):
     electronics, _ = follow_electronics(campaign, phases)
     with threadpool_limits(limits=1, user_api="blas"):
-        return adjust_coordinates(campaign, phases, electronics, Settings())
+        return adjust_coordinates(campaign, phases, electronics, ReductionSettings())
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +218,7 @@ def open_minded(night_01, reduced_night_01, effects):
 def linear(campaign, phases, start):
     """Adjustment about given coordinates with every usable shot of night-01: layout, answer."""
     electronics, _ = follow_electronics(campaign, phases)
-    network = build_network(campaign, phases, electronics, Settings())
+    network = build_network(campaign, phases, electronics, ReductionSettings())
     x = np.array(network.layout.start)
     for row, name in enumerate(start.points):
         x[network.layout.columns(name)] = start.x[row]
@@ -292,7 +292,7 @@ def test_priors_of_the_heads_show_in_the_covariance_and_grow_with_it(night_01, r
 def test_every_derivative_by_a_heads_parameter_is_a_finite_difference(night_01, reduced_night_01, effects, name):
     campaign = told(night_01, effects, LOOSE)
     electronics, _ = follow_electronics(campaign, reduced_night_01.phases)
-    network = build_network(campaign, reduced_night_01.phases, electronics, Settings())
+    network = build_network(campaign, reduced_night_01.phases, electronics, ReductionSettings())
     x = np.array(network.layout.start)
     plain = shot_group(network, name, x)[1].head
     for unknown in head_unknowns(campaign, name):
@@ -319,7 +319,7 @@ def test_a_parameter_shifts_the_prediction_as_the_same_number_on_the_sheet(night
         n: e | {"cyclic_sine_mm": (e["cyclic_sine_mm"][0] + 0.01, e["cyclic_sine_mm"][1])} for n, e in effects.items()
     }
     networks = [
-        build_network(told(night_01, said, LOOSE), reduced_night_01.phases, electronics, Settings())
+        build_network(told(night_01, said, LOOSE), reduced_night_01.phases, electronics, ReductionSettings())
         for said in (effects, more)
     ]
     x = np.array(networks[0].layout.start)
@@ -341,7 +341,7 @@ def test_whole_cycles_are_counted_after_the_heads_corrections(night_01, reduced_
         (campaign, planted(campaign, reduced_night_01, large)[0]),
     ):
         electronics, _ = follow_electronics(known, phases)
-        network = build_network(known, phases, electronics, Settings())
+        network = build_network(known, phases, electronics, ReductionSettings())
         _, parts = shot_group(network, "ZY104", np.array(network.layout.start))
         margins.append(parts.margin)
     assert np.abs(parts.head.value).min() > 10e-3

@@ -7,7 +7,7 @@ import pytest
 
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases, walk_notes
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 VOLT = 10.0 / 32768.0
 
@@ -62,11 +62,11 @@ def test_a_buffer_without_light_is_blocked_one_at_the_converters_end_is_clipped(
     changed = with_frames(head, 7, lambda codes: dark)
     changed = with_frames(changed, 11, lambda codes: np.where(np.arange(8192) == 5, 32767, codes))
     changed = with_frames(changed, 13, lambda codes: np.where(np.arange(8192) == 5, -32768, codes))
-    reason = measure_phases(changed, Settings()).reason
+    reason = measure_phases(changed, ReductionSettings()).reason
     assert reason[7].startswith("blocked: return 0.00")
     assert reason[11].startswith("clipped: 1 samples")
     assert reason[13].startswith("clipped: 1 samples")
-    before = measure_phases(head, Settings()).reason
+    before = measure_phases(head, ReductionSettings()).reason
     assert [r for k, r in enumerate(reason) if k not in (7, 11, 13)] == [
         r for k, r in enumerate(before) if k not in (7, 11, 13)
     ]
@@ -76,7 +76,7 @@ def test_a_buffer_without_light_is_blocked_one_at_the_converters_end_is_clipped(
 def test_a_dead_buffer_is_no_return_although_minus_the_leakage_looks_like_one(night_01, part, level):
     head = part(night_01, np.arange(40))
     dead = with_frames(head, [3, 5], lambda codes: np.full_like(codes, level))
-    reason = measure_phases(dead, Settings()).reason
+    reason = measure_phases(dead, ReductionSettings()).reason
     assert reason[3].startswith("dead: the samples hold 0.0000 V")
     assert reason[5].startswith("dead: ")
 
@@ -93,7 +93,7 @@ def test_shots_of_different_length_and_rate_stand_side_by_side(night_01, part, r
         wave = 4.0 * np.cos(2 * np.pi * np.arange(8192) / 32 - wanted[k - 20]) + rng.normal(0, 0.2, 8192)
         frames[head.shots.frame[k]] = np.rint(wave / VOLT)
     mixed = dataclasses.replace(part(head, np.arange(40), cycles=cycles, samples_per_cycle=samples), frames=frames)
-    phases = measure_phases(mixed, Settings())
+    phases = measure_phases(mixed, ReductionSettings())
     for k in range(40):
         mirror = mixed.mirror_of(mixed.shots.ranger[k])
         leakage = mirror.leakage_amplitude_volt * np.exp(1j * mirror.leakage_phase_rad)
@@ -106,7 +106,9 @@ def test_shots_of_different_length_and_rate_stand_side_by_side(night_01, part, r
 
 def test_progress_counts_every_shot(night_01, part):
     seen = []
-    measure_phases(part(night_01, np.arange(130)), Settings(), lambda what, done, total: seen.append((done, total)))
+    measure_phases(
+        part(night_01, np.arange(130)), ReductionSettings(), lambda what, done, total: seen.append((done, total))
+    )
     assert seen == [(64, 130), (128, 130), (130, 130)]
 
 
@@ -121,7 +123,7 @@ def test_a_turned_reference_is_found_and_no_other_is_blamed(night_01, name, whic
     """A foreign return in quadrature turns the phase and leaves the amplitude alone: 0.2 rad is 3 mm."""
     k = references_of(night_01, name)[which]
     bad = with_frames(night_01, k, lambda codes: turned(codes, 0.2))
-    _, rejected = follow_electronics(bad, measure_phases(bad, Settings()))
+    _, rejected = follow_electronics(bad, measure_phases(bad, ReductionSettings()))
     assert list(rejected) == [k]
     assert rejected[k].startswith("bad reference: phase ")
 
@@ -129,14 +131,14 @@ def test_a_turned_reference_is_found_and_no_other_is_blamed(night_01, name, whic
 def test_two_turned_references_are_both_found(night_01):
     k = references_of(night_01, "ZY115")
     bad = with_frames(night_01, [k[0], k[4]], lambda codes: turned(codes, -0.25))
-    _, rejected = follow_electronics(bad, measure_phases(bad, Settings()))
+    _, rejected = follow_electronics(bad, measure_phases(bad, ReductionSettings()))
     assert sorted(rejected) == sorted([k[0], k[4]])
 
 
 def test_a_reference_of_foreign_strength_is_found_by_its_amplitude(night_01):
     k = references_of(night_01, "ZY113")[3]
     bad = with_frames(night_01, k, lambda codes: turned(codes, 0.0, 1.1))
-    _, rejected = follow_electronics(bad, measure_phases(bad, Settings()))
+    _, rejected = follow_electronics(bad, measure_phases(bad, ReductionSettings()))
     assert list(rejected) == [k]
     assert "something else is in the beam" in rejected[k]
 
@@ -148,7 +150,7 @@ def test_good_references_are_all_kept(night_01, reduced_night_01):
 
 def test_a_ranger_without_reference_cannot_range_and_says_so(night_01, part, rangers_01, references_01):
     without = part(night_01, ~(references_01 & (rangers_01 == "ZY105")))
-    electronics, rejected = follow_electronics(without, measure_phases(without, Settings()))
+    electronics, rejected = follow_electronics(without, measure_phases(without, ReductionSettings()))
     assert "ZY105" not in electronics
     mine = [k for k in range(len(without.shots)) if without.shots.ranger[k] == "ZY105"]
     assert sorted(rejected) == mine
@@ -158,7 +160,7 @@ def test_a_ranger_without_reference_cannot_range_and_says_so(night_01, part, ran
 def test_one_cycle_of_few_samples_says_that_its_noise_is_unknown(night_01, part):
     m = 20
     short = part(night_01, np.arange(m), cycles=np.ones(m, int), samples_per_cycle=np.full(m, 4))
-    phases = measure_phases(short, Settings())
+    phases = measure_phases(short, ReductionSettings())
     assert all(r.startswith("noise unknown: 1 cycles of 4 samples") for r in phases.reason)
 
 
@@ -175,7 +177,7 @@ def test_the_drift_is_known_best_beside_its_references(night_01, reduced_night_0
 
 
 def test_a_site_whose_electronics_walk_otherwise_than_it_says_is_told(night_01):
-    phases = measure_phases(night_01, Settings())
+    phases = measure_phases(night_01, ReductionSettings())
     _, wrong = follow_electronics(night_01, phases)
     assert walk_notes(night_01, phases, wrong) == []
     for claimed, word in ((3.0, "small"), (40.0, "large")):
@@ -186,7 +188,7 @@ def test_a_site_whose_electronics_walk_otherwise_than_it_says_is_told(night_01):
 
 
 def test_a_walk_that_one_difference_contradicts_is_a_note_and_no_failure(night_01):
-    phases = measure_phases(night_01, Settings())
+    phases = measure_phases(night_01, ReductionSettings())
     shots = night_01.shots
     wrong = [
         k
@@ -202,7 +204,7 @@ def test_a_walk_that_one_difference_contradicts_is_a_note_and_no_failure(night_0
 
 
 def test_electronics_that_stand_still_are_told_without_limits_that_mean_nothing(night_01):
-    phases = measure_phases(night_01, Settings())
+    phases = measure_phases(night_01, ReductionSettings())
     reference = np.array([t == REFERENCE for t in night_01.shots.target])
     noise = 3e-4 * np.random.default_rng(0).normal(size=len(reference))
     still = np.where(reference, phases.amplitude * np.exp(1j * noise), phases.phasor)

@@ -13,7 +13,7 @@ import pytest
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 RANGER = "ZY114"  # twelve references
 BETWEEN = 0.020  # rad: a third of the heads warm up by 10 to 30 mrad at the ends; inside none bends so much
@@ -21,7 +21,7 @@ BETWEEN = 0.020  # rad: a third of the heads warm up by 10 to 30 mrad at the end
 
 @pytest.fixture(scope="module")
 def phases(night_01):
-    return measure_phases(night_01, Settings())
+    return measure_phases(night_01, ReductionSettings())
 
 
 def references(campaign):

@@ -7,10 +7,10 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.optics.retroreflector.prism import clear_share
-from catseye.reduction.optics.link import Link, Reflector
+from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.reduction.optics.link_budget import link_budget
 
-LINK, PRISM = Link(), Reflector()
+LINK, PRISM = Link(), LinkReflector()
 
 
 def reflected_share(incidence, azimuth, *, aperture, height, index, rays=60_000):

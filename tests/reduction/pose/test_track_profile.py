@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
 from catseye.geometry.antenna.frames import ground_from_alidade
-from catseye.records.laboratory.tilts import Tilts
+from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.track_profile import coefficient_names, joined_tilt, track_profile
 
 ZERO = np.array([40.0, -15.0]) * ARCSECOND
@@ -25,7 +25,7 @@ def of_the_alidade(a):
 
 
 def readings(a, u=0.1):
-    return Tilts(np.zeros(len(a)), a, of_the_alidade(a) + ZERO, np.full(len(a), u * ARCSECOND), "")
+    return TiltReadings(np.zeros(len(a)), a, of_the_alidade(a) + ZERO, np.full(len(a), u * ARCSECOND), "")
 
 
 def spread(n, u=1.0):

@@ -4,7 +4,7 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.geometry.sky.sun import altitude_azimuth, sun_direction
 from catseye.records.site.site import Location
-from catseye.reduction.site.earth_rotation import Place, RotationStatus, _each, place_of, rotation_at, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, RotationStatus, _each, place_of, rotation_at, sun_at
 from sun_scene import GREEN_BANK, MORNING, apart, astropy_sun
 
 ARCSECOND = np.pi / 648_000
@@ -80,9 +80,9 @@ def test_a_site_record_and_its_air():
     site = Location(latitude_deg=38.433, longitude_deg=280.16, elevation_of_z0_m=807.0)
     bare = sun_at(MORNING, place_of(site, pressure_hpa=0.0)).direction
     assert bare == pytest.approx(sun_at(MORNING, GREEN_BANK).direction, abs=1e-12)
-    standard = Place(GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0, 919.99)
+    standard = FramePlace(GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0, 919.99)
     assert sun_at(MORNING, site).direction == pytest.approx(sun_at(MORNING, standard).direction, abs=1e-8)
-    air = sun_at(MORNING, Place(GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0, 920.0, 20.0)).direction
+    air = sun_at(MORNING, FramePlace(GREEN_BANK.latitude, GREEN_BANK.longitude, 807.0, 920.0, 20.0)).direction
     raised = altitude_azimuth(air)[0] - altitude_azimuth(bare)[0]
     # 58" cot(50.3 degrees) at 1010 hPa and 10 C, times 920/1010 * 283/293; formulas differ by 5 % there, 2".
     assert raised == pytest.approx(58.0 / np.tan(50.3 * np.pi / 180) * 0.8797 * ARCSECOND, rel=0.06)

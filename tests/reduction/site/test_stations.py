@@ -5,7 +5,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.site.stations import AXES, TILTS, imperfections_of, point, station_of
@@ -49,7 +49,7 @@ def test_u_of_a_real_mirrors_counts_is_their_scatter(n):
             mean.azimuth_waves + rng.normal(0.0, REAL.u_encoder_counts, (2, 2)),
             mean.elevation_waves + rng.normal(0.0, REAL.u_encoder_counts, (2, 1)),
         )
-        drawn.append(imperfect_counts(Station.of_parameters(station.parameters + rng.normal(0.0, u)), off, TO))
+        drawn.append(imperfect_counts(MirrorStation.of_parameters(station.parameters + rng.normal(0.0, u)), off, TO))
     found = point(MONUMENT, REAL, TO)
     apart = np.array(drawn) - found.counts
     apart[..., 0] -= 1e5 * np.round(apart[..., 0] / 1e5)

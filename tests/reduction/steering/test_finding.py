@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import Station, counts, ray
+from catseye.geometry.mirror.pointing import MirrorStation, counts, ray
 from catseye.geometry.mirror.search_pattern import count_size, offsets_of_counts
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import gaussian_spot, matched_radius, offset_share
 from catseye.reduction.steering.finding import SearchResult, adjustment_readings, find, found_point, search_results
-from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
+from catseye.reduction.steering.spot_fit import SearchHead, Spot, fit_spot
 from draws import draws
 
-STATION = Station([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
+STATION = MirrorStation([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
 TARGET = np.array([20.0, -30.0, 75.0])
 RANGE = float(np.linalg.norm(TARGET - STATION.scan_point))
 TRUE = counts(STATION, TARGET)
 LIGHT = {"aperture": 0.0254, "receiver": 0.05, "waist": 0.01, "wavelength": 0.78e-6}
 RADIUS = matched_radius(RANGE, **LIGHT) / RANGE
 OFFSETS = np.linspace(0.0, 0.06, 61)
-HEAD = Head((2691.0, 1434.0), (-21_309.0, 75_691.0), radius=RADIUS, threshold_volt=0.5, noise_volt=0.02)
+HEAD = SearchHead((2691.0, 1434.0), (-21_309.0, 75_691.0), radius=RADIUS, threshold_volt=0.5, noise_volt=0.02)
 PEAK = 6.0
 
 
@@ -58,7 +58,7 @@ def ranger(rng, true, *, full=10.0, real=True, peak=PEAK, loose=0.5, missing=0.0
 def test_a_target_off_its_predicted_place_is_found(prime):
     rng = np.random.default_rng(4)
     true = TRUE if not prime else np.array([TRUE[0] + 50_000.0, 2 * 1434 - TRUE[1]])
-    head = HEAD if not prime else Head((2691.0, 1434.0), (2e4, 1.2e5), RADIUS, 0.5, 0.02)
+    head = HEAD if not prime else SearchHead((2691.0, 1434.0), (2e4, 1.2e5), RADIUS, 0.5, 0.02)
     spot = find(np.add(true, [25.0, -14.0]), head, ranger(rng, true), search_radius=4e-3)
     assert spot.status == "found"
     assert np.all(np.abs(spot.counts - true) < 4.0 * spot.u_counts)
@@ -83,9 +83,9 @@ def test_a_target_that_is_not_there_is_a_status_that_says_what_was_searched():
     assert np.all(half.looked_at[:, 0] > TRUE[0])
     gone = find(TRUE, HEAD, lambda at: np.nan, search_radius=5e-4)
     assert "without a reading" in gone.status
-    fine = find(TRUE, Head(HEAD.zeros, HEAD.azimuth_limits, 5e-5, 0.5, 0.02), dark, search_radius=5e-4)
+    fine = find(TRUE, SearchHead(HEAD.zeros, HEAD.azimuth_limits, 5e-5, 0.5, 0.02), dark, search_radius=5e-4)
     assert fine.status.endswith("the spot is narrower than whole counts surely meet")
-    narrow = Head(HEAD.zeros, (TRUE[0] + 2, TRUE[0] + 500), RADIUS, 0.5, 0.02)
+    narrow = SearchHead(HEAD.zeros, (TRUE[0] + 2, TRUE[0] + 500), RADIUS, 0.5, 0.02)
     assert "beyond the stops" in find(TRUE, narrow, dark, search_radius=1e-3).status
 
 
@@ -115,7 +115,7 @@ def errors(rng, n, true_of, **how):
         spot = fit_spot(
             scan.counts,
             [measure(at) for at in scan.counts],
-            Head(
+            SearchHead(
                 HEAD.zeros,
                 HEAD.azimuth_limits,
                 RADIUS,
@@ -184,7 +184,7 @@ def test_a_clipped_top_does_not_lower_the_peak():
     scan = raster(TRUE, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), 0.25 * RADIUS, HEAD.azimuth_limits)
     clean = returned(scan.counts, TRUE, real=False)
     noisy = clean + 0.02 * rng.normal(size=len(clean))
-    head = Head(
+    head = SearchHead(
         HEAD.zeros,
         HEAD.azimuth_limits,
         RADIUS,
@@ -284,7 +284,7 @@ def test_a_head_that_cannot_be_is_refused(key, value, message):
         "noise_volt": 0.1,
     }
     with pytest.raises(ValidityError, match=message):
-        Head(**{**known, key: value})
+        SearchHead(**{**known, key: value})
 
 
 def test_counts_on_the_sky_are_small_near_the_azimuth_axis():

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.clearance.keep_out import TOUCH, Box, servo_margin
+from catseye.geometry.clearance.keep_out import TOUCH, BoxZone, servo_margin
 from catseye.geometry.mirror.pointing import counts, ray
 from catseye.geometry.mirror.slew import straight, trapezoid
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.files.reading import read_record
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.site import Location
-from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, place_of, sun_at
 from catseye.reduction.steering.guard import _cut, guard_of
 from sun_scene import (
     DEGREE,
@@ -95,7 +95,7 @@ def test_at_sunrise_the_cone_begins_at_the_horizon_given():
 
 
 def test_a_sun_that_rises_and_sets_during_one_long_move_counts():
-    north = Place(68.0 * DEGREE, GREEN_BANK.longitude, 0.0)
+    north = FramePlace(68.0 * DEGREE, GREEN_BANK.longitude, 0.0)
     mjd = 52_990.72 + np.linspace(-0.1, 0.1, 801)  # December: the Sun stays low
     altitude = np.arcsin(sun_at(mjd, north).direction[:, 2])
     top = int(np.argmax(altitude))
@@ -109,7 +109,7 @@ def test_a_sun_that_rises_and_sets_during_one_long_move_counts():
 
 
 def test_refraction_moves_the_cone_near_the_horizon():
-    air = Place(guard().place.latitude, guard().place.longitude, 807.0, 920.0, 10.0)
+    air = FramePlace(guard().place.latitude, guard().place.longitude, 807.0, 920.0, 10.0)
     mjd = 52_889.458  # 11 UTC: the Sun rises
     bare, raised = (sun_at(mjd, place).direction for place in (guard().place, air))
     assert 15 / 60 < apart(bare, raised) / DEGREE < 40 / 60
@@ -179,7 +179,7 @@ def test_boxes_are_named_and_never_become_free():
 
 def test_the_sun_behind_a_box_does_not_promise_a_time():
     sun = sun_at(MORNING, guard().place).direction
-    wall = Box(STATION.scan_point + 30 * sun, [3, 3, 3], name="a wall")
+    wall = BoxZone(STATION.scan_point + 30 * sun, [3, 3, 3], name="a wall")
     verdict = guard(boxes=(wall,)).pointing(MORNING, AT_SUN)
     assert not verdict.allowed
     assert verdict.free_at_mjd is None

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.geometry.clearance.keep_out import Box
+from catseye.geometry.clearance.keep_out import BoxZone
 from catseye.geometry.mirror.pointing import counts
 from catseye.geometry.mirror.slew import trapezoid
 from catseye.reduction.steering.reroute import RouteStatus, route
@@ -56,16 +56,16 @@ def test_a_gap_in_a_wall_is_found_and_a_shut_wall_blocks():
     # Walls all about the ranger but the south side, which a bar parts; a gap in the bar is the only way down or up.
     here = STATION.scan_point
     sides = [
-        Box(np.add(here, [0, 12, 0]), [24, 0.5, 24], name="north"),
-        Box(np.add(here, [12, 0, 0]), [0.5, 24, 24], name="east"),
-        Box(np.add(here, [-12, 0, 0]), [0.5, 24, 24], name="west"),
-        Box(np.add(here, [0, 0, 12]), [24, 24, 0.5], name="top"),
-        Box(np.add(here, [0, 0, -12]), [24, 24, 0.5], name="floor"),
+        BoxZone(np.add(here, [0, 12, 0]), [24, 0.5, 24], name="north"),
+        BoxZone(np.add(here, [12, 0, 0]), [0.5, 24, 24], name="east"),
+        BoxZone(np.add(here, [-12, 0, 0]), [0.5, 24, 24], name="west"),
+        BoxZone(np.add(here, [0, 0, 12]), [24, 24, 0.5], name="top"),
+        BoxZone(np.add(here, [0, 0, -12]), [24, 24, 0.5], name="floor"),
     ]
     low, high = counts(STATION, np.add(here, [8.0, -12.0, -6.0])), counts(STATION, np.add(here, [7.0, -12.0, 6.0]))
     bars = [
-        Box(np.add(here, [-8, -12, 0]), [8, 0.5, 1.0], name="bar"),
-        Box(np.add(here, [6, -12, 0]), [12, 0.5, 1.0], name="other bar"),
+        BoxZone(np.add(here, [-8, -12, 0]), [8, 0.5, 1.0], name="bar"),
+        BoxZone(np.add(here, [6, -12, 0]), [12, 0.5, 1.0], name="other bar"),
     ]
     own = guard(place=None, boxes=tuple(sides + bars), margin_counts=(5, 5))
     assert own.pointing(MORNING, low).allowed
@@ -76,7 +76,7 @@ def test_a_gap_in_a_wall_is_found_and_a_shut_wall_blocks():
     slit = beam(profile(through.waypoints[:-1], through.waypoints[1:], 300)[1].reshape(-1, 2))
     crossing = slit[np.argmin(np.abs(slit[:, 2]))]
     assert -4.1 / 12 < crossing[0] / -crossing[1] < 0.1 / 12
-    shut = Box(np.add(here, [-2, -12, 0]), [8, 0.5, 1.0], name="shutter")
+    shut = BoxZone(np.add(here, [-2, -12, 0]), [8, 0.5, 1.0], name="shutter")
     own = guard(place=None, boxes=(*sides, *bars, shut), margin_counts=(5, 5))
     assert route(own, MORNING, low, high, step=(600.0, 300.0)).status == RouteStatus.BLOCKED
 

@@ -12,7 +12,7 @@ from catseye.geometry.antenna.frames import (
     ground_from_alidade,
     ground_from_reflector,
 )
-from catseye.geometry.mirror.pointing import Station, counts, ray
+from catseye.geometry.mirror.pointing import MirrorStation, counts, ray
 from catseye.geometry.mirror.track import apparent_motion, count_motion, line_bound, line_estimate
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.reduction.site.stations import station_of
@@ -45,7 +45,7 @@ def ground(night_01):
     names = sorted(night_01.monuments)
     each = [station_of(night_01.monuments[name], night_01.mirror_of(name)) for name in names]
     limits = [[night_01.mirror_of(n).az_low_limit, night_01.mirror_of(n).az_high_limit] for n in names]
-    return Station.of_parameters(np.stack([s.parameters for s in each])), np.array(limits, dtype=float)
+    return MirrorStation.of_parameters(np.stack([s.parameters for s in each])), np.array(limits, dtype=float)
 
 
 @pytest.mark.parametrize(("start", "end"), [(0.0, 1.0), (1.0, 0.2), (0.3, 0.3005), (0.5, 0.5)])
@@ -177,7 +177,7 @@ def test_a_feed_arm_ranger_rides_with_the_reflector_and_follows_a_ground_target(
     stations, _ = ground
     first = ground_from_reflector(*(float(d.at(30.0)[0]) for d in (SLEW.azimuth, SLEW.elevation)))
     turn = Rotation.from_euler("xyz", [2.0, 0.3, 0.4]).as_matrix()
-    arm = Station.from_matrix(
+    arm = MirrorStation.from_matrix(
         first.points([[2.0, -9.0, 52.0]]),
         (turn @ first.rotation.T)[None],
         offset=stations.offset[:1],

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.geometry.antenna.frames import ground_from_reflector_at
 from catseye.geometry.frames.rotation import rx, rz
 from catseye.records.site.structural_model import read_structural_model
@@ -14,7 +14,7 @@ from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
-POSTURE = Posture(0.9, np.radians(38.0), 3.0)
+POSTURE = TelescopePosture(0.9, np.radians(38.0), 3.0)
 FOOT = np.array([0.0, -8.0, 10.0])
 
 
@@ -24,7 +24,7 @@ def antenna():
 
 
 def test_without_motions_it_is_the_first_order(antenna):
-    posture = Posture(np.array([0.0, 2.0]), np.array([0.3, 1.2]), 15.0)
+    posture = TelescopePosture(np.array([0.0, 2.0]), np.array([0.3, 1.2]), 15.0)
     rigid = antenna.ground_from("reflector", posture, deformed=False)
     expected = ground_from_reflector_at(posture.azimuth, posture.elevation)
     np.testing.assert_allclose(rigid.points([1.0, 50.0, 9.0]), expected.points([1.0, 50.0, 9.0]), rtol=0, atol=1e-13)
@@ -59,13 +59,13 @@ def test_the_chain_is_what_the_file_says(antenna):
 
 def test_gravity_makes_the_arm_droop_downwards_and_warmth_lifts_it(antenna):
     tip = [0.0, 8.0, 50.0]  # the prime focus
-    low = Posture(0.0, np.radians(10.0), 15.0)
+    low = TelescopePosture(0.0, np.radians(10.0), 15.0)
     sag = antenna.ground_from("feed_arm", low).points(tip) - antenna.ground_from(
         "feed_arm", low, deformed=False
     ).points(tip)
     assert -0.20 < sag[2] < -0.02  # centimetres
     assert abs(sag[0]) < 0.005
-    high = [Posture(0.0, np.radians(90.0), t) for t in (5.0, 25.0)]
+    high = [TelescopePosture(0.0, np.radians(90.0), t) for t in (5.0, 25.0)]
     cold, warm = (antenna.ground_from("feed_arm", posture).points(tip)[2] for posture in high)
     # over 20 degrees: alidade, arm and dish grow, and the arm bends up by 0.4 seconds a degree, 8 m from its foot
     grown = 20 * (0.5646 + 0.2925 + 0.06) * 1e-3 + 20 * 0.4 * ARCSECOND * 8.0
@@ -75,7 +75,7 @@ def test_gravity_makes_the_arm_droop_downwards_and_warmth_lifts_it(antenna):
 def test_the_azimuth_axis_leans_the_same_way_on_the_ground_at_any_azimuth(antenna):
     """A tilt about east by +3 seconds takes the top to the south; about north by -2.2 seconds to the west."""
     for azimuth in np.linspace(0.0, 6.0, 7):
-        posture = Posture(azimuth, 1.0, 15.0)
+        posture = TelescopePosture(azimuth, 1.0, 15.0)
         top = antenna.ground_from("alidade", posture).points([0.0, 0.0, 48.26])
         np.testing.assert_allclose(top[:2] / (48.26 * ARCSECOND), [-2.2, -3.0], rtol=0, atol=1e-3)
 
@@ -111,20 +111,20 @@ def test_axis_derivatives_are_the_slopes_of_the_whole_model_to_a_percent(antenna
     found = antenna.axis_derivatives(at, POSTURE)
     for i, (da, de) in enumerate(((1e-5, 0.0), (0.0, 1e-5))):
         ends = [
-            antenna.ground_from("feed_arm", Posture(0.9 + s * da, np.radians(38.0) + s * de, 3.0)).points(x)
+            antenna.ground_from("feed_arm", TelescopePosture(0.9 + s * da, np.radians(38.0) + s * de, 3.0)).points(x)
             for s in (1, -1)
         ]
         np.testing.assert_allclose(found[:, i], (ends[0] - ends[1]) / 2e-5, rtol=0, atol=0.5)  # m/rad, of some 100
 
 
 def test_groups_move_with_their_frames_and_each_point_by_its_own_table(antenna):
-    posture = Posture(np.array([0.1, 0.9]), np.radians([38.0, 80.0]), np.array([15.0, 3.0]))
+    posture = TelescopePosture(np.array([0.1, 0.9]), np.radians([38.0, 80.0]), np.array([15.0, 3.0]))
     rim = antenna.points("rim", posture)
     assert rim.shape == (2, 10, 3)
     e = np.radians(80.0)
     position = antenna.groups["rim"].position[0]
     moved = position + np.array([0, 0.342 * np.cos(e), -1.882 * np.cos(e) - 2.801 * np.sin(e) + 0.02 * -12]) * 1e-3
-    here = antenna.ground_from("reflector", Posture(0.9, e, 3.0))
+    here = antenna.ground_from("reflector", TelescopePosture(0.9, e, 3.0))
     np.testing.assert_allclose(rim[1, 0], here.points(moved), rtol=0, atol=1e-12)
     np.testing.assert_allclose(antenna.u_points("rim"), np.hypot(0.5e-3, 0.3e-3), rtol=1e-12)
     np.testing.assert_allclose(antenna.u_points("arm"), 1e-3, rtol=1e-12)
@@ -132,9 +132,9 @@ def test_groups_move_with_their_frames_and_each_point_by_its_own_table(antenna):
 
 def test_outside_its_range_and_for_strangers_it_refuses(antenna):
     with pytest.raises(ValidityError, match="elevation 96 deg is outside 0 to 95 deg"):
-        antenna.ground_from("reflector", Posture(0.0, np.radians(96.0), 15.0))
+        antenna.ground_from("reflector", TelescopePosture(0.0, np.radians(96.0), 15.0))
     with pytest.raises(ValidityError, match="temperature 50 C"):
-        antenna.points("rim", Posture(0.0, 1.0, np.array([10.0, 50.0])))
+        antenna.points("rim", TelescopePosture(0.0, 1.0, np.array([10.0, 50.0])))
     with pytest.raises(InputError, match="frame 'boom' is not in the structural model"):
         antenna.ground_from("boom", POSTURE)
     with pytest.raises(InputError, match="group 'boom' is not"):
@@ -144,4 +144,4 @@ def test_outside_its_range_and_for_strangers_it_refuses(antenna):
     with pytest.raises(InputError, match="'rim' cannot be shifted"):  # each of its points moves by a table of its own
         antenna.points("rim", POSTURE, added={"rim": np.ones(6)})
     # 0 deg C is legal
-    assert np.isfinite(antenna.points("rim", Posture(0.0, 0.0, 0.0))).all()
+    assert np.isfinite(antenna.points("rim", TelescopePosture(0.0, 0.0, 0.0))).all()

@@ -12,15 +12,15 @@ import pytest
 
 from catseye.constants import ARCSECOND
 from catseye.errors import EstimationError, InputError
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.records.site.structural_model import StructuralModel, read_structural_model, structural_model_toml
 from catseye.reduction.structure.antenna import UNITS, antenna_of
-from catseye.reduction.structure.corrections import Measured, correct_posture, frame_motion, measured_of
+from catseye.reduction.structure.corrections import MeasuredPosture, correct_posture, frame_motion, measured_of
 from catseye.reduction.structure.fit import fit_model, updated_model
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "structural-model" / "telescope.toml"
-POSTURE = Posture(0.9, np.radians(38.0), 3.0)
+POSTURE = TelescopePosture(0.9, np.radians(38.0), 3.0)
 GROUPS = ("bearings", "rim", "arm", "subreflector_rim")
 MOVED = ("alidade", "elevation", "reflector", "feed_arm", "subreflector")
 
@@ -49,7 +49,7 @@ def measured(antenna, rng, posture, *, added=None, places=None, groups=GROUPS, n
     truth = np.concatenate(truth)
     covariance = mixed(rng, len(names))
     seen = truth.ravel() + noise * np.linalg.cholesky(covariance) @ rng.standard_normal(truth.size)
-    return Measured(names, seen.reshape(-1, 3), covariance, posture)
+    return MeasuredPosture(names, seen.reshape(-1, 3), covariance, posture)
 
 
 def scattered(antenna, rng):
@@ -166,7 +166,7 @@ def campaign(antenna, rng, count, noise=True):
     epochs = []
     for _ in range(count):
         elevation, temperature = np.radians(rng.uniform(2, 93)), rng.uniform(-20, 35)
-        posture = Posture(rng.uniform(-3, 3), elevation, temperature)
+        posture = TelescopePosture(rng.uniform(-3, 3), elevation, temperature)
         added = scattered(antenna, rng)[0] if noise else None
         epochs.append(measured(antenna, rng, posture, added=added, places=places, noise=noise, groups=GROUPS[1:3]))
     return epochs
@@ -247,7 +247,7 @@ def test_the_update_is_a_new_file_whose_next_fit_begins_with_what_was_learnt(ant
     assert again.record.by == "a test"
     for name in FREE:
         np.testing.assert_allclose(again.motions[name].coefficients, fit.coefficients[name], rtol=1e-12, atol=1e-18)
-    posture = Posture(0.0, 0.8, 10.0)
+    posture = TelescopePosture(0.0, 0.8, 10.0)
     u = np.sqrt(np.diag(again.motions["feed_arm"].six_covariance(posture)))
     assert np.all(u[[1, 2, 3]] > antenna.motions["feed_arm"].u[[1, 2, 3]])  # now the coefficients say their own
     np.testing.assert_allclose(u[[0, 4, 5]], antenna.motions["feed_arm"].u[[0, 4, 5]], rtol=1e-12)
@@ -293,7 +293,7 @@ def test_targets_are_taken_from_a_coordinates_file_with_their_covariance(antenna
         with pytest.raises(InputError, match="TR01 has no x, y and z"):
             measured_of(document | {"points": points | {"TR01": lost}}, antenna, POSTURE)
     with pytest.raises(EstimationError, match="no target was measured"):
-        correct_posture(antenna, Measured((), np.zeros((0, 3)), np.zeros((0, 0)), POSTURE))
+        correct_posture(antenna, MeasuredPosture((), np.zeros((0, 3)), np.zeros((0, 0)), POSTURE))
     with pytest.raises(InputError, match="none of their points"):
         measured_of(document | {"points": {"OTHER": points["OTHER"]}}, antenna, POSTURE)
 

@@ -7,16 +7,23 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError, ValidityError
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.frames.rotation import from_vector, to_vector
-from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import read_structural_model
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
-from catseye.reduction.structure.moving_ranger import Driven, Known, moving_ranger, projected, tracked, vibrating
+from catseye.reduction.structure.moving_ranger import (
+    Driven,
+    FrameCorrections,
+    moving_ranger,
+    projected,
+    tracked,
+    vibrating,
+)
 from catseye.signal.vibration.filter import Mode, follow, start
 from repository import ROOT
 
@@ -120,7 +127,7 @@ def test_scan_point_and_turn_scatter_as_their_covariance_claims(antenna, mirror)
     swing = vibrating(antenna.record, state, np.array(100.0))
     moving = moving_ranger(RANGER, mirror, antenna, DRIVE, np.array(100.0), u_mount=1e-5, known=(swing,))
     moved, added = draws(antenna, rng, state)
-    drawn = Known(added, np.zeros((30, 30)))
+    drawn = FrameCorrections(added, np.zeros((30, 30)))
     times = np.full(COUNT, 100.0)
     station = moving_ranger(RANGER, mirror, antenna, moved, times, u_mount=1e-5, known=(drawn,)).station
     still = moving.station
@@ -130,7 +137,7 @@ def test_scan_point_and_turn_scatter_as_their_covariance_claims(antenna, mirror)
     turn = to_vector(seat @ np.swapaxes(station.gamma, -1, -2) @ still.gamma)
     check(np.concatenate([shift, turn], axis=-1), moving.covariance)
     target = np.array([20.0, -100.0, 30.0])
-    seen = Station.from_matrix(
+    seen = MirrorStation.from_matrix(
         still.scan_point + shift,
         still.gamma @ np.swapaxes(from_vector(turn), -1, -2),
         offset=still.offset,
@@ -196,7 +203,7 @@ def test_a_measured_correction_replaces_the_models_uncertainty(antenna, mirror):
     now = np.array(100.0)
     names = ("alidade", "elevation", "reflector", "feed_arm")
     six = {name: np.full(6, 1e-5) for name in names}
-    sharp = Known(six, np.eye(24) * 1e-14, replaces=True)
+    sharp = FrameCorrections(six, np.eye(24) * 1e-14, replaces=True)
     before = moving_ranger(RANGER, mirror, antenna, DRIVE, now, u_mount=1e-7)
     after = moving_ranger(RANGER, mirror, antenna, DRIVE, now, u_mount=1e-7, known=(sharp,))
     assert np.all(np.diag(after.covariance) < np.diag(before.covariance))
@@ -232,7 +239,7 @@ def test_strangers_are_refused(antenna, mirror):
     with pytest.raises(ValidityError, match="outside"):
         moving_ranger(RANGER, mirror, antenna, DRIVE, 1000.0, u_mount=1e-5)
     assert DRIVE.posture(100.0).temperature_c == 3.0
-    assert isinstance(DRIVE.posture(TIMES), Posture)
+    assert isinstance(DRIVE.posture(TIMES), TelescopePosture)
 
 
 def test_what_stands_on_the_alidade_does_not_follow_the_elevation_encoder(tmp_path):
@@ -278,7 +285,7 @@ def test_an_arm_that_ground_rangers_track_is_foretold_as_if_a_detector_saw_it(an
     state = follow(start(t[0], modes, u_offset=1e-2), t, samples, noise=noise).state
     known = vibrating(antenna.record, state, ahead, seen_at=(antenna, "ZEG41040L"))
     found = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(known,))
-    told = Known({"feed_arm": swing(ahead)}, np.zeros((2, 6, 6)))
+    told = FrameCorrections({"feed_arm": swing(ahead)}, np.zeros((2, 6, 6)))
     true = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(told,))
     still = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7)
     off = np.linalg.norm(found.station.scan_point - true.station.scan_point, axis=-1)

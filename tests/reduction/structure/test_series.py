@@ -6,7 +6,7 @@ import pytest
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.series import Spread
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.geometry.frames.rotation import from_vector
 from catseye.reduction.structure.check import left_out
 from catseye.reduction.structure.series import GroupSeries, SeriesModel, fit_structure
@@ -44,7 +44,7 @@ def planted(seed, *, epochs=40, n=8, noise=0.05, wind=(0.0, 0.0), own=0.0, hyste
     )
     names = tuple(f"P{i}" for i in range(n))
     mjd = 60000.0 + np.arange(epochs) / 48.0
-    posture = Posture(np.zeros(epochs), e, warm)
+    posture = TelescopePosture(np.zeros(epochs), e, warm)
     labels = tuple(f"epoch {t}" for t in range(epochs))
     return GroupSeries("arm", "reflector", names, mjd, posture, way, places, spread, PIVOT, labels), true
 
@@ -145,7 +145,7 @@ def test_what_is_unknown_or_floats_is_refused_by_name():
 
     warm = np.array(series.posture.temperature_c)
     warm[3] = np.nan
-    blind = replace(series, posture=Posture(series.posture.azimuth, series.posture.elevation, warm))
+    blind = replace(series, posture=TelescopePosture(series.posture.azimuth, series.posture.elevation, warm))
     with pytest.raises(InputError, match="epoch epoch 3: its temperature is unknown"):
         fit_structure(blind)
     fit_structure(blind, SeriesModel(temperature=False))

@@ -8,7 +8,7 @@ from catseye.reduction.structure.vibration import RangeSeries, difference, movem
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.twin.air import LivingAir
 from catseye.simulator.twin.conditions import LIVING_NIGHT, LivingPlanted
-from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.telescope import ARM_FOOT, ARM_LENGTH, telescope
 
 WINDOW, RATE, U = 0.128, 7.8, 20e-6
@@ -26,7 +26,7 @@ def twin(night_01):
     streams, planted = Streams(20), LivingPlanted(ignore=["wind"])
     start = night_01.site.campaign.start_mjd_utc
     air = LivingAir.of(night_01, LIVING_NIGHT, start, streams=streams, planted=planted)
-    return telescope(night_01, Motion.parse("fixed 145 45"), start, air, streams=streams, planted=planted)
+    return telescope(night_01, AxisMotion.parse("fixed 145 45"), start, air, streams=streams, planted=planted)
 
 
 def place(twin, seconds):

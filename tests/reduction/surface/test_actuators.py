@@ -6,7 +6,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.optics.zernike import Term
 from catseye.reduction.surface.actuators import actuators_of, corrections, rows_of
-from catseye.reduction.surface.shape import Aperture, ShapeSettings, shape_of
+from catseye.reduction.surface.shape import LitAperture, ShapeSettings, shape_of
 from surface_scene import APERTURE, COS, NAMES, NORMAL, PLACES, SITE, half_path_of, prisms
 
 
@@ -93,4 +93,4 @@ def test_the_sites_actuators_stand_under_its_prisms():
     assert len(names) == 2209
     height = np.sum(places[:, :2] ** 2, axis=1) / 240.0
     np.testing.assert_allclose(places[:, 2], height, atol=1e-6)  # as written, to the micrometre
-    assert np.linalg.norm(Aperture.of(SITE.site.paraboloid).unit(places), axis=1).max() < 1.03
+    assert np.linalg.norm(LitAperture.of(SITE.site.paraboloid).unit(places), axis=1).max() < 1.03

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.observations.kinds import Coordinates, Distances
+from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.estimation.observations.unit_direction import across
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.triplet.ties import (
@@ -105,7 +105,7 @@ def test_a_lateral_offset_shows_where_a_unit_is_seen_in_many_postures():
     groups = list(triplet_observations(units, TripletParameters(first, np.full(m, LATERAL))))
     columns = (first[:, None] + [0, 3, BALL]).ravel()
     observed = np.concatenate(points) + u_point * rng.normal(size=9 * m)
-    groups.append(Coordinates.of_points("points", observed, np.full(9 * m, u_point**2), columns))
+    groups.append(ObservedCoordinates.of_points("points", observed, np.full(9 * m, u_point**2), columns))
     free = np.ones(COUNT * m, dtype=bool)
     free[(first[1:, None] + [LATERAL, LATERAL + 1]).ravel()] = False  # nothing uses the others' own
     solution = adjust(triplet_start(units), groups, free=free).require_converged()

@@ -12,7 +12,7 @@ from catseye.signal.cycles.whole import unwrapped_length, whole_cycles
 from catseye.signal.detection.frequency_plan import FrequencyPlan, synthetic_half_wavelength, unambiguous_range
 from catseye.signal.detection.phase import detect
 from catseye.signal.detection.sampling import (
-    Sampling,
+    SamplingPlan,
     aliasing_harmonics,
     buffer_mean,
     jitter_amplitude_factor,
@@ -100,7 +100,7 @@ def test_beats_follow_light_and_oscillator():
     assert below.beat_hz(1000.0, oscillator_offset_hz=3.0) == 997.0
     receding = -2 * 0.25 / SPEED_OF_LIGHT * above.modulation_hz  # Hz, Doppler at 0.25 m/s
     for plan in (above, below):
-        rate = float(motion_effect(plan, Sampling(), range_rate=0.25).phase_rate)
+        rate = float(motion_effect(plan, SamplingPlan(), range_rate=0.25).phase_rate)
         assert plan.beat_hz(1000.0, received_offset_hz=receding) == pytest.approx(1000 - rate / (2 * np.pi), abs=1e-9)
 
 
@@ -125,26 +125,26 @@ def test_two_modulations_make_a_longer_one():
         (lambda: synthetic_half_wavelength(1e9, 1e9), "two modulations of the same 1000000000.0 Hz have no beat"),
         (lambda: unambiguous_range([1e9, 1.5]), "modulation 1.5 Hz is not a whole number"),
         (lambda: unambiguous_range([]), "no modulation given"),
-        (lambda: Sampling().with_(cycles=1200), "1200 cycles of 64 samples are 76800, the buffer holds 65536"),
+        (lambda: SamplingPlan().with_(cycles=1200), "1200 cycles of 64 samples are 76800, the buffer holds 65536"),
         (
-            lambda: Sampling().with_(intermediate_hz=2000.0),
+            lambda: SamplingPlan().with_(intermediate_hz=2000.0),
             "128000 samples/s, the converter takes 100000; at most 1562.5",
         ),
-        (lambda: Sampling(cycles=0), "cycles 0 is not a whole number of at least 1"),
-        (lambda: Sampling(cycles=1.0), "cycles 1.0 is not a whole number"),
-        (lambda: Sampling(cycles=True), "cycles True is not a whole number"),
-        (lambda: Sampling(samples_per_cycle=2), "samples a cycle 2 is not a whole number of at least 3"),
-        (lambda: Sampling(samples_per_cycle=70_000, intermediate_hz=1.0), "take fewer samples a cycle"),
+        (lambda: SamplingPlan(cycles=0), "cycles 0 is not a whole number of at least 1"),
+        (lambda: SamplingPlan(cycles=1.0), "cycles 1.0 is not a whole number"),
+        (lambda: SamplingPlan(cycles=True), "cycles True is not a whole number"),
+        (lambda: SamplingPlan(samples_per_cycle=2), "samples a cycle 2 is not a whole number of at least 3"),
+        (lambda: SamplingPlan(samples_per_cycle=70_000, intermediate_hz=1.0), "take fewer samples a cycle"),
         (
-            lambda: Sampling(samples_per_cycle=8, intermediate_hz=10_001.0),
+            lambda: SamplingPlan(samples_per_cycle=8, intermediate_hz=10_001.0),
             "10001.0 Hz is not above 0 and at most 10000",
         ),
-        (lambda: Sampling(intermediate_hz=float("nan")), "intermediate frequency nan Hz"),
-        (lambda: Sampling(intermediate_hz=0.0), "intermediate frequency 0.0 Hz"),
-        (lambda: Sampling().ranges_per_second(-1.0), "overhead -1.0 s"),
+        (lambda: SamplingPlan(intermediate_hz=float("nan")), "intermediate frequency nan Hz"),
+        (lambda: SamplingPlan(intermediate_hz=0.0), "intermediate frequency 0.0 Hz"),
+        (lambda: SamplingPlan().ranges_per_second(-1.0), "overhead -1.0 s"),
         (lambda: aliasing_harmonics(2, 9), "samples a cycle 2"),
         (
-            lambda: motion_effect(FrequencyPlan(), Sampling(), range_rate=1.0),
+            lambda: motion_effect(FrequencyPlan(), SamplingPlan(), range_rate=1.0),
             "turns 1.28 cycles within a buffer of 0.128 s",
         ),
     ],
@@ -157,10 +157,10 @@ def test_what_the_instrument_cannot_do_is_refused_in_one_line(make, text):
 
 
 def test_a_refused_change_leaves_the_sampling_as_it_was():
-    sampling = Sampling()
+    sampling = SamplingPlan()
     with pytest.raises(ValidityError):
         sampling.with_(cycles=1025)
-    assert sampling == Sampling(64, 128, 1000.0)
+    assert sampling == SamplingPlan(64, 128, 1000.0)
     assert sampling.with_(cycles=1024).samples == 65_536  # the limit itself is allowed
     assert sampling.with_(intermediate_hz=1562.5).sample_rate_hz == 100_000.0
     assert sampling.with_(samples_per_cycle=10, intermediate_hz=10_000.0).sample_rate_hz == 100_000.0
@@ -170,12 +170,12 @@ def test_a_refused_change_leaves_the_sampling_as_it_was():
 
 def test_narrow_integers_do_not_overflow():
     with pytest.raises(ValidityError, match="76800"):
-        Sampling(samples_per_cycle=np.int16(64), cycles=np.int16(1200))
-    assert Sampling(samples_per_cycle=np.int8(64), cycles=np.int8(100)).samples == 6400
+        SamplingPlan(samples_per_cycle=np.int16(64), cycles=np.int16(1200))
+    assert SamplingPlan(samples_per_cycle=np.int8(64), cycles=np.int8(100)).samples == 6400
 
 
 def test_durations_and_rates():
-    usual = Sampling()
+    usual = SamplingPlan()
     assert usual.duration == 0.128
     assert usual.ranges_per_second() == 7.8125  # "below 7.8 ranges a second" with any overhead
     assert usual.ranges_per_second(0.1) == pytest.approx(1 / 0.228)
@@ -184,7 +184,7 @@ def test_durations_and_rates():
 
 @pytest.mark.parametrize(("n", "m"), [(3, 1), (4, 7), (16, 5), (64, 20)])
 def test_the_mean_over_a_buffer_agrees_with_mpmath(n, m):
-    sampling = Sampling(n, m, 10.0)
+    sampling = SamplingPlan(n, m, 10.0)
     for x in (0.0, 1e-9, 0.057, 0.5, 1.0, 2.25, n - 1.0, n - 1e-7, float(n), n + 0.3, -7.3, 100.125):
         with mpmath.workdps(40):
             exact = complex(mpmath.fsum(mpmath.expjpi(2 * mpmath.mpf(x) * j / n) for j in range(m * n)) / (m * n))
@@ -194,7 +194,7 @@ def test_the_mean_over_a_buffer_agrees_with_mpmath(n, m):
 
 @pytest.mark.parametrize(("n", "m"), [(3, 2), (4, 9), (16, 8), (64, 128)])
 def test_any_tone_is_detected_as_its_response_says(n, m):
-    sampling = Sampling(n, m, 1000.0)
+    sampling = SamplingPlan(n, m, 1000.0)
     rng = np.random.default_rng(n)
     for f in (0.0, 57.0, 999.9, 1000.0, 1000.37, 2000.0, 31_999.0, 63_000.0, 65_017.0, *rng.uniform(0, 1e5, 10)):
         phase = rng.uniform(0, 2 * np.pi)
@@ -203,7 +203,7 @@ def test_any_tone_is_detected_as_its_response_says(n, m):
 
 
 def test_a_signal_off_its_lock_has_the_phase_of_the_middle_and_a_cyclic_bias():
-    sampling, offset = Sampling(), 1e-4
+    sampling, offset = SamplingPlan(), 1e-4
     phases = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     found = np.array([detect(tone(sampling, 1000 * (1 + offset), p), 64).phase for p in phases])
     middle = phases - 2 * np.pi * offset * 1000.0 * sampling.centre
@@ -220,10 +220,10 @@ def test_a_signal_off_its_lock_has_the_phase_of_the_middle_and_a_cyclic_bias():
 
 def test_harmonics_vanish_or_alias_as_said():
     for n in (3, 4, 5, 16, 64):
-        sampling = Sampling(n, 4, 100.0)
+        sampling = SamplingPlan(n, 4, 100.0)
         seen = [k for k in range(2, 200) if abs(detect(tone(sampling, 100.0 * k, 0.3), n).phasor) > 1e-9]
         assert seen == aliasing_harmonics(n, 199)
-    sampling = Sampling(16, 4)
+    sampling = SamplingPlan(16, 4)
     above = detect(tone(sampling, 17_000.0, 0.3), 16).phasor
     below = detect(tone(sampling, 15_000.0, 0.3), 16).phasor
     assert abs(above - np.exp(0.3j)) < 1e-12
@@ -231,7 +231,7 @@ def test_harmonics_vanish_or_alias_as_said():
 
 
 def test_the_bound_of_a_spur_is_reached_and_never_passed():
-    sampling = Sampling(16, 8)
+    sampling = SamplingPlan(16, 8)
     response = tone_response(sampling, 1060.0)
     signal = tone(sampling, 1000.0, 1.0)
     phases = np.linspace(0, 2 * np.pi, 720, endpoint=False)
@@ -251,7 +251,7 @@ def test_the_bound_of_a_spur_is_reached_and_never_passed():
 def test_a_line_in_the_phase_is_averaged_as_said():
     depth, n = 1e-3, 64
     for m, line in ((128, 57.0), (128, 60.0), (16, 57.0), (1000, 57.0)):
-        sampling = Sampling(n, m)
+        sampling = SamplingPlan(n, m)
         t = np.arange(sampling.samples) / sampling.sample_rate_hz
         response = complex(modulation_response(sampling, line))
         for psi in (0.0, 1.0, 2.5):
@@ -260,13 +260,13 @@ def test_a_line_in_the_phase_is_averaged_as_said():
             expected = depth * (np.exp(-1j * psi) * response).real
             # the image's share, and second order in the depth
             assert abs(seen - expected) <= depth * abs(response) * line / 2000 * 1.05 + depth**2
-    assert abs(modulation_response(Sampling(cycles=1000), [50.0, 57.0, 60.0])).max() < 1e-12
+    assert abs(modulation_response(SamplingPlan(cycles=1000), [50.0, 57.0, 60.0])).max() < 1e-12
 
 
 @pytest.mark.parametrize(("n", "phase"), [(3, 0.4), (4, 0.0), (5, 1.0), (16, 2.0)])
 @pytest.mark.parametrize("radians", [0.02, 0.4])
 def test_jitter_makes_the_loss_and_the_scatter_that_is_claimed(n, phase, radians):
-    sampling = Sampling(n, 120 // n)
+    sampling = SamplingPlan(n, 120 // n)
     u_trigger = radians / (2 * np.pi * 1000.0)
     rng = np.random.default_rng(n)
     t = np.arange(sampling.samples) / sampling.sample_rate_hz + rng.normal(
@@ -283,7 +283,7 @@ def test_jitter_makes_the_loss_and_the_scatter_that_is_claimed(n, phase, radians
 
 
 def test_jitter_of_four_samples_a_cycle_depends_on_the_phase():
-    sampling, u = Sampling(4, 64), 0.02 / (2 * np.pi * 1000.0)
+    sampling, u = SamplingPlan(4, 64), 0.02 / (2 * np.pi * 1000.0)
     rng = np.random.default_rng(1)
     t = np.arange(256) / 4000.0 + rng.normal(scale=u, size=(10_000, 256))
     scatter = [np.std(detect(np.cos(2 * np.pi * 1000 * t - p), 4).phase - p) for p in (np.pi / 4, np.pi / 2)]
@@ -295,7 +295,7 @@ def test_jitter_of_four_samples_a_cycle_depends_on_the_phase():
 @pytest.mark.parametrize("side", ["above", "below"])
 @pytest.mark.parametrize(("speed", "acceleration"), [(0.01, 0.0), (-0.05, 0.0), (0.3, 0.0), (0.002, 0.05)])
 def test_a_moving_target_reads_as_said(side, speed, acceleration):
-    plan, sampling = FrequencyPlan(oscillator=side), Sampling()
+    plan, sampling = FrequencyPlan(oscillator=side), SamplingPlan()
     effect = motion_effect(plan, sampling, range_rate=speed, acceleration=acceleration, group_index=N_AIR)
     t = np.arange(sampling.samples) / sampling.sample_rate_hz
     after = t - t.mean()
@@ -316,7 +316,7 @@ def test_a_moving_target_reads_as_said(side, speed, acceleration):
 
 
 def test_a_target_at_rest_has_no_effect():
-    effect = motion_effect(FrequencyPlan(), Sampling(), range_rate=[0.0, 0.0])
+    effect = motion_effect(FrequencyPlan(), SamplingPlan(), range_rate=[0.0, 0.0])
     assert effect.amplitude_factor.tolist() == [1.0, 1.0]
     assert np.max(effect.phase_bias_bound) < 1e-15
     assert effect.range_since_trigger.tolist() == [0.0, 0.0]

@@ -7,12 +7,12 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from catseye.constants import PPM, SPEED_OF_LIGHT
-from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, Air, group_refractivity_ppm
+from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, TrueAir, group_refractivity_ppm
 from catseye.simulator.night.faults import EFFECTS, Faults, Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
 from catseye.simulator.night.head import electronic_phase
 from catseye.simulator.night.paraboloid import normal_deviation
-from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.simulate import simulate_night
 from catseye.simulator.night.world import kelvin_from_ground
 
@@ -173,7 +173,7 @@ def test_the_scan_point_stands_a_quarter_of_a_metre_above_the_fixed_point(night)
     ],
 )
 def test_the_nominal_posture_puts_vertex_and_focus_where_the_site_says(azimuth, elevation, z_mm, ground_mm):
-    pose = Posture(azimuth, elevation)
+    pose = TruePosture(azimuth, elevation)
     at = np.array([0.0, 0.0, z_mm / 1000])
     np.testing.assert_allclose(pose.nominal(at) * 1000, ground_mm, atol=6e-4)  # printed to the micrometre
     np.testing.assert_allclose(pose.reflector_from_nominal(pose.nominal(at)), at, atol=1e-12)
@@ -189,7 +189,7 @@ def test_the_air_has_the_sensitivities_that_the_notes_print():
 
 @pytest.mark.parametrize("conditions", [NIGHT, SUMMER_DAY, WINTER])
 def test_the_path_index_is_the_mean_of_the_index_along_the_path(conditions):
-    air = Air(conditions)
+    air = TrueAir(conditions)
     start, end = np.array([110.0, 40.0, 0.3]), np.array([10.0, 20.0, 110.0])
     share = (np.arange(20000) + 0.5) / 20000
     dense = air.index(start[2] + share * (end - start)[2], 900.0).mean()

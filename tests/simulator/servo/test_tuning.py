@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete, freqz
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, ValidityError
 from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, velocity_integer
-from catseye.simulator.servo.axis import ServoAxis, Trace
+from catseye.simulator.servo.axis import AxisTrace, ServoAxis
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign, Motor
 from catseye.simulator.servo.tuning import (
@@ -28,7 +28,7 @@ from catseye.simulator.servo.tuning import (
 PLANT = plant_of(AxisDesign())
 
 
-def moves(design: AxisDesign, *targets: int, bits: int = 8) -> list[Trace]:
+def moves(design: AxisDesign, *targets: int, bits: int = 8) -> list[AxisTrace]:
     plant = plant_of(design)
     made = ServoAxis(MotionChip(output_bits=bits), Motor(design))
     made.axis(True)
@@ -131,11 +131,11 @@ def test_an_identified_axis_is_tuned_as_the_true_one():
 
 
 def test_moves_that_tell_nothing_are_refused():
-    still = Trace(np.arange(9) * SAMPLE_TIME, *(np.zeros((5, 9))))
+    still = AxisTrace(np.arange(9) * SAMPLE_TIME, *(np.zeros((5, 9))))
     with pytest.raises(EstimationError, match="do not tell"):
         identify(still)
     real = moves(AxisDesign(), 5000)[0]
-    swapped = Trace(real.time, real.desired, real.velocity, real.actual, real.angle, -real.output)
+    swapped = AxisTrace(real.time, real.desired, real.velocity, real.actual, real.angle, -real.output)
     with pytest.raises(EstimationError, match="against the acceleration"):
         identify(swapped)
 
@@ -172,7 +172,7 @@ def test_other_refusals():
     for time, position in (([0.0, 1.0], [0.0, np.nan]), ([], []), ([0.0, 1.0], [0.0])):
         with pytest.raises(ValidityError, match="finite numbers"):
             step_metrics(time, position, target=5.0)
-    one = Trace(np.zeros(1), *np.zeros((5, 1)))
+    one = AxisTrace(np.zeros(1), *np.zeros((5, 1)))
     for traces in ((), (one,)):
         with pytest.raises(EstimationError, match="no moves"):
             identify(*traces)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.simulator.twin.converter import Converter
 
 VOLT = 10.0 / 32768.0
-DEFAULT = Sampling()
+DEFAULT = SamplingSettings()
 QUIET = Converter(offset=0.1, noise=1e-9)
 
 
@@ -77,7 +77,13 @@ def test_noise_is_white_of_the_size_told_and_the_generator_s():
 
 
 @pytest.mark.parametrize(
-    "sampling", [Sampling(3, 1, 1), Sampling(10, 1, 10_000), Sampling(64, 1024, 1000), Sampling(1000, 5, 99)]
+    "sampling",
+    [
+        SamplingSettings(3, 1, 1),
+        SamplingSettings(10, 1, 10_000),
+        SamplingSettings(64, 1024, 1000),
+        SamplingSettings(1000, 5, 99),
+    ],
 )
 def test_any_legal_sampling_gives_its_words(sampling):
     found = codes(np.full(9, 2.0 * np.exp(-1j)), sampling=sampling)
@@ -88,7 +94,7 @@ def test_any_legal_sampling_gives_its_words(sampling):
 
 
 def test_a_return_that_turns_far_within_a_slow_cycle_is_sampled_as_it_is():
-    sampling = Sampling(1000, 2, 1)
+    sampling = SamplingSettings(1000, 2, 1)
     at = np.linspace(0.0, 2.0, 401)
     found = codes(3.0 * np.exp(1j * (0.4 + 15.0 * at)), at, sampling)
     t = np.arange(2000) / 1000.0
@@ -100,7 +106,7 @@ def test_slow_and_fast_cycles_are_sampled_alike():
     """A phase that turns straight: 99 Hz goes sample by sample, 100 Hz cycle by cycle."""
     found = []
     for hertz in (99, 100):
-        sampling = Sampling(64, 10, hertz)
+        sampling = SamplingSettings(64, 10, hertz)
         at = np.linspace(0.0, sampling.duration, 25)
         found.append(order(codes(3.0 * np.exp(2j * at * hertz / 100), at, sampling)))
     assert np.allclose(*found, atol=1e-3)

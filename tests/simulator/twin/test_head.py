@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 from catseye.ranger.ranger import Ranger
 from catseye.records.files.reading import read_record
@@ -27,7 +27,7 @@ START = 52889.125
 ZP3 = ROOT / "examples/mirrors/ZP3.toml"
 VELOCITY, ACCELERATION = velocity_integer(12_000), acceleration_integer(40_000)
 BY_COUNTS = np.array([1e-3, 2e-3])  # rad of phase a count: a world whose returns tell where the mirror is
-SHORT = Sampling(64, 8, 1000)
+SHORT = SamplingSettings(64, 8, 1000)
 
 
 class World:
@@ -97,7 +97,7 @@ def test_the_world_is_asked_along_the_buffer_for_the_mirror_s_true_counts():
     head.start(0, 3000, velocity=VELOCITY, acceleration=ACCELERATION)
     clock.advance(0.1)
     begun = world.seconds(clock.now_ns())
-    head.trigger(Sampling())
+    head.trigger(SamplingSettings())
     clock.advance(0.06)
     between = head._caught_up(exactly=True).axes.counts
     clock.advance(0.068)
@@ -120,7 +120,7 @@ def test_the_phase_of_a_buffer_on_the_move_is_the_mean_of_its_way(late):
     begin = head.now().after(0.5)
     head.follow((np.array([100.0, 50.0]), np.array([300.0, 0.0])), (begin, begin.after(2.0)))
     clock.advance(1.5 + late)
-    buffer = shot(head, clock, Sampling())
+    buffer = shot(head, clock, SamplingSettings())
     middle = world.seconds(clock.now_ns()) - 0.064
     expected = np.array([200.0, 25.0]) + np.array([100.0, -25.0]) * (0.064 + late + off(head, clock))
     wanted = expected @ BY_COUNTS + 40.0 * (middle - 0.5e-3 / 64)  # the middle of the samples
@@ -320,7 +320,7 @@ def test_a_buffer_costs_less_than_its_share_of_a_core():
     took = []
     for _ in range(20):
         begin = time.perf_counter()
-        shot(head, clock, Sampling())
+        shot(head, clock, SamplingSettings())
         took.append(time.perf_counter() - begin)
     assert min(took) < 2.5e-3
 

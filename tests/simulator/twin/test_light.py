@@ -7,15 +7,15 @@ from catseye.constants import DEGREE
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
-from catseye.simulator.twin.light import Electronics, acceptance, glass_way, path_waves, prism_way
-from catseye.simulator.twin.targets import Retro
+from catseye.simulator.twin.light import ElectronicsWalk, acceptance, glass_way, path_waves, prism_way
+from catseye.simulator.twin.targets import BodyRetroreflector
 from simulator.living_scene import only, rms
 
 UP = np.array([0.0, 0.0, 1.0])
 ANGLES = np.linspace(0.0, 44.0, 12) * DEGREE
-SLAB = Retro("prism", "dish", np.zeros(3), UP, (0.0381,), (4.0, 5.0))
-BALL = Retro("ball", "dish", np.zeros(3), UP, (0.050, 0.0965), (2.0, 3.0))
-HOLLOW = Retro("hollow", "ground", np.zeros(3), None, (), (3.0, 4.0))
+SLAB = BodyRetroreflector("prism", "dish", np.zeros(3), UP, (0.0381,), (4.0, 5.0))
+BALL = BodyRetroreflector("ball", "dish", np.zeros(3), UP, (0.050, 0.0965), (2.0, 3.0))
+HOLLOW = BodyRetroreflector("hollow", "ground", np.zeros(3), None, (), (3.0, 4.0))
 
 
 def test_a_prism_delays_as_the_rays_of_the_night_do():
@@ -62,7 +62,7 @@ def test_acceptance_falls_with_the_angle_to_nothing():
 
 def heads(*effects, count=250):
     planted = only(*effects)
-    return [Electronics(f"head {k}", Streams(5), planted) for k in range(count)]
+    return [ElectronicsWalk(f"head {k}", Streams(5), planted) for k in range(count)]
 
 
 @pytest.mark.parametrize("lag", [120.0, 3600.0, 14_400.0])

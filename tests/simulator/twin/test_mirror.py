@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from catseye.errors import InputError
 from catseye.ranger.motion_units import SAMPLE_TIME
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.mirror import MirrorTuning, Track, TwinMirror
+from catseye.simulator.twin.mirror import CountSegment, MirrorTuning, TwinMirror
 
 VELOCITY, ACCELERATION = 268_435, 305  # 12 000 counts/s, 40 000 counts/s^2
 SECOND = round(1.0 / SAMPLE_TIME)
@@ -31,13 +31,13 @@ def homed(*faults, **options) -> TwinMirror:
     return made
 
 
-def line(made: TwinMirror, counts, *, begin, seconds, rates) -> Track:
+def line(made: TwinMirror, counts, *, begin, seconds, rates) -> CountSegment:
     n0 = np.array(counts, dtype=float)
     start = made.samples + begin / SAMPLE_TIME
-    return Track((start, start + seconds / SAMPLE_TIME), (n0, n0 + np.array(rates) * seconds))
+    return CountSegment((start, start + seconds / SAMPLE_TIME), (n0, n0 + np.array(rates) * seconds))
 
 
-def followed(made: TwinMirror, track: Track, seconds: float):
+def followed(made: TwinMirror, track: CountSegment, seconds: float):
     """Truth less track at every fifth sample from now on, (n, 2)."""
     first = made.samples
     off = []
@@ -159,7 +159,7 @@ def test_a_track_takes_over_from_a_track_without_a_jerk():
     first = line(made, (500, 500), begin=0.5, seconds=5.0, rates=(160.0, 80.0))
     made.follow(first)
     followed(made, first, 2.0)
-    again = Track(first.samples, first.counts)
+    again = CountSegment(first.samples, first.counts)
     assert made.follow(again)
     assert np.max(np.abs(followed(made, again, 1.0))) < 4.0
 
@@ -176,7 +176,7 @@ def test_a_track_needs_amplifiers_and_no_move():
     made.pass_to(made.samples + 3 * SECOND)
     assert made.follow(track)
     with pytest.raises(InputError, match="expected within"):
-        made.follow(Track(track.samples, (np.array([np.nan, 0.0]), np.array([0.0, 0.0]))))
+        made.follow(CountSegment(track.samples, (np.array([np.nan, 0.0]), np.array([0.0, 0.0]))))
 
 
 def test_a_move_gives_a_track_up_even_with_another_acceleration():

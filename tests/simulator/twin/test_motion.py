@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.simulator.twin.motion import FASTEST, Motion, read_table
+from catseye.simulator.twin.motion import FASTEST, AxisMotion, read_table
 
 LATITUDE, MJD = 38.433121 * DEGREE, 60_000.1
 SIDEREAL = 2 * np.pi * 1.00273781191135448 / 86_400.0  # rad of hour angle a second of UT1; IAU 2000
 
 
 def angles(motion, seconds):
-    motion = Motion.parse(motion) if isinstance(motion, str) else motion
+    motion = AxisMotion.parse(motion) if isinstance(motion, str) else motion
     return motion.angles(np.asarray(seconds, dtype=float), latitude=LATITUDE, start_mjd=MJD)
 
 
@@ -116,7 +116,7 @@ def test_azimuth_counts_on_without_jumps_through_two_days(azimuth, elevation):
 def test_a_table_passes_its_postures_and_stands_outside(tmp_path):
     file = tmp_path / "way.csv"
     file.write_text("mjd,azimuth_deg,elevation_deg\n60000.1,10,30\n60000.101,11,31\n60000.103,15,30\n", "utf-8")
-    motion = Motion.parse(f"table {file}")
+    motion = AxisMotion.parse(f"table {file}")
     at = np.array([-50.0, 0.0, 86.4, 259.2, 900.0])
     a = angles(motion, at)
     assert a.azimuth / DEGREE == pytest.approx([10, 10, 11, 15, 15], abs=1e-6)  # an MJD is good to 0.6 us
@@ -147,7 +147,7 @@ def test_a_table_passes_its_postures_and_stands_outside(tmp_path):
 )
 def test_what_is_no_motion_is_refused(text, said):
     with pytest.raises(InputError, match=said):
-        Motion.parse(text)
+        AxisMotion.parse(text)
 
 
 def test_a_track_through_the_zenith_is_refused():

@@ -9,7 +9,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import format_request
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.records.site.folder import read_site
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from catseye.simulator.twin.faults import Fault, FaultBoard
@@ -94,7 +94,7 @@ def test_each_ranger_of_a_site_is_served_at_its_address_from_its_files(few):
             told = await world.ask(client, "COO", "ZEG41040L")
             assert told.ok
             ranger = world.site.rangers[name]
-            assert Status.INITIALISED in ranger.status()
+            assert StatusWord.INITIALISED in ranger.status()
             mirror = few.mirror_of(name)
             assert ranger.limits == (mirror.az_low_limit, mirror.az_high_limit)
             assert (await world.ask(client, "CMEAS", 1, 0)).ok
@@ -168,7 +168,7 @@ def test_a_dead_ranger_comes_back_cold(few):
         assert (await world.ask(other, "VER")).ok
         await asyncio.sleep(150.1 - world.loop.time())
         client = await world.client("ZY101")
-        assert world.site.rangers["ZY101"].status() == Status.AUTO
+        assert world.site.rangers["ZY101"].status() == StatusWord.AUTO
         assert (await world.ask(client, "LST")).values == ("0",)
         assert not (await world.ask(client, "CIL", 1)).ok
         client.close()
@@ -203,7 +203,7 @@ def test_a_hung_ranger_takes_lines_and_answers_nothing_and_forgets_them(few):
         await asyncio.sleep(5.0)
         assert not lost.done()
         assert float((await world.ask(client, "D0")).text) == few.mirror_of("ZY101").d0_mm
-        assert Status.INITIALISED in world.site.rangers["ZY101"].status()
+        assert StatusWord.INITIALISED in world.site.rangers["ZY101"].status()
         client.close()
         fresh.close()
 
@@ -229,7 +229,7 @@ def test_a_cut_network_breaks_connections_but_the_ranger_goes_on(few):
         await asyncio.sleep(26.1 - world.loop.time())
         client = await world.client("ZY101")
         reply = await world.ask(client, "STW")
-        assert {Status.SCANNING, Status.INITIALISED} <= set(Status(int(reply.text, 16)))
+        assert {StatusWord.SCANNING, StatusWord.INITIALISED} <= set(StatusWord(int(reply.text, 16)))
         client.close()
 
     running.run(story)

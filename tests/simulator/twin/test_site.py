@@ -17,7 +17,7 @@ from catseye.records.site.folder import read_site
 from catseye.simulator.night.air import group_refractivity_ppm
 from catseye.simulator.twin.conditions import DEWY_NIGHT, STILL, LivingPlanted
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.motion import Motion
+from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.site import Twin
 from repository import TESTS
 from simulator.living_scene import START, digest, only, phasor, rms, site, twin, whole_site
@@ -360,7 +360,7 @@ def test_order_of_asking_changes_nothing():
 
 def test_a_campaigns_directory_is_a_site_too():
     night = Path(whole_site().directory).parents[1] / "night-01"
-    made = Twin(read_site(night), seed=1, start_mjd=52_889.125, motion=Motion.parse("fixed 145.3 30"))
+    made = Twin(read_site(night), seed=1, start_mjd=52_889.125, motion=AxisMotion.parse("fixed 145.3 30"))
     ranger, name = "ZY101", sorted(n for n in made.scene.retros if n.endswith("-B"))[0]
     assert np.isfinite(aimed(made, ranger, name, 0.0)).all()
     assert abs(phasor(made.shot(ranger, "ZRG", 0.0))) == pytest.approx(6.5, abs=0.1)

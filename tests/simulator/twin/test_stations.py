@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts, imperfect_ray
-from catseye.geometry.mirror.pointing import Station as Ideal
+from catseye.geometry.mirror.pointing import MirrorStation as Ideal
 from catseye.geometry.mirror.pointing import counts as ideal_counts
 from catseye.geometry.mirror.pointing import ray as ideal_ray
 from catseye.ranger.initialisation import mount_from_reflector

@@ -1,7 +1,7 @@
 """The index of air by a named model, checked against the model's limits.
 
 A new model is one file with a MODEL, and one line here. Carbon dioxide enters where the model has it; the others' air
-has a fixed share, which `Air.co2_ppm` tells.
+has a fixed share, which `AirState.co2_ppm` tells.
 """
 
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from catseye.atmosphere.index import barrell_sears1963, ciddor_hill1999, iag1999_closed, rueger1990
-from catseye.atmosphere.index.model import Kind, Model, Partials, Sensitivity
-from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.index.model import IndexModel, IndexSensitivity, Kind, Partials
+from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.weather import humidity
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
 
-MODELS: dict[str, Model] = {
+MODELS: dict[str, IndexModel] = {
     "ciddor_hill1999": ciddor_hill1999.MODEL,
     "rueger1990": rueger1990.MODEL,
     "iag1999_closed": iag1999_closed.MODEL,
@@ -26,11 +26,11 @@ MODELS: dict[str, Model] = {
 KERNELS = {"ciddor_hill1999", "rueger1990"}  # those with a compiled form beside the plain one, `NAME_kernel.py`
 LARGE = 200_000  # states from which on the compiled form is worth loading: 0.7 s, once
 
-MODULATION = Limit("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
+MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
 
 
 @dataclass(frozen=True)
-class Air:
+class AirState:
     """Everything about one state of air, or an array of them, that a ranger needs.
 
     temperature_c          air temperature, °C
@@ -60,8 +60,8 @@ class Air:
     humidity_percent: Any
     dew_point_c: Any
     group_wavelength: Any
-    sensitivity: Sensitivity
-    phase_sensitivity: Sensitivity
+    sensitivity: IndexSensitivity
+    phase_sensitivity: IndexSensitivity
     standard_uncertainty: Any
     co2_ppm: Any
     model: str
@@ -207,7 +207,7 @@ def air(
     model="ciddor_hill1999",
     co2_ppm=450.0,
     modulation_hz=1500e6,
-) -> Air:
+) -> AirState:
     """Both indices of air, its vapour, and how the indices move with the weather.
 
     temperature_c      air temperature, °C, within the model's limits
@@ -241,7 +241,7 @@ def air_of_vapour(
     model="ciddor_hill1999",
     co2_ppm=450.0,
     modulation_hz=1500e6,
-) -> Air:
+) -> AirState:
     """The same from the partial pressure of the vapour, however that was found: dew point, wet bulb.
 
     vapour_pressure_hpa   partial pressure of water vapour, hPa, 0 to saturation
@@ -260,14 +260,16 @@ def air_of_vapour(
     return _air(chosen, *weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm, modulation_hz=modulation_hz)
 
 
-def _air(chosen: Model, temperature_c, pressure_hpa, vapour, relative, *, wavelength_um, co2_ppm, modulation_hz) -> Air:
+def _air(
+    chosen: IndexModel, temperature_c, pressure_hpa, vapour, relative, *, wavelength_um, co2_ppm, modulation_hz
+) -> AirState:
     MODULATION.check(modulation_hz)
     state = (temperature_c, pressure_hpa, vapour)
     saturation = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula)
     light = {"wavelength_um": wavelength_um, "co2_ppm": co2_ppm}
     group = chosen.refractivity(*state, **light)
     phase = chosen.refractivity(*state, **light, kind="phase")
-    return Air(
+    return AirState(
         temperature_c=temperature_c,
         pressure_hpa=pressure_hpa,
         group_index=1.0 + group,
@@ -315,13 +317,13 @@ def _kernel(model: str) -> Callable[..., Any]:
     return refractivity
 
 
-def _known(model: str) -> Model:
+def _known(model: str) -> IndexModel:
     if model not in MODELS:
         raise ValidityError(f"air model {model!r} is unknown; choose one of {', '.join(MODELS)}")
     return MODELS[model]
 
 
-def _check(chosen: Model, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm) -> None:
+def _check(chosen: IndexModel, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm) -> None:
     """Every argument within the model's limits, and the vapour leaves room for air."""
     chosen.check(
         temperature_c=temperature_c,
@@ -334,20 +336,22 @@ def _check(chosen: Model, temperature_c, pressure_hpa, humidity_percent, wavelen
     _check_share(chosen, e, pressure_hpa)
 
 
-def _check_vapour(chosen: Model, temperature_c, pressure_hpa, vapour_pressure_hpa, wavelength_um, co2_ppm) -> None:
+def _check_vapour(chosen: IndexModel, temperature_c, pressure_hpa, vapour_pressure_hpa, wavelength_um, co2_ppm) -> None:
     """The same where the vapour pressure is given; it may reach saturation, to rounding."""
     chosen.check(temperature_c=temperature_c, pressure_hpa=pressure_hpa, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
     e = np.asarray(vapour_pressure_hpa, float)
-    Limit("vapour pressure", "hPa", 0.0, np.inf, "the notion of a pressure").check(e)
+    ValidInterval("vapour pressure", "hPa", 0.0, np.inf, "the notion of a pressure").check(e)
     saturated = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula).pressure_hpa
     SATURATED.check(100.0 * e / saturated)
     _check_share(chosen, e, pressure_hpa)
 
 
-def _check_share(chosen: Model, vapour_pressure_hpa, pressure_hpa) -> None:
+def _check_share(chosen: IndexModel, vapour_pressure_hpa, pressure_hpa) -> None:
     share = 100.0 * vapour_pressure_hpa / np.asarray(pressure_hpa, float)
-    Limit("vapour's share of the pressure", "%", 0.0, 100.0, chosen.limits["humidity_percent"].source).check(share)
+    ValidInterval("vapour's share of the pressure", "%", 0.0, 100.0, chosen.limits["humidity_percent"].source).check(
+        share
+    )
 
 
 # 0.2 % of grace: the saturation formulas differ by 0.1 % and each instrument comes with its own
-SATURATED = Limit("vapour pressure over saturation", "%", 0.0, 100.2, "air without droplets", places=1)
+SATURATED = ValidInterval("vapour pressure over saturation", "%", 0.0, 100.2, "air without droplets", places=1)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from catseye.atmosphere.index.model import Model
+from catseye.atmosphere.index.model import IndexModel
 from catseye.atmosphere.weather.humidity import saturation
 from catseye.errors import ValidityError
 
@@ -43,13 +43,13 @@ class SaturationPolynomial(NamedTuple):
     odd: tuple[float, ...]
 
 
-def limits_of(model: Model) -> tuple[float, ...]:
+def limits_of(model: IndexModel) -> tuple[float, ...]:
     """Where a model holds, as its kernel needs it: lower and upper °C, hPa, %."""
     limits = (model.limits[name] for name in ("temperature_c", "pressure_hpa", "humidity_percent"))
     return tuple(end for limit in limits for end in (limit.lower, limit.upper))
 
 
-def saturation_polynomial(model: Model, factor: Callable) -> SaturationPolynomial:
+def saturation_polynomial(model: IndexModel, factor: Callable) -> SaturationPolynomial:
     """What of a model's saturation pressure depends on temperature alone, over its limits of temperature.
 
     model    the model

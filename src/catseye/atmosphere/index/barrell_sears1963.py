@@ -5,7 +5,7 @@ Its form is (n_L - 1) = (n_g - 1)/(1 + a t) p/760 - 5.5e-8 e/(1 + a t), p and e 
 """
 
 from catseye.atmosphere.index.ideal_gas import densities, density_slopes, limits
-from catseye.atmosphere.index.model import Dispersion, Gases, Model
+from catseye.atmosphere.index.model import Gases, IndexModel, RefractiveDispersion
 from catseye.constants import ZERO_CELSIUS_K
 
 # [BARRELL39] as [RUEGER90] gives the resolution: phase refractivity, ppm, of dry air with 300 ppm of carbon dioxide at
@@ -14,12 +14,12 @@ PHASE_POWERS = (287.604, 1.6288, 0.0136)
 STANDARD_HPA = 1013.25  # 760 mm Hg
 VAPOUR_PER_MMHG = -5.5e-8  # at 0 °C, at all wavelengths
 
-MODEL = Model(
+MODEL = IndexModel(
     name="barrell_sears1963",
     source="[BARRELL39], [RUEGER90]",
     dispersion=Gases(
-        Dispersion(powers=PHASE_POWERS, scale=1e-6 * ZERO_CELSIUS_K / STANDARD_HPA),
-        Dispersion(powers=(VAPOUR_PER_MMHG * ZERO_CELSIUS_K * 760.0 / STANDARD_HPA,)),
+        RefractiveDispersion(powers=PHASE_POWERS, scale=1e-6 * ZERO_CELSIUS_K / STANDARD_HPA),
+        RefractiveDispersion(powers=(VAPOUR_PER_MMHG * ZERO_CELSIUS_K * 760.0 / STANDARD_HPA,)),
     ),
     densities=densities,
     density_slopes=density_slopes,

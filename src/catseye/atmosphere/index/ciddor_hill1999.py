@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.index.model import DensitySlopes, Dispersion, Gases, Model
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.index.model import DensitySlopes, Gases, IndexModel, RefractiveDispersion
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import PA_PER_HPA
 from catseye.constants import ZERO_CELSIUS_K
 
@@ -146,23 +146,23 @@ def _standard_zt(temperature_c, pressure_pa, vapour_fraction):
 
 # Refractivities add in proportion to density ([CIDDOR96] eq. 5); the Lorentz-Lorenz sum differs by up to 4e-9 and does
 # not reproduce the tables. Today's [IAPWS97] saturation changes the index of saturated air by less than 1e-10 to 30 °C.
-MODEL = Model(
+MODEL = IndexModel(
     name="ciddor_hill1999",
     source="[CIDDOR99], [CIDDOR96]",
     dispersion=Gases(
-        Dispersion(poles=DRY_TERMS, scale=1e-8 * _standard_zt(*STANDARD_DRY)),
-        Dispersion(powers=VAPOUR_TERMS, scale=1e-8 * VAPOUR_FACTOR * _standard_zt(*STANDARD_VAPOUR)),
+        RefractiveDispersion(poles=DRY_TERMS, scale=1e-8 * _standard_zt(*STANDARD_DRY)),
+        RefractiveDispersion(powers=VAPOUR_TERMS, scale=1e-8 * VAPOUR_FACTOR * _standard_zt(*STANDARD_VAPOUR)),
     ),
     densities=densities,
     density_slopes=density_slopes,
     vapour_formula="ciddor",
     standard_uncertainty=5e-8,  # the upper end of the 2e-8 to 5e-8 that the author states
     limits={
-        "temperature_c": Limit("temperature", "C", -40.0, 100.0, "[CIDDOR96]"),
-        "pressure_hpa": Limit("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]"),
-        "humidity_percent": Limit("relative humidity", "%", 0.0, 100.0, "[CIDDOR96]"),
-        "wavelength_um": Limit("wavelength", "um", 0.30, 1.69, "[CIDDOR96]", places=2),
-        "co2_ppm": Limit("carbon dioxide", "ppm", 0.0, 2000.0, "[CIDDOR96]"),
+        "temperature_c": ValidInterval("temperature", "C", -40.0, 100.0, "[CIDDOR96]"),
+        "pressure_hpa": ValidInterval("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]"),
+        "humidity_percent": ValidInterval("relative humidity", "%", 0.0, 100.0, "[CIDDOR96]"),
+        "wavelength_um": ValidInterval("wavelength", "um", 0.30, 1.69, "[CIDDOR96]", places=2),
+        "co2_ppm": ValidInterval("carbon dioxide", "ppm", 0.0, 2000.0, "[CIDDOR96]"),
     },
     co2_ppm=CO2_STANDARD_PPM,
     co2_slope=CO2_SLOPE,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catseye.atmosphere.index.model import Partials
-from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.weather import humidity, psychrometer
 from catseye.errors import ValidityError
 
@@ -19,11 +19,11 @@ from catseye.errors import ValidityError
 U_OVER_WATER = {"buck": 6e-4, "ciddor": 6e-4, "iapws": 2e-4}
 U_OVER_ICE = {"buck": 1e-3, "iapws": 4e-4}
 
-MIRROR = Limit("mirror", "°C", -100.0, 100.0, "saturation")
+MIRROR = ValidInterval("mirror", "°C", -100.0, 100.0, "saturation")
 DEPOSITS = ("dew", "frost")
 
 
-class Reading(NamedTuple):
+class VapourReading(NamedTuple):
     """Vapour pressure from an instrument's reading, and how it moves with what it came from.
 
     vapour_pressure_hpa   hPa
@@ -83,7 +83,9 @@ class Reading(NamedTuple):
         )
 
 
-def of_relative_humidity(temperature_c, pressure_hpa, humidity_percent, formula="buck", *, over_ice=False) -> Reading:
+def of_relative_humidity(
+    temperature_c, pressure_hpa, humidity_percent, formula="buck", *, over_ice=False
+) -> VapourReading:
     """Vapour pressure from relative humidity, over liquid water unless ice is asked for.
 
     temperature_c      air temperature, -100 to 100 °C
@@ -105,10 +107,10 @@ def of_relative_humidity(temperature_c, pressure_hpa, humidity_percent, formula=
     at = _saturated(temperature_c, pressure_hpa, formula, over_ice)
     e = share * at.pressure_hpa
     u = _u_formula(formula, over_ice) * e
-    return Reading(e, share * at.per_c, share * at.per_hpa, at.pressure_hpa / 100.0, u)
+    return VapourReading(e, share * at.per_c, share * at.per_hpa, at.pressure_hpa / 100.0, u)
 
 
-def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> Reading:
+def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> VapourReading:
     """Vapour pressure from the temperature at which a chilled mirror holds its deposit.
 
     mirror_c       dew or frost point, -100 to 100 °C; with frost at most 0.01 °C
@@ -137,10 +139,10 @@ def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> Readin
     frost = deposit == "frost"
     at = _saturated(mirror_c, pressure_hpa, formula, frost)
     u = _u_formula(formula, frost) * at.pressure_hpa
-    return Reading(at.pressure_hpa, np.zeros_like(at.pressure_hpa), at.per_hpa, at.per_c, u)
+    return VapourReading(at.pressure_hpa, np.zeros_like(at.pressure_hpa), at.per_hpa, at.per_c, u)
 
 
-def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, formula="buck", *, over_ice=False) -> Reading:
+def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, formula="buck", *, over_ice=False) -> VapourReading:
     """Vapour pressure from a ventilated psychrometer; limits and errors of `vapour_pressure_of_wet_bulb_hpa`.
 
     temperature_c   dry bulb, °C, which is the air's temperature
@@ -160,7 +162,7 @@ def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, formula="buck", *, over
     slopes = psychrometer.wet_bulb_partials(temperature_c, wet_bulb_c, pressure_hpa, over_ice=over_ice, formula=formula)
     saturated = _saturated(wet_bulb_c, pressure_hpa, formula, over_ice).pressure_hpa
     u = _root_sum(_u_formula(formula, over_ice) * saturated, psychrometer.U_COEFFICIENT * (saturated - e))
-    return Reading(e, slopes.temperature_c, slopes.pressure_hpa, slopes.wet_bulb_c, u)
+    return VapourReading(e, slopes.temperature_c, slopes.pressure_hpa, slopes.wet_bulb_c, u)
 
 
 def _saturated(temperature_c, pressure_hpa, formula, over_ice):

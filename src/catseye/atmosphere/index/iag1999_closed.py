@@ -5,7 +5,7 @@ Public code often calls the set of 1963 by this name: 287.604 is not 287.6155 (0
 """
 
 from catseye.atmosphere.index.ideal_gas import densities, density_slopes, limits
-from catseye.atmosphere.index.model import Dispersion, Gases, Model
+from catseye.atmosphere.index.model import Gases, IndexModel, RefractiveDispersion
 from catseye.constants import ZERO_CELSIUS_K
 
 # [IAG99]: group refractivity, ppm, of dry air with 375 ppm of carbon dioxide at 0 °C and 1013.25 hPa, in 1, s, s²;
@@ -14,12 +14,14 @@ GROUP_POWERS = (287.6155, 4.88660, 0.06800)
 STANDARD_K_PER_HPA = ZERO_CELSIUS_K / 1013.25
 VAPOUR_K_PER_HPA = -11.27e-6  # [IAG99], of the vapour pressure over temperature, at all wavelengths
 
-MODEL = Model(
+MODEL = IndexModel(
     name="iag1999_closed",
     source="[IAG99]",
     dispersion=Gases(
-        Dispersion(powers=tuple(c / (2 * i + 1) for i, c in enumerate(GROUP_POWERS)), scale=1e-6 * STANDARD_K_PER_HPA),
-        Dispersion(powers=(VAPOUR_K_PER_HPA,)),
+        RefractiveDispersion(
+            powers=tuple(c / (2 * i + 1) for i, c in enumerate(GROUP_POWERS)), scale=1e-6 * STANDARD_K_PER_HPA
+        ),
+        RefractiveDispersion(powers=(VAPOUR_K_PER_HPA,)),
     ),
     densities=densities,
     density_slopes=density_slopes,

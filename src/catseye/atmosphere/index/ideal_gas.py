@@ -7,7 +7,7 @@ pressure, what the vapour refracts less than the air it displaces.
 import numpy as np
 
 from catseye.atmosphere.index.model import DensitySlopes, Gases
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 
 
@@ -42,12 +42,12 @@ def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
     )
 
 
-def limits(source: str) -> dict[str, Limit]:
+def limits(source: str) -> dict[str, ValidInterval]:
     """The limits that both closed formulas share."""
     return {
-        "temperature_c": Limit("temperature", "C", -40.0, 50.0, source),
-        "pressure_hpa": Limit("pressure", "hPa", 500.0, 1100.0, source),
-        "humidity_percent": Limit("relative humidity", "%", 0.0, 100.0, source),
-        "wavelength_um": Limit("wavelength", "um", 0.36, 1.70, source, places=2),
-        "co2_ppm": Limit("carbon dioxide", "ppm", 0.0, 2000.0, source),
+        "temperature_c": ValidInterval("temperature", "C", -40.0, 50.0, source),
+        "pressure_hpa": ValidInterval("pressure", "hPa", 500.0, 1100.0, source),
+        "humidity_percent": ValidInterval("relative humidity", "%", 0.0, 100.0, source),
+        "wavelength_um": ValidInterval("wavelength", "um", 0.36, 1.70, source, places=2),
+        "co2_ppm": ValidInterval("carbon dioxide", "ppm", 0.0, 2000.0, source),
     }

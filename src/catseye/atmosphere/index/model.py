@@ -11,12 +11,12 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 
 Kind = Literal["group", "phase"]
 
 
-class Sensitivity(NamedTuple):
+class IndexSensitivity(NamedTuple):
     """Derivatives of an index; relative humidity held, but for that by the vapour pressure.
 
     temperature_c         per °C
@@ -51,10 +51,10 @@ class Partials(NamedTuple):
     co2_ppm: Any
     wavelength_um: Any
 
-    def with_humidity_held(self, saturation, humidity_percent) -> Sensitivity:
+    def with_humidity_held(self, saturation, humidity_percent) -> IndexSensitivity:
         """The chain rule from vapour pressure to relative humidity, by `saturation` and its slopes."""
         fraction = np.asarray(humidity_percent, float) / 100.0
-        return Sensitivity(
+        return IndexSensitivity(
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
             self.pressure_hpa + self.vapour_pressure_hpa * fraction * saturation.per_hpa,
             self.vapour_pressure_hpa * saturation.pressure_hpa / 100.0,
@@ -89,7 +89,7 @@ class DensitySlopes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Dispersion:
+class RefractiveDispersion:
     """Phase refractivity per unit of density as a function of s = 1/wavelength²: poles k/(a - s) and powers of s.
 
     poles    pairs (k, a), um^-2
@@ -130,7 +130,7 @@ class Dispersion:
 
 
 @dataclass(frozen=True)
-class Model:
+class IndexModel:
     """One model of the index of air.
 
     name                   as users write it
@@ -153,7 +153,7 @@ class Model:
     density_slopes: Callable[..., Gases]
     vapour_formula: str
     standard_uncertainty: float
-    limits: dict[str, Limit]
+    limits: dict[str, ValidInterval]
     co2_ppm: float
     co2_slope: float = 0.0
     vapour_uncertainty: float = 0.0

@@ -6,14 +6,14 @@ It lies up to 0.1 ppm below `ciddor_hill1999` in ordinary weather, 0.3 ppm when 
 
 import numpy as np
 
-from catseye.atmosphere.index.model import DensitySlopes, Dispersion, Gases, Model
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.index.model import DensitySlopes, Gases, IndexModel, RefractiveDispersion
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 
 # [RUEGER90] eq. A.10 ([PARKER04] eq. 1.25) prints the group forms. Phase refractivity per unit density factor: the dry
 # air's is [PECK72]'s scaled; the vapour's is [OWENS67]'s, which the group form multiplies by 1, 3, 5, 7. um^-2
-DRY = Dispersion(poles=((1646386.0, 238.0185), (47729.9, 57.362)), scale=1e-8)
-VAPOUR = Dispersion(powers=(6487.31, 58.058, -0.71150, 0.08851), scale=1e-8)
+DRY = RefractiveDispersion(poles=((1646386.0, 238.0185), (47729.9, 57.362)), scale=1e-8)
+VAPOUR = RefractiveDispersion(powers=(6487.31, 58.058, -0.71150, 0.08851), scale=1e-8)
 # [PARKER04] eq. 1.23: dry air's departure from the ideal gas, 1/hPa, K/hPa, K²/hPa
 DRY_DENSITY = (57.90e-8, -9.3250e-4, 0.25844)
 # [PARKER04] eq. 1.24: vapour's, in 1/T^0 to 1/T^3, 1/hPa; then the coefficient of P_w²
@@ -99,7 +99,7 @@ def _inverse_powers_slope(coefficients, kelvin):
 
 
 # [PARKER04] eqs. 1.50-1.53 print the slopes of the example, -0.895e-6 /°C, 0.272e-6 /hPa, -0.0096e-6 /%, -4.09e-8 /hPa
-MODEL = Model(
+MODEL = IndexModel(
     name="rueger1990",
     source="[RUEGER90], [OWENS67]",
     dispersion=Gases(DRY, VAPOUR),
@@ -109,11 +109,11 @@ MODEL = Model(
     # the notes say two parts in 1e8; but it lies below [CIDDOR99] by 5.2e-9 for each hPa of vapour, to 3e-8 at most
     standard_uncertainty=5e-8,
     limits={
-        "temperature_c": Limit("temperature", "C", -40.0, 50.0, "[RUEGER90]"),
-        "pressure_hpa": Limit("pressure", "hPa", 500.0, 1100.0, "[RUEGER90]"),
-        "humidity_percent": Limit("relative humidity", "%", 0.0, 100.0, "[RUEGER90]"),
-        "wavelength_um": Limit("wavelength", "um", 0.36, 1.69, "[OWENS67]", places=2),
-        "co2_ppm": Limit("carbon dioxide", "ppm", 0.0, 2000.0, "[RUEGER90]"),
+        "temperature_c": ValidInterval("temperature", "C", -40.0, 50.0, "[RUEGER90]"),
+        "pressure_hpa": ValidInterval("pressure", "hPa", 500.0, 1100.0, "[RUEGER90]"),
+        "humidity_percent": ValidInterval("relative humidity", "%", 0.0, 100.0, "[RUEGER90]"),
+        "wavelength_um": ValidInterval("wavelength", "um", 0.36, 1.69, "[OWENS67]", places=2),
+        "co2_ppm": ValidInterval("carbon dioxide", "ppm", 0.0, 2000.0, "[RUEGER90]"),
     },
     co2_ppm=300.0,
     vapour_uncertainty=5.2e-9,

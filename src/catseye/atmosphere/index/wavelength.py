@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catseye.atmosphere.index.air import phase_refractivity
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import EstimationError
 
-INDEX = Limit("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
-MODULATION = Limit("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
+INDEX = ValidInterval("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
+MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
 MICROMETRE = 1e-6  # m
 ROUNDS = 20  # of the search for a vacuum wavelength; each gains five decimals
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from catseye.atmosphere.index.air import air
 from catseye.atmosphere.path.mean import hydrostatic_pressure_hpa, nodes_along
-from catseye.atmosphere.path.profile import HUMIDITY, PRESSURE, TEMPERATURE, Prior, Profile, Readings
+from catseye.atmosphere.path.profile import HUMIDITY, PRESSURE, TEMPERATURE, Profile, ProfilePrior, ProfileReadings
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.errors import EstimationError
 
@@ -48,24 +48,24 @@ class WeatherReadings:
     humidity_percent: np.ndarray
     count: np.ndarray
 
-    def of(self, name: str) -> Readings:
+    def of(self, name: str) -> ProfileReadings:
         """The readings of one quantity, those that are nan left out."""
         value = np.asarray(getattr(self, name), float)
         there = ~np.isnan(value)
         if not there.any():
             raise EstimationError(f"{name} was read by no station; the index of air needs it")
         columns = (self.seconds, self.z, self.station, value, self.count)
-        return Readings(*(np.asarray(column)[there] for column in columns))
+        return ProfileReadings(*(np.asarray(column)[there] for column in columns))
 
     def averaged(self, block: float) -> "WeatherReadings":
-        """Means over blocks of time of each station; see `Readings.averaged`.
+        """Means over blocks of time of each station; see `ProfileReadings.averaged`.
 
         block   s, length of a block, above zero
 
         Raises EstimationError where a sensor gave nothing: its rows would be averaged with others' weights.
         """
         names = ("temperature_c", "pressure_hpa", "humidity_percent")
-        whole = [Readings(self.seconds, self.z, self.station, getattr(self, name), self.count) for name in names]
+        whole = [ProfileReadings(self.seconds, self.z, self.station, getattr(self, name), self.count) for name in names]
         if any(np.isnan(one.value).any() for one in whole):
             raise EstimationError("a sensor gave nothing in some readings; give only whole rows to be averaged")
         means = [one.averaged(block) for one in whole]
@@ -110,9 +110,9 @@ class AirProfile:
         readings: WeatherReadings,
         *,
         ground: float,
-        temperature: Prior = TEMPERATURE,
-        pressure: Prior = PRESSURE,
-        humidity: Prior = HUMIDITY,
+        temperature: ProfilePrior = TEMPERATURE,
+        pressure: ProfilePrior = PRESSURE,
+        humidity: ProfilePrior = HUMIDITY,
     ) -> "AirProfile":
         """The air given its readings.
 
@@ -128,7 +128,7 @@ class AirProfile:
         read = readings.of("pressure_hpa")
         middle = float(np.mean(read.z))
         reduced = _weighed(warmth, damp, read.seconds, read.value, read.z, middle)
-        even = Readings(read.seconds, read.z, read.station, reduced, read.count)
+        even = ProfileReadings(read.seconds, read.z, read.station, reduced, read.count)
         return cls(warmth, damp, Profile.of(even, pressure, ground=ground), middle)
 
     def state(self, seconds, z) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

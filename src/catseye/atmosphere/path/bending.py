@@ -25,13 +25,13 @@ the bound.
 import numpy as np
 
 from catseye.atmosphere.index.air import phase_refractivity
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import DRY_AIR_KG_PER_MOL, GAS_CONSTANT, STANDARD_GRAVITY, ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
-LENGTH = Limit("length", "m", 0.0, 1e5, "a ray in the lower air")
-EXCESS = Limit("excess", "m", 0.0, 1.0, "a small excess", places=1)
-GRADIENT = Limit("gradient of the index", "1/m", -0.01, 0.01, "air", places=2)
+LENGTH = ValidInterval("length", "m", 0.0, 1e5, "a ray in the lower air")
+EXCESS = ValidInterval("excess", "m", 0.0, 1.0, "a small excess", places=1)
+GRADIENT = ValidInterval("gradient of the index", "1/m", -0.01, 0.01, "air", places=2)
 
 
 def index_gradient(temperature_gradient_c_per_m, temperature_c=20.0, pressure_hpa=933.0, *, refractivity=None):

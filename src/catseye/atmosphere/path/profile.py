@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.errors import EstimationError, ValidityError
 
-MOST_READINGS = 2000  # of one quantity: 1 s on one core; more are averaged first (`Readings.averaged`)
-ABOVE_GROUND = Limit("height above the ground", "m", 0.0, 1000.0, "a logarithmic surface layer", places=1)
+MOST_READINGS = 2000  # of one quantity: 1 s on one core; more are averaged first (`ProfileReadings.averaged`)
+ABOVE_GROUND = ValidInterval("height above the ground", "m", 0.0, 1000.0, "a logarithmic surface layer", places=1)
 BLOCK_ROWS = 512  # of a covariance at a time
 
 
@@ -46,7 +46,7 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
-class Prior:
+class ProfilePrior:
     """What is known of a quantity before it is read, in its unit.
 
     level, gradient, layer   coefficients: unit, unit/m, unit per factor e of (1 m + height above the ground)
@@ -78,24 +78,24 @@ class Prior:
 
 # 3 °C in 3 h: slopes of some 2 °C/h; 0.02 °C/m: lapse and inversion; 0.2 °C: T*/0.4 of a calm night or a fair day;
 # 0.15 °C: half a degree within a minute by day is three sigmas ([PARKER04] section 1.6.2)
-TEMPERATURE = Prior(
+TEMPERATURE = ProfilePrior(
     Coefficient(20.0, 3.0, 10_800.0), Coefficient(0.02, 0.01, 3600.0), Coefficient(0.2, 0.1, 3600.0),
     offset=0.3, noise=0.05, local=0.15,
 )  # fmt: skip
 # reduced to one height before; 2 hPa in 3 h, a front's; 0.2 hPa: a barometer not lately compared
-PRESSURE = Prior(
+PRESSURE = ProfilePrior(
     Coefficient(50.0, 2.0, 10_800.0), Coefficient(0.0, 0.0, 3600.0), Coefficient(0.0, 0.0, 3600.0),
     offset=0.2, noise=0.05,
 )  # fmt: skip
 # relative humidity; 0.06 %/m: what a lapse or an inversion of 0.01 °C/m makes of an even vapour pressure
-HUMIDITY = Prior(
+HUMIDITY = ProfilePrior(
     Coefficient(50.0, 15.0, 10_800.0), Coefficient(0.06, 0.03, 3600.0), Coefficient(1.0, 0.5, 3600.0),
     offset=2.0, noise=0.5, local=1.0,
 )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class ProfileReadings:
     """Readings of one quantity.
 
     seconds   (n,) s, from any start
@@ -111,7 +111,7 @@ class Readings:
     value: np.ndarray
     count: np.ndarray
 
-    def averaged(self, block: float) -> "Readings":
+    def averaged(self, block: float) -> "ProfileReadings":
         """Means over blocks of time of each station.
 
         block   s, length of a block, above zero
@@ -120,7 +120,7 @@ class Readings:
         large a standard uncertainty where blocks are longer than its correlation time.
         Raises ValidityError for a block that is not above zero.
 
-        >>> two = Readings(*(np.array(v) for v in ([0.0, 10.0], [2.0, 2.0], [0, 0], [5.0, 6.0], [1, 1])))
+        >>> two = ProfileReadings(*(np.array(v) for v in ([0.0, 10.0], [2.0, 2.0], [0, 0], [5.0, 6.0], [1, 1])))
         >>> two.averaged(60.0).value, two.averaged(60.0).count
         (array([5.5]), array([2]))
         """
@@ -136,7 +136,7 @@ class Readings:
 
         first = np.unique(of, return_index=True)[1]
         whole = np.rint(count).astype(int)
-        return Readings(mean(self.seconds), self.z[first], self.station[first], mean(self.value), whole)
+        return ProfileReadings(mean(self.seconds), self.z[first], self.station[first], mean(self.value), whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,15 +151,15 @@ class Profile:
     factor      (n, n) lower Cholesky factor of that covariance
     """
 
-    readings: Readings
-    prior: Prior
+    readings: ProfileReadings
+    prior: ProfilePrior
     ground: float
     mean: float
     weights: np.ndarray
     factor: np.ndarray
 
     @classmethod
-    def of(cls, readings: Readings, prior: Prior, *, ground: float) -> "Profile":
+    def of(cls, readings: ProfileReadings, prior: ProfilePrior, *, ground: float) -> "Profile":
         """The quantity given its readings.
 
         readings   at least one
@@ -170,7 +170,7 @@ class Profile:
         Raises EstimationError without a reading or with more than MOST_READINGS, ValidityError for readings that are
         not finite or below the ground.
 
-        >>> one = Readings(*(np.array(v) for v in ([0.0], [2.0], [0], [15.0], [1])))
+        >>> one = ProfileReadings(*(np.array(v) for v in ([0.0], [2.0], [0], [15.0], [1])))
         >>> air = Profile.of(one, TEMPERATURE, ground=0.0)
         >>> np.round(air.at([0.0, 0.0], [2.0, 52.0]), 2), np.round(air.u_at([0.0, 0.0], [2.0, 52.0]), 2)
         (array([15., 15.]), array([0.34, 1.33]))

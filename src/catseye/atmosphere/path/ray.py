@@ -43,7 +43,7 @@ class RayAir(NamedTuple):
     group: Any = None
 
 
-class Ray(NamedTuple):
+class BentRay(NamedTuple):
     """Rays between m pairs of points against their chords.
 
     length_excess    (m,) length of the ray less the chord, m; never below zero
@@ -84,7 +84,7 @@ def layered(index_of_height: Callable, group_of_height: Callable | None = None) 
     return air
 
 
-def bent_ray(air: Callable[[np.ndarray], RayAir], a, b, *, tolerance=1e-12) -> Ray:
+def bent_ray(air: Callable[[np.ndarray], RayAir], a, b, *, tolerance=1e-12) -> BentRay:
     """The ray from each a to each b through smooth air.
 
     air         function of points (..., 3) in m, giving a RayAir; `layered` makes one from profiles of height
@@ -202,7 +202,7 @@ def _rates(air, a, frame, x, state):
     return rates
 
 
-def _as_ray(end, start, frame, good, status) -> Ray:
+def _as_ray(end, start, frame, good, status) -> BentRay:
     def across(two):
         return np.where(good[:, None], np.einsum("mi,mij->mj", two, frame[:, 1:]), np.nan)
 
@@ -210,7 +210,7 @@ def _as_ray(end, start, frame, good, status) -> Ray:
         size = np.linalg.norm(slope, axis=1)
         return slope * (np.arctan(size) / np.where(size > 0.0, size, 1.0))[:, None]
 
-    return Ray(
+    return BentRay(
         np.where(good, end[:, 4], np.nan),
         np.where(good, end[:, 5], np.nan),
         across(angle(start)),

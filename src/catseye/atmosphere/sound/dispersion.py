@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 
 GAMMA = 1.400
@@ -19,10 +19,10 @@ OXYGEN_SHARE, OXYGEN_K = 0.209, 2239.1  # [ISO93]: mole fraction, temperature of
 NITROGEN_SHARE, NITROGEN_K = 0.781, 3352.0
 U_DISPERSION = 0.1  # of the dispersion itself: [ISO93] gives absorption to 10 %
 
-FREQUENCY = Limit("frequency", "Hz", 0.0, 1e6, "[ISO93]")
+FREQUENCY = ValidInterval("frequency", "Hz", 0.0, 1e6, "[ISO93]")
 
 
-class Dispersion(NamedTuple):
+class SoundDispersion(NamedTuple):
     """What a frequency adds to the speed of sound, as shares of the speed at zero frequency.
 
     phase      of the phase velocity: what a steady tone shows, and a correlation that follows its carrier
@@ -63,7 +63,7 @@ def relaxation_hz(temperature_c, pressure_hpa, vapour_pressure_hpa):
     return oxygen, nitrogen
 
 
-def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, frequency_hz) -> Dispersion:
+def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, frequency_hz) -> SoundDispersion:
     """What a frequency adds to the speed of sound at zero frequency, phase and group, as shares.
 
     temperature_c         air temperature, -40 to 50 °C
@@ -91,4 +91,4 @@ def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, frequency_hz) -
         square = (f / relaxation) ** 2
         phase = phase + strength * square / (1.0 + square)
         group = group + strength * square * (3.0 + square) / (1.0 + square) ** 2
-    return Dispersion(phase, group, U_DISPERSION * np.maximum(phase, group))
+    return SoundDispersion(phase, group, U_DISPERSION * np.maximum(phase, group))

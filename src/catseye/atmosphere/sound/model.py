@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 
 
 class SoundPartials(NamedTuple):
@@ -73,7 +73,7 @@ class SoundModel:
     partials: Callable[..., SoundPartials]
     vapour_formula: str
     standard_uncertainty: float
-    limits: dict[str, Limit]
+    limits: dict[str, ValidInterval]
     has_co2: bool
 
     def check(self, **arguments) -> None:
@@ -88,11 +88,11 @@ def limits(
     temperature_c: tuple[float, float],
     pressure_hpa: tuple[float, float],
     co2_ppm: tuple[float, float] = (0.0, 2000.0),
-) -> dict[str, Limit]:
+) -> dict[str, ValidInterval]:
     """The limits of a model, each given as (least, greatest)."""
     return {
-        "temperature_c": Limit("temperature", "C", *temperature_c, source),
-        "pressure_hpa": Limit("pressure", "hPa", *pressure_hpa, source),
-        "humidity_percent": Limit("relative humidity", "%", 0.0, 100.0, source),
-        "co2_ppm": Limit("carbon dioxide", "ppm", *co2_ppm, source),
+        "temperature_c": ValidInterval("temperature", "C", *temperature_c, source),
+        "pressure_hpa": ValidInterval("pressure", "hPa", *pressure_hpa, source),
+        "humidity_percent": ValidInterval("relative humidity", "%", 0.0, 100.0, source),
+        "co2_ppm": ValidInterval("carbon dioxide", "ppm", *co2_ppm, source),
     }

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 
-WIND = Limit("wind", "m/s", -60.0, 60.0, "the formula of slow winds")
+WIND = ValidInterval("wind", "m/s", -60.0, 60.0, "the formula of slow winds")
 
 
 class Pair(NamedTuple):

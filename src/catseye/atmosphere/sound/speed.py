@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.sound import cramer1993 as sound_cramer1993
 from catseye.atmosphere.sound import parker2004 as sound_parker2004
 from catseye.atmosphere.sound import real_gas as sound_real_gas
@@ -27,7 +27,7 @@ THERMOMETRY = "real_gas"
 STEPS = 12  # of Newton's method; from 20 °C it needs five
 CLOSE_ENOUGH_C = 1e-10
 
-SPEED = Limit("speed of sound", "m/s", 250.0, 450.0, "air")
+SPEED = ValidInterval("speed of sound", "m/s", 250.0, 450.0, "air")
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,9 @@ def _refused_outside(chosen, found, speed):
 def _check_vapour(chosen, e, pressure_hpa) -> None:
     share = 100.0 * np.asarray(e, float) / np.asarray(pressure_hpa, float)
     upper = 6.0 if chosen.name == "cramer1993" else 20.0
-    Limit("vapour's share of the pressure", "%", 0.0, upper, chosen.limits["humidity_percent"].source).check(share)
+    ValidInterval("vapour's share of the pressure", "%", 0.0, upper, chosen.limits["humidity_percent"].source).check(
+        share
+    )
 
 
 def model_named(model: str) -> SoundModel:

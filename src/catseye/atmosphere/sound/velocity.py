@@ -11,14 +11,14 @@ k (1 - k) d³/12R². With k = 0.13 that is 0.03 um at 510 m, 0.3 mm at 11 km.
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 
 EARTH_RADIUS = 6_371_000.0  # m, mean; 0.3 % of it changes nothing below 10 km
 REFRACTION = 0.13  # coefficient k of light by day, well above the ground
 
-COEFFICIENT = Limit("coefficient of refraction", "(ratio)", -5.0, 5.0, "the notion of a smoothly bent ray")
-RADIUS = Limit("radius of the earth", "m", 6.2e6, 6.6e6, "the earth")
-INDEX = Limit("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
+COEFFICIENT = ValidInterval("coefficient of refraction", "(ratio)", -5.0, 5.0, "the notion of a smoothly bent ray")
+RADIUS = ValidInterval("radius of the earth", "m", 6.2e6, 6.6e6, "the earth")
+INDEX = ValidInterval("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
 
 
 def first_velocity_correction(shown, reference_index, group_index):

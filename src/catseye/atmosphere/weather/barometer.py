@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import DRY_AIR_KG_PER_MOL, GAS_CONSTANT, STANDARD_GRAVITY, WATER_OVER_AIR, ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
@@ -38,14 +38,14 @@ LIFT = ((-3.085462e-4, -2.27e-7), (7.254e-11, 1.0e-13), (-1.517e-17, -6e-20))
 GRS80_EQUATOR, GRS80_K, GRS80_E2 = 9.780_326_771_5, 0.001_931_851_353, 0.006_694_380_022_90
 GRS80_A, GRS80_F, GRS80_M = 6_378_137.0, 1.0 / 298.257_222_101, 0.003_449_786_003_08
 
-READING = Limit("barometer reading", "mm Hg", 300.0, 850.0, "[PARKER04] eq. 1.8")
-MERCURY = Limit("mercury temperature", "°C", -30.0, 60.0, "[PARKER04] eq. 1.8")
-GRAVITY = Limit("gravity", "m/s²", 9.7, 9.9, "the earth's surface", places=1)
-LATITUDE = Limit("latitude", "rad", -np.pi / 2, np.pi / 2, "the earth", places=4)
-ELEVATION = Limit("elevation", "m", -500.0, 9000.0, "[SMITHSON51] table 167")
-PRESSURE = Limit("pressure", "hPa", 100.0, 1400.0, "the hydrostatic balance of the lower air")
-RISE = Limit("difference of elevation", "m", -12000.0, 12000.0, "the hydrostatic balance of the lower air")
-TEMPERATURE = Limit("temperature", "°C", -100.0, 60.0, "the hydrostatic balance of the lower air")
+READING = ValidInterval("barometer reading", "mm Hg", 300.0, 850.0, "[PARKER04] eq. 1.8")
+MERCURY = ValidInterval("mercury temperature", "°C", -30.0, 60.0, "[PARKER04] eq. 1.8")
+GRAVITY = ValidInterval("gravity", "m/s²", 9.7, 9.9, "the earth's surface", places=1)
+LATITUDE = ValidInterval("latitude", "rad", -np.pi / 2, np.pi / 2, "the earth", places=4)
+ELEVATION = ValidInterval("elevation", "m", -500.0, 9000.0, "[SMITHSON51] table 167")
+PRESSURE = ValidInterval("pressure", "hPa", 100.0, 1400.0, "the hydrostatic balance of the lower air")
+RISE = ValidInterval("difference of elevation", "m", -12000.0, 12000.0, "the hydrostatic balance of the lower air")
+TEMPERATURE = ValidInterval("temperature", "°C", -100.0, 60.0, "the hydrostatic balance of the lower air")
 
 
 def temperature_corrected_mmhg(reading_mmhg, mercury_c):
@@ -217,7 +217,7 @@ class GravityStation:
         >>> round(float(GRAVITY_STATIONS["Green Bank AA"].gravity_at(797.3)), 6)
         9.797962
         """
-        Limit("elevation", "m", self.elevation - 50.0, self.elevation + 50.0, f"{self.name}'s gradient").check(
+        ValidInterval("elevation", "m", self.elevation - 50.0, self.elevation + 50.0, f"{self.name}'s gradient").check(
             elevation
         )
         return self.gravity + gradient * (np.asarray(elevation, float) - self.elevation)
@@ -315,11 +315,11 @@ def carried_pressure(
     vapour, lapse = np.asarray(vapour_pressure_hpa, float), np.asarray(lapse_c_per_m, float)
     rise = np.asarray(z_to, float) - np.asarray(z_from, float)
     RISE.check(rise)
-    Limit("vapour's share of the pressure", "%", 0.0, 100.0, "a mixture of gases").check(100.0 * vapour / p)
+    ValidInterval("vapour's share of the pressure", "%", 0.0, 100.0, "a mixture of gases").check(100.0 * vapour / p)
     x = -lapse * rise / kelvin  # relative change of the absolute temperature
-    Limit("absolute temperature at the top over that below", "(ratio)", 0.5, 2.0, "one straight layer", 1).check(
-        1.0 + x
-    )
+    ValidInterval(
+        "absolute temperature at the top over that below", "(ratio)", 0.5, 2.0, "one straight layer", 1
+    ).check(1.0 + x)
     share, light = vapour / p, 1.0 - WATER_OVER_AIR
     weight = gravity * DRY_AIR_KG_PER_MOL / GAS_CONSTANT  # K/m, of dry air
     column, per_x = _log_ratio(x)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import humidity
 from catseye.constants import ZERO_CELSIUS_K
 from catseye.errors import ValidityError
@@ -20,11 +20,11 @@ STEFAN_BOLTZMANN = 5.670_374_419e-8  # W/(m² K⁴), exact in the SI to these di
 SKY = (0.711, 0.56, 0.73)
 SKY_MIDNIGHT, SKY_PER_HPA = 0.013, 0.00012
 STILL_AIR, PER_WIND = 2.8, 3.0  # [WATMUFF77]: W/(m² K), and per m/s of wind
-SURFACE = Limit("surface temperature", "°C", -100.0, 100.0, "saturation over water and ice")
-WIND = Limit("wind", "m/s", 0.0, 7.0, "[WATMUFF77]")
-SKY_EMISSIVITY = Limit("emissivity of the sky", "(ratio)", 0.0, 1.0, "[BERDAHL84]")
-EMISSIVITY = Limit("emissivity", "(ratio)", 0.0, 1.0, "the notion of emissivity")
-SKY_VIEW = Limit("view of the sky", "(ratio)", 0.0, 1.0, "the notion of a share")
+SURFACE = ValidInterval("surface temperature", "°C", -100.0, 100.0, "saturation over water and ice")
+WIND = ValidInterval("wind", "m/s", 0.0, 7.0, "[WATMUFF77]")
+SKY_EMISSIVITY = ValidInterval("emissivity of the sky", "(ratio)", 0.0, 1.0, "[BERDAHL84]")
+EMISSIVITY = ValidInterval("emissivity", "(ratio)", 0.0, 1.0, "the notion of emissivity")
+SKY_VIEW = ValidInterval("view of the sky", "(ratio)", 0.0, 1.0, "the notion of a share")
 STEPS = 20
 
 
@@ -132,8 +132,8 @@ def radiative_depression_k(temperature_c, dew_point_c, pressure_hpa=1000.0, *, w
     8.1
     """
     t, dew = np.asarray(temperature_c, float), np.asarray(dew_point_c, float)
-    Limit("temperature", "°C", -40.0, 50.0, "[BERDAHL84]").check(t)
-    Limit("dew point", "°C", -40.0, 50.0, "[BERDAHL84]").check(dew)
+    ValidInterval("temperature", "°C", -40.0, 50.0, "[BERDAHL84]").check(t)
+    ValidInterval("dew point", "°C", -40.0, 50.0, "[BERDAHL84]").check(dew)
     humidity.PRESSURE.check(pressure_hpa)
     WIND.check(wind)
     EMISSIVITY.check(emissivity)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 from catseye.errors import ValidityError
 
@@ -58,14 +58,16 @@ GREENSPAN_ALPHA = (3.64449e-4, 2.93631e-5, 4.88635e-7, 4.36543e-9)
 GREENSPAN_LN_BETA = (-1.07271e1, 7.61989e-2, -1.74771e-4, 2.46721e-6)
 
 # a chilled mirror reads far below the air's own limits; formulas are extrapolated there, docstrings say how well
-PRESSURE = Limit("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]'s enhancement of saturation")
-DEW_POINT = Limit("dew point", "°C", -100.0, 100.0, "saturation over water")
-FROST_POINT = Limit("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
-OVER_ICE = Limit("temperature of ice", "°C", -100.0, MELTING_C, "ice", places=2)
-AIR_TEMPERATURE = Limit("temperature", "°C", -100.0, 100.0, "saturation over water")
-HUMIDITY = Limit("relative humidity", "%", 0.0, 100.0, "unsaturated air")
-OVER_ICE_HUMIDITY = Limit("relative humidity over ice", "%", 0.0, 300.0, "supersaturation over ice")  # 265 % at -100 °C
-VAPOUR_PRESSURE = Limit("vapour pressure", "hPa", 0.0, 1400.0, "the notion of a pressure")
+PRESSURE = ValidInterval("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]'s enhancement of saturation")
+DEW_POINT = ValidInterval("dew point", "°C", -100.0, 100.0, "saturation over water")
+FROST_POINT = ValidInterval("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
+OVER_ICE = ValidInterval("temperature of ice", "°C", -100.0, MELTING_C, "ice", places=2)
+AIR_TEMPERATURE = ValidInterval("temperature", "°C", -100.0, 100.0, "saturation over water")
+HUMIDITY = ValidInterval("relative humidity", "%", 0.0, 100.0, "unsaturated air")
+OVER_ICE_HUMIDITY = ValidInterval(
+    "relative humidity over ice", "%", 0.0, 300.0, "supersaturation over ice"
+)  # 265 % at -100 °C
+VAPOUR_PRESSURE = ValidInterval("vapour pressure", "hPa", 0.0, 1400.0, "the notion of a pressure")
 
 
 class Saturation(NamedTuple):

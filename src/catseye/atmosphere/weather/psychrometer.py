@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import (
     DRY_BELOW_HPA,
     ICE_FORMULAS,
@@ -31,9 +31,9 @@ U_COEFFICIENT = 0.01  # of itself: [WMO18] has as much at 15 °C, 1.4 % less at 
 STEPS = 30
 ROUNDING = 2e-3  # by so much the formulas over water and over ice may cross at 0 °C
 
-DRY_BULB = Limit("dry bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
-WET_BULB = Limit("wet bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
-ICE_BULB = Limit("wet bulb with ice", "°C", -40.0, MELTING_C, "[RUEGER90] eq. 5.24", places=2)
+DRY_BULB = ValidInterval("dry bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
+WET_BULB = ValidInterval("wet bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
+ICE_BULB = ValidInterval("wet bulb with ice", "°C", -40.0, MELTING_C, "[RUEGER90] eq. 5.24", places=2)
 
 
 class WetBulbPartials(NamedTuple):

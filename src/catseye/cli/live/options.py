@@ -62,10 +62,10 @@ def time_of(text: str | None) -> str | None:
 def motion_of(text: str | None) -> str | None:
     """As given, if it is a motion; a table is read when it is needed."""
     if text is not None and not text.startswith("table "):
-        from catseye.simulator.twin.motion import Motion
+        from catseye.simulator.twin.motion import AxisMotion
 
         try:
-            Motion.parse(text)
+            AxisMotion.parse(text)
         except CatseyeError as problem:
             raise typer.BadParameter(f"{problem}.") from problem
     return text

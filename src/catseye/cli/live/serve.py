@@ -73,13 +73,13 @@ def serve(
     records = site_of(site)
     from catseye.service.child import LiveChild
     from catseye.service.simulation import twin_arguments
-    from catseye.service.world import World
+    from catseye.service.world import TwinWords
 
     if twin and port_base == 0:
         raise typer.BadParameter("a twin that is started again needs ports that stay.", param_hint="'--port-base'")
     if twin and (loopback or addresses is not None or feed is not None or motion_script is not None):
         raise typer.BadParameter("brings its rangers and its feed.", param_hint="'--twin'")
-    made = World.starting_now if start is not None else World
+    made = TwinWords.starting_now if start is not None else TwinWords
     world = made(mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()))
     if twin:
         world.twin(records)  # what it cannot be is refused here

@@ -69,11 +69,11 @@ def simulate(
     records = site_of(site)
     from catseye.service.running import FastLoop, LiveRun
     from catseye.service.simulation import Simulation
-    from catseye.service.world import World
+    from catseye.service.world import TwinWords
 
     told: dict[str, Any] = {"seed": seed, "motion": motion, "conditions": conditions, "faults": tuple(fault or ())}
     begins = mjd_start(start, NIGHT)
-    world = World(begins, **told) if fast else World.starting_now(begins, **told).late(UNTIL_READY)
+    world = TwinWords(begins, **told) if fast else TwinWords.starting_now(begins, **told).late(UNTIL_READY)
     free = fast or port_base == 0
     orders = orders_of(
         drop=drop,

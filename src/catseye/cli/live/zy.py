@@ -115,9 +115,9 @@ def zy(
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **told)
     else:
         from catseye.service.warm import WarmingClock
-        from catseye.service.world import World, twin_heads
+        from catseye.service.world import TwinWords, twin_heads
 
-        made = World.starting_now if clock_offset_s is None else World
+        made = TwinWords.starting_now if clock_offset_s is None else TwinWords
         more = {} if clock_offset_s is None else {"offset": clock_offset_s}
         world = made(
             mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()), **more

@@ -7,7 +7,7 @@ import typer
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
 from catseye.constants import DEGREE
-from catseye.reduction.optics.link import Link, Reflector
+from catseye.reduction.optics.link import Link, LinkReflector
 
 if TYPE_CHECKING:
     from catseye.reduction.optics.link_budget import LinkBudget
@@ -31,10 +31,12 @@ def link(
     ] = Link.transmission,
     aperture_mm: Annotated[
         float, typer.Option("--aperture-mm", help="Radius of the reflector's clear face, mm.")
-    ] = Reflector.aperture * 1e3,
-    height_mm: Annotated[float, typer.Option("--height-mm", help="Corner behind the face, mm.")] = Reflector.height
+    ] = LinkReflector.aperture * 1e3,
+    height_mm: Annotated[float, typer.Option("--height-mm", help="Corner behind the face, mm.")] = LinkReflector.height
     * 1e3,
-    index: Annotated[float, typer.Option("--index", help="Of the reflector: 1 for a hollow cube.")] = Reflector.index,
+    index: Annotated[
+        float, typer.Option("--index", help="Of the reflector: 1 for a hollow cube.")
+    ] = LinkReflector.index,
     duration: Annotated[float, typer.Option("--duration", help="Of one range, s.")] = Link.duration,
     blocked_noise_volt: Annotated[
         float, typer.Option("--blocked-noise-volt", help="Rms of the samples with the beam blocked, V.")
@@ -59,7 +61,7 @@ def link(
         duration=duration,
         blocked_noise_volt=blocked_noise_volt,
     )
-    reflector = Reflector(aperture=aperture_mm * 1e-3, height=height_mm * 1e-3, index=index)
+    reflector = LinkReflector(aperture=aperture_mm * 1e-3, height=height_mm * 1e-3, index=index)
     if measured_volt is not None:
         head = head.scaled(link_budget(head, reflector, distance).amplitude_volt, measured_volt)
     light = {"incidence": incidence_deg * DEGREE, "background": background_uw * 1e-6}

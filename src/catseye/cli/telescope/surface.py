@@ -216,11 +216,11 @@ def _found(
     from catseye.reduction.surface.actuators import actuators_of, corrections
     from catseye.reduction.surface.change import change_between
     from catseye.reduction.surface.lookup import lookup_of
-    from catseye.reduction.surface.shape import Aperture, shape_of
+    from catseye.reduction.surface.shape import LitAperture, shape_of
 
     wanted, positions, travel = actuators
     site = read_site(site_directory(reading.site))
-    aperture = Aperture.of(site.site.paraboloid)
+    aperture = LitAperture.of(site.site.paraboloid)
     epochs, hashes = reading.of(inputs, site)
     shapes = []
     for k, prisms in enumerate(epochs):

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from catseye.coordinator.clients.parameters import Parameter, Parameters
+from catseye.coordinator.clients.parameters import ClientParameter, Parameters
 from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers, plain
 from catseye.coordinator.modes import mode_of
 from catseye.coordinator.ziy import Coordinator
@@ -35,7 +35,7 @@ HELP = {
 class Board:
     """A coordinator's commands, parameters and samplers."""
 
-    def __init__(self, coordinator: Coordinator, parameters: tuple[Parameter, ...] = ()):
+    def __init__(self, coordinator: Coordinator, parameters: tuple[ClientParameter, ...] = ()):
         self._ziy = coordinator
         self.samplers = Samplers()
         self.parameters = Parameters((*_own(coordinator), *parameters))
@@ -120,7 +120,7 @@ class Board:
         return [(ranger.upper(),)]
 
 
-def _own(z: Coordinator) -> tuple[Parameter, ...]:
+def _own(z: Coordinator) -> tuple[ClientParameter, ...]:
     """The coordinator's own parameters."""
 
     def dropped(text: str) -> str:
@@ -140,8 +140,8 @@ def _own(z: Coordinator) -> tuple[Parameter, ...]:
         z.set_mode(mode_of(text))
 
     return (
-        Parameter("mode", "active passive hold", lambda: z.mode, lambda text: mode_of(text), set_mode),
-        Parameter(
+        ClientParameter("mode", "active passive hold", lambda: z.mode, lambda text: mode_of(text), set_mode),
+        ClientParameter(
             "dropped",
             "rangers with blanks between, or none",
             lambda: " ".join(sorted(z.firing.dropped)) or "none",

@@ -9,7 +9,7 @@ Check = Callable[[str], str]  # the text as it is kept, or InputError
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ClientParameter:
     """One parameter.
 
     name    as it is set
@@ -29,7 +29,7 @@ class Parameter:
 class Parameters:
     """All of them; what was set waits until `start`, which wants a `prepare` after the last change."""
 
-    def __init__(self, parameters: tuple[Parameter, ...]):
+    def __init__(self, parameters: tuple[ClientParameter, ...]):
         self._all = {p.name: p for p in parameters}
         self._set: dict[str, str] = {}
         self._prepared = False

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
-from catseye.coordinator.journal.entries import AnsweredShot, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.ranger.line import stamp_text
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
@@ -57,11 +57,11 @@ def rows_of(entry: Any) -> Iterable[tuple[str, Row]]:
         yield "WEATHER", (_stamp(entry.ticks), plain(entry.station), *values)
     elif isinstance(entry, Happening):
         yield "EVENTS", (_stamp(entry.ticks), entry.severity, plain(entry.who), plain(entry.kind), plain(entry.text))
-    elif isinstance(entry, Solution):
+    elif isinstance(entry, EpochSolution):
         yield from _of_solution(entry)
 
 
-def _of_solution(entry: Solution) -> Iterable[tuple[str, Row]]:
+def _of_solution(entry: EpochSolution) -> Iterable[tuple[str, Row]]:
     """Of an epoch's answer as `reduction.live.live` gives it; what it does not have is `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     names, places = answer.get("names") or [], answer.get("x") or []

@@ -16,7 +16,7 @@ from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.line import LONGEST_REQUEST, Request, parse_request, stamp_text
-from catseye.ranger.network import Listener, Network, Sockets
+from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 
 PORT = 5260
 LOOPBACK = "127.0.0.1"
@@ -106,12 +106,17 @@ class ZiyServer:
     """
 
     def __init__(
-        self, coordinator: Coordinator, host: str = LOOPBACK, port: int = PORT, *, network: Network | None = None
+        self,
+        coordinator: Coordinator,
+        host: str = LOOPBACK,
+        port: int = PORT,
+        *,
+        network: ConnectionMaker | None = None,
     ):
         self.coordinator, self.host, self.port = coordinator, host, port
         self.board = Board(coordinator)
         self.clients: set[Client] = set()
-        self._network: Network = network or Sockets()
+        self._network: ConnectionMaker = network or Sockets()
         self._listener: Listener | None = None
         self._keeping: asyncio.Task[None] | None = None
 

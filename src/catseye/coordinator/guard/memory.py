@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.vantage import Vantage
 from catseye.errors import InputError
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.line import Request
 from catseye.ranger.motion_units import acceleration_counts, velocity_counts
 from catseye.ranger.state import AxisSettings
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.ranger.values import Value
 from catseye.records.site.folder import REFERENCE
 
@@ -103,7 +103,7 @@ class Memory:
         self.order: list[int] = []
 
     @property
-    def believed(self) -> Station:
+    def believed(self) -> MirrorStation:
         """The mirror as the ranger was told that it stands."""
         return self._table.station
 
@@ -169,7 +169,7 @@ class Memory:
         """What a reply says of where the mirror stands and of the laser; what cannot be read says nothing."""
         try:
             if command == "STW" and ok:
-                self._status(Status(int(values[0], 16)))
+                self._status(StatusWord(int(values[0], 16)))
             elif command in (self.stand.by, "WAI") and ok is False:
                 self.stand.failed()
             elif command in ("ACP", "WAI") and ok:
@@ -182,11 +182,11 @@ class Memory:
         except (ValueError, IndexError):
             return
 
-    def _status(self, word: Status) -> None:
-        self.laser_off = bool(word & Status.LASER_OFF)
-        if word & (Status.AZIMUTH_OFF | Status.ELEVATION_OFF):
+    def _status(self, word: StatusWord) -> None:
+        self.laser_off = bool(word & StatusWord.LASER_OFF)
+        if word & (StatusWord.AZIMUTH_OFF | StatusWord.ELEVATION_OFF):
             self.stand.failed()
-        for axis, home in enumerate((Status.AZIMUTH_HOMED, Status.ELEVATION_HOMED)):
+        for axis, home in enumerate((StatusWord.AZIMUTH_HOMED, StatusWord.ELEVATION_HOMED)):
             if not word & home:
                 self.stand.lose(axis)
 

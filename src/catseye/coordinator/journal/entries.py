@@ -44,7 +44,7 @@ class AnsweredShot:
 
 
 @dataclass(frozen=True)
-class Command:
+class SentCommand:
     """A line sent to a ranger and its first reply; a reply that never came is empty and `ok` None.
 
     ticks   of the reply, or of now where none came
@@ -60,7 +60,7 @@ class Command:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class EpochSolution:
     """What an epoch's solving gave, as plain values; one that gave nothing is kept too, since it used up its shots.
 
     ticks        the time that `Live.begin` was asked for
@@ -73,7 +73,7 @@ class Solution:
     covariance: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, ticks: int, answer: Any) -> "Solution":
+    def of(cls, ticks: int, answer: Any) -> "EpochSolution":
         """An epoch answer, any dataclass or mapping, or None; its matrix `covariance` is kept apart, bit for bit.
 
         Raises InputError for a value that JSON cannot hold.
@@ -94,7 +94,7 @@ class Solution:
         """The answer as JSON, keys sorted: two answers are the same where their texts are."""
         return json.dumps(self.answer, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
-    def same(self, other: "Solution | None") -> bool:
+    def same(self, other: "EpochSolution | None") -> bool:
         """Whether the other is this one to the last bit."""
         if other is None or (self.covariance is None) != (other.covariance is None):
             return False
@@ -115,7 +115,7 @@ class Document:
     text: str
 
 
-Entry = AnsweredShot | LiveWeather | LivePosture | Happening | Command | Solution | Document
+Entry = AnsweredShot | LiveWeather | LivePosture | Happening | SentCommand | EpochSolution | Document
 Item = Entry | LiveShot  # a bare shot is one without an answer
 
 

@@ -24,7 +24,7 @@ CHECKPOINT_PAGES = 512  # 4 MB: a checkpoint holds a commit up, for 4 ms; one of
 
 
 @dataclass(frozen=True)
-class Place:
+class JournalAddress:
     """A journal's place: `path` of a file, or `url` of a server; `shown` for people, without a password."""
 
     shown: str
@@ -32,24 +32,24 @@ class Place:
     url: URL | None = None
 
 
-def place_of(url: str | Path) -> Place:
+def place_of(url: str | Path) -> JournalAddress:
     """The place that a URL or a file's name means; InputError for any other text."""
     if isinstance(url, Path) or "://" not in url:
-        return Place(str(url), path=Path(url))
+        return JournalAddress(str(url), path=Path(url))
     try:
         parsed = make_url(url)
         backend = parsed.get_backend_name()
     except (ArgumentError, ValueError):
         raise InputError(f"journal {url.partition('://')[0]}://...: is no URL ({EXPECTED})") from None
     if backend == "sqlite" and parsed.database and not parsed.host and parsed.database != ":memory:":
-        return Place(parsed.database, path=Path(parsed.database))
+        return JournalAddress(parsed.database, path=Path(parsed.database))
     if backend in ("postgresql", "postgres") and parsed.database:
         shown = parsed.set(drivername="postgresql").render_as_string(hide_password=True)
-        return Place(shown, url=parsed.set(drivername="postgresql+psycopg"))
+        return JournalAddress(shown, url=parsed.set(drivername="postgresql+psycopg"))
     raise InputError(f"journal {parsed.render_as_string(hide_password=True)}: cannot be used ({EXPECTED})")
 
 
-def refuse_foreign(place: Place, *, fresh: bool) -> None:
+def refuse_foreign(place: JournalAddress, *, fresh: bool) -> None:
     """A file that is there is an SQLite file; with `fresh` it need not be there, but its directory."""
     if place.path is None:
         return
@@ -69,7 +69,7 @@ def refuse_foreign(place: Place, *, fresh: bool) -> None:
         raise InputError(f"journal {place.shown}: starts with {opening!r}: no journal (expected a file of catseye)")
 
 
-def writing_engine(place: Place, *, create: bool = False) -> Engine:
+def writing_engine(place: JournalAddress, *, create: bool = False) -> Engine:
     """Connections that write, durable against power loss when a commit returns; one each time it is asked.
 
     create   whether a file may be made
@@ -93,7 +93,7 @@ def writing_engine(place: Place, *, create: bool = False) -> Engine:
     return engine
 
 
-def reading_engine(place: Place) -> Engine:
+def reading_engine(place: JournalAddress) -> Engine:
     """Connections that only read, each transaction one state of the journal."""
     if place.url is not None:
         return _server_engine(place.url).execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
@@ -108,7 +108,7 @@ def reading_engine(place: Place) -> Engine:
     return engine
 
 
-def _file_engine(place: Place, options: str) -> Engine:
+def _file_engine(place: JournalAddress, options: str) -> Engine:
     address = f"file:{quote(str(place.path))}?{options}"
 
     def connected() -> sqlite3.Connection:
@@ -141,7 +141,7 @@ def _server_engine(url: URL) -> Engine:
     return engine
 
 
-def identity(place: Place) -> tuple[int, int] | None:
+def identity(place: JournalAddress) -> tuple[int, int] | None:
     """Of a journal's file; None for a server, and where it is not there."""
     if place.path is None:
         return None
@@ -152,7 +152,7 @@ def identity(place: Place) -> tuple[int, int] | None:
     return there.st_dev, there.st_ino
 
 
-def fold(place: Place, connection: Connection) -> None:
+def fold(place: JournalAddress, connection: Connection) -> None:
     """A file's log goes into the file, where nobody else has it open: a journal that was closed is one file."""
     raw = connection.connection.driver_connection
     if place.path is not None and raw is not None:
@@ -161,7 +161,7 @@ def fold(place: Place, connection: Connection) -> None:
             raw.execute("PRAGMA journal_mode = DELETE")
 
 
-def refused(place: Place, problem: SQLAlchemyError) -> InputError:
+def refused(place: JournalAddress, problem: SQLAlchemyError) -> InputError:
     """A database's complaint in one line."""
     why = str(problem.orig if isinstance(problem, DBAPIError) and problem.orig else problem).strip()
     return InputError(f"journal {place.shown}: {' '.join(why.split())[:300]}")
@@ -173,7 +173,7 @@ class WriterLock:
     Raises InputError, naming the writer that has it.
     """
 
-    def __init__(self, place: Place):
+    def __init__(self, place: JournalAddress):
         self._file: int | None = None
         if place.path is None:
             return

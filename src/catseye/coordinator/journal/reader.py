@@ -11,7 +11,7 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Engine, Table, func, select
 from sqlalchemy.exc import SQLAlchemyError
 
-from catseye.coordinator.journal.entries import AnsweredShot, Entry, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
 from catseye.coordinator.journal.rows import entry_of, unpack
 from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, version_of
@@ -119,10 +119,10 @@ class JournalReader:
             if isinstance(entry, AnsweredShot):
                 yield seq, entry
 
-    def solutions(self, run: int) -> Iterator[tuple[int, Solution]]:
+    def solutions(self, run: int) -> Iterator[tuple[int, EpochSolution]]:
         """The solutions of a run, with their seq."""
         for seq, entry in self.events(run, kinds=["solutions"]):
-            if isinstance(entry, Solution):
+            if isinstance(entry, EpochSolution):
                 yield seq, entry
 
     def last(self, run: int) -> int:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Solution
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
 from catseye.coordinator.parts import EpochJob, LiveReduction
 from catseye.errors import CatseyeError
@@ -24,8 +24,8 @@ class Replayed:
     """
 
     seq: int
-    stored: Solution
-    new: Solution
+    stored: EpochSolution
+    new: EpochSolution
     shots: int
     differing: tuple[int, ...]
 
@@ -61,8 +61,8 @@ def replay(
             live.posture(entry)
         elif isinstance(entry, Document) and entry.name == EPOCH_BEGUN:
             job = live.begin(entry.ticks)
-        elif isinstance(entry, Solution):
-            new = Solution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
+        elif isinstance(entry, EpochSolution):
+            new = EpochSolution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
             yield Replayed(seq, entry, new, shots, tuple(differing))
             shots, differing, job = 0, [], None
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.coordinator.journal.entries import AnsweredShot, Command, Document, Entry, Item, Solution
+from catseye.coordinator.journal.entries import AnsweredShot, Document, Entry, EpochSolution, Item, SentCommand
 from catseye.errors import InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 
@@ -78,7 +78,7 @@ def _posture(item: LivePosture) -> tuple[str, Row]:
     }
 
 
-def _command(item: Command) -> tuple[str, Row]:
+def _command(item: SentCommand) -> tuple[str, Row]:
     return "commands", {
         "ticks": _whole("command ticks", item.ticks),
         "ranger": _text(item.ranger),
@@ -110,7 +110,7 @@ def _detail(value: Any) -> Any:
     return repr(plain) if isinstance(plain, float) and not np.isfinite(plain) else plain
 
 
-def _solution(item: Solution) -> tuple[str, Row]:
+def _solution(item: EpochSolution) -> tuple[str, Row]:
     matrix = item.covariance
     return "solutions", {
         "ticks": _whole("solution ticks", item.ticks),
@@ -132,9 +132,9 @@ MAKERS: Mapping[type, Callable[[Any], tuple[str, Row]]] = {
     AnsweredShot: _shot,
     LiveWeather: _weather,
     LivePosture: _posture,
-    Command: _command,
+    SentCommand: _command,
     Happening: _happening,
-    Solution: _solution,
+    EpochSolution: _solution,
     Document: _document,
 }
 
@@ -164,11 +164,11 @@ def _read_shot(row: Any, samples: NDArray[np.int16] | None) -> AnsweredShot:
     return AnsweredShot(shot, row.status, row.text, _back(row.range_m), _back(row.u_range_m), _back(row.misfit_m))
 
 
-def _read_solution(row: Any, _: object) -> Solution:
+def _read_solution(row: Any, _: object) -> EpochSolution:
     matrix = None
     if row.covariance is not None:
         matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, -1 if row.size else 0)
-    return Solution(row.ticks, json.loads(row.answer), matrix)
+    return EpochSolution(row.ticks, json.loads(row.answer), matrix)
 
 
 READERS: Mapping[str, Callable[[Any, Any], Entry]] = {
@@ -183,7 +183,7 @@ READERS: Mapping[str, Callable[[Any, Any], Entry]] = {
         _back(row.azimuth_rate_rad_s),
         _back(row.elevation_rate_rad_s),
     ),
-    "commands": lambda row, _: Command(row.ticks, row.ranger, row.tid, row.line, row.reply, row.ok),
+    "commands": lambda row, _: SentCommand(row.ticks, row.ranger, row.tid, row.line, row.reply, row.ok),
     "happenings": lambda row, _: Happening(
         row.ticks, row.who, row.kind, row.text, row.severity, json.loads(row.details)
     ),

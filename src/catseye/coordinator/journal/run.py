@@ -11,14 +11,14 @@ from sqlalchemy import insert, select
 
 from catseye import __version__
 from catseye.coordinator.journal.entries import Run, plain
-from catseye.coordinator.journal.place import Place, reading_engine, writing_engine
+from catseye.coordinator.journal.place import JournalAddress, reading_engine, writing_engine
 from catseye.coordinator.journal.tables import RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
 from catseye.coordinator.parts import Clock, ticks_now
 
 OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
 
 
-def begin(place: Place, run: Run, clock: Clock, buffers: bool) -> int:
+def begin(place: JournalAddress, run: Run, clock: Clock, buffers: bool) -> int:
     """The tables where there are none, the run's row and its files, in one transaction; the run's number.
 
     buffers   whether samples will be kept
@@ -58,7 +58,7 @@ def begin(place: Place, run: Run, clock: Clock, buffers: bool) -> int:
     return number
 
 
-def _look_first(place: Place) -> None:
+def _look_first(place: JournalAddress) -> None:
     """A file of others' is refused before it is opened for writing, which would change its header."""
     if place.path is not None and place.path.exists() and place.path.stat().st_size:
         with reading_engine(place).connect() as connection:

@@ -20,7 +20,7 @@ from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 
 from catseye.coordinator.journal.entries import Item, Run
 from catseye.coordinator.journal.place import (
-    Place,
+    JournalAddress,
     WriterLock,
     fold,
     identity,
@@ -70,7 +70,7 @@ class Journal:
     place    where it is, for people
     """
 
-    def __init__(self, place: Place, engine: Engine, lock: WriterLock, run: int, **settings: Any):
+    def __init__(self, place: JournalAddress, engine: Engine, lock: WriterLock, run: int, **settings: Any):
         self.run, self.place = run, place.shown
         self._where, self._engine, self._lock = place, engine, lock
         self._clock: Clock = settings["clock"]

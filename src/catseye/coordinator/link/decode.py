@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.errors import InputError, ValidityError
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import Reply
 from catseye.records.night.live import LiveShot
 
@@ -28,7 +28,7 @@ class BufferRead:
 
     cube: int | None
     ticks: int
-    sampling: Sampling
+    sampling: SamplingSettings
     volts_per_code: float
     samples: NDArray[np.int16]
 
@@ -54,7 +54,7 @@ def buffer_of(reply: Reply) -> BufferRead:
     cube = None if values[0] == "none" else _whole(values[0], "BUF's cube")
     cycles, samples, frequency = (_whole(v, "BUF's sampling") for v in values[1:4])
     try:
-        sampling = Sampling(samples, cycles, frequency)
+        sampling = SamplingSettings(samples, cycles, frequency)
     except ValidityError as problem:
         raise InputError(f"BUF: {problem}") from problem
     volts = _real(values[4], "BUF's V a code", LARGEST_CODE_V)
@@ -87,7 +87,9 @@ def measurement_of(reply: Reply) -> Measurement:
     )
 
 
-def shot_of(ranger: str, target: str, measured: Measurement, buffer: BufferRead | None, usual: Sampling) -> LiveShot:
+def shot_of(
+    ranger: str, target: str, measured: Measurement, buffer: BufferRead | None, usual: SamplingSettings
+) -> LiveShot:
     """A shot from its two replies; `usual` is how it was taken where the buffer itself did not come."""
     sampling = usual if buffer is None else buffer.sampling
     return LiveShot(

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from catseye.coordinator.link.decode import reals_of
 from catseye.errors import InputError
 from catseye.ranger.commands import MOST_CUBES
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import Reply, Request
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.records.site.folder import REFERENCE
 
 AT_ONCE = 48  # requests on their way together: fewer than a ZY lets wait
@@ -113,7 +113,7 @@ class Preparation:
         return (*mark, *(Request(name, OF_A_CUBE.get(name, ())) for name in READ_BACK if name in given))
 
 
-async def prepare(ask: Ask, preparation: Preparation, status: Callable[[], Status]) -> bool:
+async def prepare(ask: Ask, preparation: Preparation, status: Callable[[], StatusWord]) -> bool:
     """Tell a ranger what it lacks; True where records had to be sent.
 
     ask      sends a request past the guard and gives its reply: (request, s)
@@ -122,7 +122,7 @@ async def prepare(ask: Ask, preparation: Preparation, status: Callable[[], Statu
     Raises Refused: a command, or the search for an index.
     """
     sent = False
-    if not (status() & Status.INITIALISED and await _has_it(ask, preparation)):
+    if not (status() & StatusWord.INITIALISED and await _has_it(ask, preparation)):
         sent = True
         for at in range(0, len(preparation.requests), AT_ONCE):
             await _all(ask, preparation.requests[at : at + AT_ONCE])
@@ -132,12 +132,12 @@ async def prepare(ask: Ask, preparation: Preparation, status: Callable[[], Statu
     return sent
 
 
-async def sampling_of(ask: Ask) -> Sampling:
+async def sampling_of(ask: Ask) -> SamplingSettings:
     """How a ranger takes its buffers, asked."""
     cycles, samples, frequency = [
         int(reals_of(await ask(Request(name), PATIENCE), 1)[0]) for name in ("CYC", "SFQ", "IFF")
     ]
-    return Sampling(samples, cycles, frequency)
+    return SamplingSettings(samples, cycles, frequency)
 
 
 async def counts_of(ask: Ask) -> tuple[float, float]:
@@ -161,16 +161,16 @@ async def _all(ask: Ask, requests: Sequence[Request]) -> None:
             raise Refused("not-initialised", f"{line[:60]} was refused: {reply.text[:120]}")
 
 
-async def _axes(ask: Ask, status: Callable[[], Status]) -> None:
+async def _axes(ask: Ask, status: Callable[[], StatusWord]) -> None:
     """Amplifiers on and both indices found; with the laser off meanwhile, for the search may cross the Sun."""
     word = status()
-    for axis, on in enumerate((Status.AZIMUTH_ENABLED, Status.ELEVATION_ENABLED)):
+    for axis, on in enumerate((StatusWord.AZIMUTH_ENABLED, StatusWord.ELEVATION_ENABLED)):
         if not word & on:
             await _all(ask, [Request("AXIS", (str(axis), "1"))])
-    lost = [k for k, home in enumerate((Status.AZIMUTH_HOMED, Status.ELEVATION_HOMED)) if not word & home]
+    lost = [k for k, home in enumerate((StatusWord.AZIMUTH_HOMED, StatusWord.ELEVATION_HOMED)) if not word & home]
     if not lost:
         return
-    if not word & Status.LASER_OFF:
+    if not word & StatusWord.LASER_OFF:
         await _all(ask, [Request("PS", ("0",))])
     for axis in lost:
         reply = await ask(Request("FHM", (str(axis),)), HOMING_TIMEOUT)

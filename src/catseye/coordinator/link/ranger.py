@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Literal
 
 from catseye.coordinator.herald import Herald
-from catseye.coordinator.journal.entries import Command
+from catseye.coordinator.journal.entries import SentCommand
 from catseye.coordinator.link.clock_watch import ClockWatch
 from catseye.coordinator.link.greeting import Greeting, first_of
 from catseye.coordinator.link.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
@@ -24,9 +24,9 @@ from catseye.coordinator.parts import Clock, PlannedShot, SafetyGuard, Tell, tic
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, stamp_text
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 from catseye.records.night.live import LiveShot
 
 State = Literal["down", "connected", "preparing", "ready"]
@@ -61,7 +61,7 @@ class RangerLink:
         tell: Tell,
         wanted: Wanted = "measure",
         heard: Callable[["RangerLink", Reply], None] | None = None,
-        commanded: Callable[[Command], None] | None = None,
+        commanded: Callable[[SentCommand], None] | None = None,
         settings: LinkSettings | None = None,
         seed: int = 0,
         network: Any = None,
@@ -71,7 +71,7 @@ class RangerLink:
         self.told: set[int] = set()  # cubes that it was told of on demand
         self.names = {number: name for name, number in self.preparation.numbers.items()}
         self.state: State = "down"
-        self.sampling = Sampling()
+        self.sampling = SamplingSettings()
         self.counts: tuple[float, float] | None = None
         self.busy, self.shots, self.failures = False, 0, 0  # failures in a row
         self.round_trip = float("nan")
@@ -97,7 +97,7 @@ class RangerLink:
         return self._client is not None and not self._client.closed.done()
 
     @property
-    def status(self) -> Status:
+    def status(self) -> StatusWord:
         """Its status word as last heard."""
         return self._status.word
 
@@ -212,7 +212,7 @@ class RangerLink:
         if self.wanted == "measure" and (idle or not self.busy):
             if right is not None:
                 await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
-            if self.state == "ready" and self.status & Status.LASER_OFF:  # the ranger itself switched it off
+            if self.state == "ready" and self.status & StatusWord.LASER_OFF:  # the ranger itself switched it off
                 await self._ask(Request("PS", ("1",)), self.settings.probe_timeout)
         return True
 
@@ -220,14 +220,14 @@ class RangerLink:
         """Tell the ranger what it lacks; where that fails, wait, longer each time."""
         self.state = "preparing"
         loop = asyncio.get_running_loop()
-        began, was_dark = loop.time(), bool(self.status & Status.LASER_OFF)
+        began, was_dark = loop.time(), bool(self.status & StatusWord.LASER_OFF)
         try:
             self._teach_guard()
             self.told.clear()
             sent = await prepare(self.sure, self.preparation, lambda: self.status)
             self.sampling = await sampling_of(self._ask)
             self.counts = await counts_of(self._ask)
-            if self.status & Status.LASER_OFF:
+            if self.status & StatusWord.LASER_OFF:
                 self._lit_here = self._lit_here or was_dark
                 await self.sure(Request("PS", ("1",)), PATIENCE)
         except CatseyeError as problem:
@@ -276,12 +276,12 @@ class RangerLink:
         if self._commanded is None:
             return
         if reply is None:
-            self._commanded(Command(ticks_now(self._clock), self.ranger, tid, line))
+            self._commanded(SentCommand(ticks_now(self._clock), self.ranger, tid, line))
             return
         text = "" if reply.command == "BUF" else reply.text[:LONGEST_KEPT]  # samples have a table of their own
         came = reply.ticks is not None  # the client answers itself where the connection is lost
         ticks = reply.ticks if reply.ticks is not None else ticks_now(self._clock)
-        self._commanded(Command(ticks, self.ranger, tid, line, text, reply.ok if came else None))
+        self._commanded(SentCommand(ticks, self.ranger, tid, line, text, reply.ok if came else None))
 
     async def _ask(self, request: Request, timeout: float) -> Reply:
         """A reply, f = 0 where there was none in time, or it must not be sent."""

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from catseye.coordinator.herald import Herald
-from catseye.ranger.status import Status
+from catseye.ranger.status import StatusWord
 
-NEEDED = Status.INITIALISED | Status.AZIMUTH_HOMED | Status.ELEVATION_HOMED | Status.AUTO
+NEEDED = StatusWord.INITIALISED | StatusWord.AZIMUTH_HOMED | StatusWord.ELEVATION_HOMED | StatusWord.AUTO
 
 
 class StatusWatch:
@@ -16,24 +16,24 @@ class StatusWatch:
 
     def __init__(self, ranger: str, herald: Herald, lost: Callable[[str], None]):
         self.ranger, self._herald, self._lost = ranger, herald, lost
-        self.word = Status(0)
+        self.word = StatusWord(0)
 
     def hear(self, text: str) -> None:
         """A new word, as it travels; one that is none is told, and not used."""
         try:
-            word = Status(int(text[:12], 16) & 0xFFFFFFFF)
+            word = StatusWord(int(text[:12], 16) & 0xFFFFFFFF)
         except ValueError:
             self._herald.tell("bad-line", f"{self.ranger}: STW {text[:20]!a} is no status word", "warning")
             return
         before, self.word = self.word, word
-        for axis, bit in enumerate((Status.AZIMUTH_OFF, Status.ELEVATION_OFF)):
+        for axis, bit in enumerate((StatusWord.AZIMUTH_OFF, StatusWord.ELEVATION_OFF)):
             text = f"the motor of axis {axis} went off: position error past its limit (see whether it turns freely)"
             self._herald.standing(
                 f"motor-off-{axis}", text if word & bit else None, over=f"the motor of axis {axis} is on"
             )
-        free = "its clock has no time signal" if word & Status.CLOCK_FREE else None
+        free = "its clock has no time signal" if word & StatusWord.CLOCK_FREE else None
         self._herald.standing("clock-free", free, over="its clock follows the time signal")
-        if word & Status.CLIPPED and not before & Status.CLIPPED:
+        if word & StatusWord.CLIPPED and not before & StatusWord.CLIPPED:
             self._herald.tell(
                 "saturated", "its converter is at its ends (weaken the return, see the amplifier)", "warning"
             )

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from catseye.coordinator.link.preparation import Preparation
 from catseye.coordinator.link.settings import LinkSettings
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import Reply, Request
 
 Sent = tuple[int, "asyncio.Future[Reply]"]  # TID, and what will be answered
@@ -27,7 +27,7 @@ class Wire(Protocol):
     shots: int
     failures: int
     round_trip: float
-    sampling: Sampling
+    sampling: SamplingSettings
     preparation: Preparation
     settings: LinkSettings
 

@@ -16,7 +16,7 @@ WHY = {FREE: None, SUN: "the Sun", BOX: "a box"}
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class ShotCandidates:
     """The place where the mirror stands, row 0, and m things to shoot.
 
     names     (1 + m) the first is ""
@@ -55,7 +55,7 @@ class Candidates:
 
 def candidates(
     names: tuple[str, ...], looks: Array, units: Array, start: tuple[float, float], around: Surroundings
-) -> tuple[Candidates, dict[str, str]]:
+) -> tuple[ShotCandidates, dict[str, str]]:
     """The table, and why names were left out of it.
 
     names    (m)
@@ -91,7 +91,7 @@ def candidates(
     moving = trapezoid(middle[:, None], middle[None], around.vantage.pace).total
     corner = _round_corners(around, middle, low, high, code=code, moving=moving)
     chosen = np.concatenate([np.zeros((1, 3)), units[kept].reshape(-1, 3)])
-    return Candidates(("", *(names[i] for i in kept)), middle, low, high, code, moving, corner, chosen), unseen
+    return ShotCandidates(("", *(names[i] for i in kept)), middle, low, high, code, moving, corner, chosen), unseen
 
 
 def _round_corners(

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.parts import PlannedShot, SiteState
 from catseye.coordinator.visibility.surroundings import later
-from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture
+from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage, nominal_posture
 from catseye.geometry.antenna.frames import ground_from_reflector_at
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import REFERENCE, SiteFolder
@@ -19,7 +19,7 @@ AS_GIVEN = 0.005  # m: a target this near to its record is where the ranger beli
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenTarget:
     """What a ranger shall shoot: target, s from the round's begin to its buffer, why, and halts on the way, counts."""
 
     target: str
@@ -40,7 +40,7 @@ class Places:
         self,
         site: SiteFolder,
         vantages: Mapping[str, Vantage],
-        retros: Mapping[str, Retro],
+        retros: Mapping[str, SeenRetroreflector],
         state: SiteState,
         ticks: NDArray[np.int64],
     ):
@@ -78,7 +78,7 @@ class Places:
             self._shifts[vantage.name] = there[0] - vantage.station.scan_point
         return self._shifts[vantage.name]
 
-    def shots(self, vantage: Vantage, chosen: "list[Chosen]", duration: float) -> tuple[PlannedShot, ...]:
+    def shots(self, vantage: Vantage, chosen: "list[ChosenTarget]", duration: float) -> tuple[PlannedShot, ...]:
         """The shots of a ranger."""
         begin = np.array([later(int(self.ticks[0]), each.at) for each in chosen], dtype=np.int64)
         both = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)

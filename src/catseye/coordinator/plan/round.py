@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.coordinator.parts import PlannedShot, Round, SiteState
-from catseye.coordinator.plan.candidates import Candidates, candidates
-from catseye.coordinator.plan.places import Chosen, Places
+from catseye.coordinator.plan.candidates import ShotCandidates, candidates
+from catseye.coordinator.plan.places import ChosenTarget, Places
 from catseye.coordinator.plan.tour import Tour
 from catseye.coordinator.plan.value import SIGMA, Knowledge
-from catseye.coordinator.visibility.sights import Sights
+from catseye.coordinator.visibility.sights import VisibleSights
 from catseye.coordinator.visibility.surroundings import FREE, PERHAPS, KeepClear, Surroundings, instants, later
-from catseye.coordinator.visibility.vantage import Retro, Vantage, retros_of, vantages_of
+from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage, retros_of, vantages_of
 from catseye.errors import InputError
 from catseye.geometry.clearance.keep_out import servo_margin
 from catseye.ranger.sun_watch import LARGEST_STEP
@@ -72,7 +72,7 @@ class _Turn:
 
     vantage: Vantage
     around: Surroundings
-    table: Candidates
+    table: ShotCandidates
     points: NDArray[np.int64]
     variance: Array
     until: float
@@ -80,7 +80,7 @@ class _Turn:
     open_: NDArray[np.bool_]
     row: int = 0
     at: float = 0.0
-    chosen: list[Chosen] = field(default_factory=list)
+    chosen: list[ChosenTarget] = field(default_factory=list)
 
 
 class RoundPlanner:
@@ -109,7 +109,7 @@ class RoundPlanner:
         dish = tuple(r for r in self.retros.values() if r.part == "dish")
         ground = {n: r for n, r in self.retros.items() if _matters(r, wanted)}
         arm = {n: r for n, r in self.retros.items() if r.part == "dish" or (r.part != "benchmark" and r.kind != "ball")}
-        self._sights = Sights(site, self.vantages, ground=ground, arm=arm, solids=solids)
+        self._sights = VisibleSights(site, self.vantages, ground=ground, arm=arm, solids=solids)
         self._benchmarks = {b.ranger: b.target for b in site.benchmarks}
         self._benchmarked: dict[str, int] = {}
         seen = self._sights.at(Places.nominal(site)).targets
@@ -231,7 +231,7 @@ class RoundPlanner:
     def _take(self, turn: _Turn, row: int, reason: str) -> None:
         begin = turn.at + float(turn.table.moving[turn.row, row]) + self.settings.settle
         turn.open_[row] = False
-        turn.chosen.append(Chosen(turn.table.names[row], begin, reason, turn.table.via(turn.row, row)))
+        turn.chosen.append(ChosenTarget(turn.table.names[row], begin, reason, turn.table.via(turn.row, row)))
         turn.row, turn.at = row, begin + self.settings.duration + self.settings.transfer
 
     @property
@@ -290,11 +290,13 @@ class RoundPlanner:
             visited=self._visited,
         )
         self._visited.update(tour.names[i] for i, _ in chosen)
-        turn.chosen += [Chosen(tour.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen]
+        turn.chosen += [
+            ChosenTarget(tour.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen
+        ]
         return {(name, target): text for target, text in why.items()}
 
 
-def _matters(retro: Retro, wanted: frozenset[str] | None) -> bool:
+def _matters(retro: SeenRetroreflector, wanted: frozenset[str] | None) -> bool:
     """To rangers on the ground."""
     if wanted is not None:
         return retro.name in wanted

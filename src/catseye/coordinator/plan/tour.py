@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.coordinator.visibility.surroundings import FREE, Surroundings
-from catseye.coordinator.visibility.vantage import Retro, Vantage
+from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage
 from catseye.geometry.mirror.slew import trapezoid
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ class Tour:
     The way is ordered by the mirror's own counts, in bands of elevation, to and fro in azimuth: short moves.
     """
 
-    def __init__(self, vantage: Vantage, retros: tuple[Retro, ...]):
+    def __init__(self, vantage: Vantage, retros: tuple[SeenRetroreflector, ...]):
         points = np.array([r.point for r in retros]).reshape(-1, 3)
         counts = vantage.look(points)
         within = np.flatnonzero(np.isfinite(counts).all(axis=1))

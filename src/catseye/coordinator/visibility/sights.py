@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import DEGREE
-from catseye.coordinator.visibility.vantage import Retro, Vantage, nominal_posture, reflector_at
+from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage, nominal_posture, reflector_at
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.solids import Solids
@@ -24,7 +24,7 @@ class Seen:
     unseen: dict[tuple[str, str], str]
 
 
-class Sights:
+class VisibleSights:
     """Visible pairs of a site.
 
     vantages   of the rangers
@@ -41,8 +41,8 @@ class Sights:
         site: SiteFolder,
         vantages: Mapping[str, Vantage],
         *,
-        ground: Mapping[str, Retro],
-        arm: Mapping[str, Retro],
+        ground: Mapping[str, SeenRetroreflector],
+        arm: Mapping[str, SeenRetroreflector],
         solids: Solids | None = None,
         limits: RangeLimits | None = None,
     ):
@@ -64,7 +64,9 @@ class Sights:
             self._kept[cell] = Seen({**seen.targets, **self._arm.targets}, {**seen.unseen, **self._arm.unseen})
         return self._kept[cell]
 
-    def _pairs(self, vantages: Mapping[str, Vantage], retros: Mapping[str, Retro], posture: LivePosture | None) -> Seen:
+    def _pairs(
+        self, vantages: Mapping[str, Vantage], retros: Mapping[str, SeenRetroreflector], posture: LivePosture | None
+    ) -> Seen:
         """Of rangers and retroreflectors; without a posture that of the record, where riders are asked."""
         if not vantages or not retros:
             return Seen(dict.fromkeys(vantages, ()), {})

@@ -14,13 +14,13 @@ from catseye.constants import DEGREE
 from catseye.coordinator.visibility.sweep import chords, nearest
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between
 from catseye.errors import InputError
-from catseye.geometry.clearance.keep_out import Box
+from catseye.geometry.clearance.keep_out import BoxZone
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.mirror.slew import trapezoid
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.keep_out import KeepOut
-from catseye.reduction.site.earth_rotation import Place, place_of, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, place_of, sun_at
 from catseye.reduction.steering.guard import Guard, guard_of
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ class KeepClear:
     place      of the ground frame's origin; the site's, with its usual air, if None
     """
 
-    def __init__(self, site: SiteFolder, keep_out: KeepOut | None = None, place: Place | None = None):
+    def __init__(self, site: SiteFolder, keep_out: KeepOut | None = None, place: FramePlace | None = None):
         self.site, self.keep_out = site, keep_out or KeepOut()
         self.place = place or place_of(site.site.site)
         self.boxes = self.keep_out.boxes()
@@ -246,7 +246,7 @@ def _seen(vantage: Vantage, frames: list[Transform], centres: Array, radii: Arra
     return Spheres(axes.reshape(-1, 3), limits.ravel()), step
 
 
-def _pieces(box: Box) -> list[tuple[Array, float]]:
+def _pieces(box: BoxZone) -> list[tuple[Array, float]]:
     """Middles (3,) m, ground, and radii of spheres about equal pieces of a box."""
     number = np.ceil(box.size / PIECE).astype(int)
     size = box.size / number

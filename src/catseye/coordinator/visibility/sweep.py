@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 
 Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
 
 
-def nearest(station: Station, low: ArrayLike, high: ArrayLike, directions: ArrayLike) -> Array:
+def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, directions: ArrayLike) -> Array:
     """Least angle (..., k), rad, between the beam and directions while the counts stay within rectangles.
 
     station       one ranger, in the frame of the directions
@@ -28,7 +28,7 @@ def nearest(station: Station, low: ArrayLike, high: ArrayLike, directions: Array
 
     Source: above. Good to 3e-8 rad (the arc cosine near 1).
 
-    >>> flat = Station([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
+    >>> flat = MirrorStation([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
     >>> up = [[0.0, 0.0, 1.0]]  # is y of this mirror: Theta = Phi = a quarter turn
     >>> nearest(flat, [0.0, 12_500.0], [20_000.0, 13_000.0], up).round(6).tolist()  # 5000 counts of azimuth short
     [0.314159]

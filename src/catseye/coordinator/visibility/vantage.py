@@ -14,7 +14,7 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.mirror.encoder import prime_counts, turned_within, within
-from catseye.geometry.mirror.pointing import Station, counts
+from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.initialisation import frame_of, own_station
 from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
@@ -42,7 +42,7 @@ class Vantage:
 
     name: str
     frame: Frame
-    station: Station
+    station: MirrorStation
     mirror: Mirror
     pace: Pace
 
@@ -73,19 +73,19 @@ class Vantage:
             answer[allowed] = np.stack([azimuth, setting[..., 1]], axis=-1)[allowed]
         return answer
 
-    def on_ground(self, frame: Transform) -> Station:
+    def on_ground(self, frame: Transform) -> MirrorStation:
         """Its mirror in the ground frame while the reflector stands so: `ground_from_reflector`."""
         if self.frame == "ground":
             return self.station
         own = self.station
         turned = own.gamma @ frame.rotation.T
-        return Station.from_matrix(
+        return MirrorStation.from_matrix(
             frame.points(own.scan_point), turned, offset=own.offset, beta=own.beta, zeros=own.zeros
         )
 
 
 @dataclass(frozen=True, eq=False)
-class Retro:
+class SeenRetroreflector:
     """A retroreflector: kind as in `reduction.steering.visibility.ACCEPTANCE`; point (3,) m and outward axis (3,), NaN
     where unknown, in its frame; u m of each coordinate; what it is `part` of.
     """
@@ -117,13 +117,13 @@ def pace_by(mirror: Mirror) -> Pace:
     return Pace((speed, speed), (acceleration, acceleration))
 
 
-def retros_of(site: SiteFolder) -> dict[str, Retro]:
+def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
     """Every retroreflector of a site, by name.
 
     Source: [GOLDMAN00] figure 10 for triplets: ball = mid-point + h_corr normal, which points to the prisms' side.
     """
     benches = {each.target for each in site.benchmarks}
-    found: dict[str, Retro] = {}
+    found: dict[str, SeenRetroreflector] = {}
     for target in site.targets.values():
         part: Literal["dish", "structure", "benchmark"] = "structure"
         if target.name in benches:
@@ -132,16 +132,18 @@ def retros_of(site: SiteFolder) -> dict[str, Retro]:
             part = "dish"
         axis = np.full(3, np.nan) if target.normal is None else np.array(target.normal)
         point = np.array(target.position_mm) * MILLIMETRE
-        found[target.name] = Retro(target.name, target.type, target.frame, point, axis, _u(target.u_position_mm), part)
+        found[target.name] = SeenRetroreflector(
+            target.name, target.type, target.frame, point, axis, _u(target.u_position_mm), part
+        )
     for triplet in site.triplets.values():
         ball, normal = np.array(triplet.nominal_position_mm) * MILLIMETRE, np.array(triplet.normal)
         middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
         half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
         left, right, own = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
         u, frame = _u(triplet.u_position_mm), triplet.frame
-        found[left] = Retro(left, "prism", frame, middle - half, normal, u, "triplet")
-        found[right] = Retro(right, "prism", frame, middle + half, normal, u, "triplet")
-        found[own] = Retro(own, "ball", frame, ball, -normal, u, "triplet")
+        found[left] = SeenRetroreflector(left, "prism", frame, middle - half, normal, u, "triplet")
+        found[right] = SeenRetroreflector(right, "prism", frame, middle + half, normal, u, "triplet")
+        found[own] = SeenRetroreflector(own, "ball", frame, ball, -normal, u, "triplet")
     return found
 
 

@@ -12,7 +12,7 @@ from enum import IntEnum
 import numpy as np
 
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.ambiguity.tree import Candidates, Ranged, grown, trunk
+from catseye.estimation.ambiguity.tree import CycleCandidates, Ranged, grown, trunk
 
 SURE = 5.7e-7  # doubt that is accepted while all ranges are good: five standard deviations of a normal variable
 SURE_OF_ALL = 1e-3  # doubt that is accepted in all, one wrong range considered
@@ -240,7 +240,7 @@ class _Explanation:
 
     left_out: int
     penalty: float
-    found: Candidates
+    found: CycleCandidates
 
 
 def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation] | None:

@@ -57,7 +57,7 @@ class Trunk:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class CycleCandidates:
     """What the search found.
 
     x            (c, 3) m, one a set of whole cycles
@@ -96,7 +96,7 @@ def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
     return Trunk(first, cycles[inside], x[inside], information[inside], square[inside])
 
 
-def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> Candidates | None:
+def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> CycleCandidates | None:
     """Every set of whole cycles of some ranges that grows from a trunk; None where that would be more than `most`.
 
     ranged   the problem
@@ -125,7 +125,7 @@ def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> Candidate
     whole = np.rint((distance - ranged.lengths) / ranged.periods)
     whole[:, order] = cycles
     covariance = np.linalg.inv(information[np.argmin(square)]) if len(square) else np.full((3, 3), np.nan)
-    return Candidates(x, whole.astype(np.int64), square, covariance, floor, tried)
+    return CycleCandidates(x, whole.astype(np.int64), square, covariance, floor, tried)
 
 
 def _best_figure(ranged: Ranged, rows: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.baseline.model import Claim, Extra, Known, Model, Normal, Sights
+from catseye.estimation.baseline.model import BaselineModel, BaselineSights, Claim, Extra, KnownPlaces, Normal
 
 FLOOR = np.array([1e-7, 1e-7, 1e-9]) ** 2  # m², m², ratio²: no distance meter is better
 CEILING = np.array([0.1, 0.1, 1e-3]) ** 2
@@ -29,7 +29,7 @@ ORDERS = 256  # of the pillars, followed at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class BaselineSolution:
     """An adjusted baseline.
 
     names        (u,) of the parameters: "x 1", "y 1" by the pillars' numbers, "zero", "scale", extras, "orientation 0"
@@ -67,7 +67,7 @@ class Solution:
     sets_squares: float
     variance_factor: float
     parts: dict[str, np.ndarray]
-    used: Sights
+    used: BaselineSights
 
     def of(self, name: str) -> tuple[float, float]:
         """A parameter and its standard uncertainty; nan, nan if it is not one."""
@@ -89,24 +89,24 @@ class Solution:
 
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """(r,) rows of [x, y] that have an uncertainty, as in `Known`, and their covariance (r, r), m²."""
+        """(r,) rows of [x, y] that have an uncertainty, as in `KnownPlaces`, and their covariance (r, r), m²."""
         at = [i for i, name in enumerate(self.names) if name[:2] in ("x ", "y ")]
         rows = [int(self.names[i][2:]) + (len(self.x) if self.names[i][0] == "y" else 0) for i in at]
         return np.array(rows, int), self.covariance[np.ix_(at, at)]
 
 
 def adjust_baseline(
-    sights: Sights,
+    sights: BaselineSights,
     x,
     y,
     *,
-    known: Known | None = None,
+    known: KnownPlaces | None = None,
     scale: bool = False,
     extra: Extra | None = None,
     u_centring: float = 2e-4,
     noise: Claim | None = None,
     claim: Claim | None = None,
-) -> Solution:
+) -> BaselineSolution:
     """Pillars and instrument by least squares, with variance components of the noise.
 
     sights       shots
@@ -122,7 +122,7 @@ def adjust_baseline(
     Source: least squares with correlated observations; restricted likelihood of the components, [PATTERSON71].
     """
     x, y = np.array(x, float), np.array(y, float)
-    model = Model(sights, x, y, known, scale, extra, u_centring)
+    model = BaselineModel(sights, x, y, known, scale, extra, u_centring)
     start = noise or claim or Claim(1e-8, 1e-7, 1e-12)
     values = np.zeros(len(model.names))
     for _ in range(20):
@@ -148,7 +148,7 @@ def adjust_baseline(
     return _solution(model, values, noise, u_noise, normal)
 
 
-def _components(model: Model, values: np.ndarray) -> tuple[Claim, np.ndarray]:
+def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.ndarray]:
     """Restricted maximum likelihood of shot, set and air, none below its floor; and their covariance (3, 3)."""
     from scipy.optimize import minimize
 
@@ -201,7 +201,7 @@ def _component_covariance(model, y, a, found, active, repeats):
     return covariance
 
 
-def _of_estimated_noise(model: Model, noise: Claim, covariance: np.ndarray, normal: Normal) -> np.ndarray:
+def _of_estimated_noise(model: BaselineModel, noise: Claim, covariance: np.ndarray, normal: Normal) -> np.ndarray:
     """What estimated weights add to the covariance of the parameters.
 
     Once for the scatter that wrong weights cause, once because the weights fit the residuals and flatter themselves:
@@ -217,7 +217,7 @@ def _of_estimated_noise(model: Model, noise: Claim, covariance: np.ndarray, norm
                            optimize=True)  # fmt: skip
 
 
-def _solution(model: Model, values, noise: Claim, u_noise: np.ndarray, normal: Normal) -> Solution:
+def _solution(model: BaselineModel, values, noise: Claim, u_noise: np.ndarray, normal: Normal) -> BaselineSolution:
     m, sights = len(model.distance), model.sights
     extra = _of_estimated_noise(model, noise, u_noise, normal)
     misclosure, _ = model.rows(values)
@@ -241,7 +241,7 @@ def _solution(model: Model, values, noise: Claim, u_noise: np.ndarray, normal: N
     x, y = model.at(values)
     total = values.copy()
     total[: model.lengths] = np.concatenate([x, y])[model.free]
-    return Solution(
+    return BaselineSolution(
         names=model.names,
         values=total,
         covariance=normal.covariance + extra,
@@ -263,7 +263,7 @@ def _solution(model: Model, values, noise: Claim, u_noise: np.ndarray, normal: N
     )
 
 
-def _parts(model: Model, noise: Claim, normal: Normal) -> dict[str, np.ndarray]:
+def _parts(model: BaselineModel, noise: Claim, normal: Normal) -> dict[str, np.ndarray]:
     m, a = len(model.distance), len(model.aimed)
     v, gain = model.noise_only(noise), normal.gain
     causes = {"noise": np.sqrt(np.einsum("ij,jk,ik->i", gain[:, :m], v[:m, :m], gain[:, :m]))}
@@ -278,9 +278,11 @@ def _parts(model: Model, noise: Claim, normal: Normal) -> dict[str, np.ndarray]:
     return causes
 
 
-def separation(sights: Sights, solution: Solution, extra: Extra, known: Known | None, scale: bool) -> float:
+def separation(
+    sights: BaselineSights, solution: BaselineSolution, extra: Extra, known: KnownPlaces | None, scale: bool
+) -> float:
     """How well further terms are told from the others: least singular value, columns weighed and of length 1."""
-    model = Model(sights, solution.x, solution.y, known, scale, extra, 2e-4)
+    model = BaselineModel(sights, solution.x, solution.y, known, scale, extra, 2e-4)
     return model.step(np.zeros(len(model.names)), solution.noise)[1].separation
 
 

@@ -15,7 +15,7 @@ LEAST_SEPARATION = 1e-4  # below it the parameters themselves are not determined
 
 
 @dataclass(frozen=True, eq=False)
-class Sights:
+class BaselineSights:
     """Shots between pillars.
 
     start, end    (m,) numbers of pillars
@@ -43,7 +43,7 @@ class Sights:
     def __len__(self) -> int:
         return len(self.distance)
 
-    def only(self, keep: np.ndarray) -> "Sights":
+    def only(self, keep: np.ndarray) -> "BaselineSights":
         """Some of the shots, sets and set-ups numbered anew."""
         one, setup = (np.unique(c[keep], return_inverse=True)[1] for c in (self.set, self.setup))
         return replace(
@@ -82,7 +82,7 @@ class Sights:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownPlaces:
     """Places known before, with their covariance.
 
     x, y         (n,) m
@@ -122,7 +122,7 @@ class Claim:
     air: float
 
 
-class Model:
+class BaselineModel:
     """The linear model at given values: sets' means, then directions, then places known before."""
 
     def __init__(self, sights, x, y, known, scale, extra, u_centring):

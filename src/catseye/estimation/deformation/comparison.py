@@ -15,7 +15,7 @@ from catseye.estimation.deformation.congruence import (
     pooled_variance_factor,
 )
 from catseye.estimation.deformation.deformation import Deformation, moved_points
-from catseye.estimation.deformation.epoch_model import Connection, EpochModel, listed
+from catseye.estimation.deformation.epoch_model import DatumConnection, EpochModel, listed
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.network.model import NetworkSolution
 from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
@@ -28,7 +28,7 @@ TOO_MANY = (
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class PointMovements:
     """What moved between two epochs; arrays over the n points of `deformation`, in x east, y north, z up.
 
     first, second           as adjusted
@@ -83,7 +83,7 @@ def compare(
     rounding: float = 1e-5,
     same_point: float = 0.1,
     scale_by_variance_factor: bool = False,
-) -> Comparison:
+) -> PointMovements:
     """What moved between two adjusted epochs of a network, with the covariance that their connection calls for.
 
     first, second              adjusted by `adjust_network`, in the same axes
@@ -103,7 +103,7 @@ def compare(
     Source: [PELZER71], [CASPARY87] (congruence); [FOERSTNER16] chapter 4 (propagation; see `epoch_model`).
     """
     _check_alike(first, second)
-    held = Connection.of(first, second, datum, rounding)
+    held = DatumConnection.of(first, second, datum, rounding)
     names, apart = _common(first, second, points, held, same_point)
     model = EpochModel.of(first, second, names, held)
     factor, homogeneity = _factor(first, second)
@@ -125,7 +125,7 @@ def compare(
         deformation = moved_points(epochs, **options)
         plain = differences(epochs, held.datum, deformation.stable)
         difference, covariance = _blocks_of(*_seen(plain, deformation.stable))
-    done = Comparison(
+    done = PointMovements(
         first=first,
         second=second,
         deformation=deformation,
@@ -162,7 +162,11 @@ def _factor(first: NetworkSolution, second: NetworkSolution) -> tuple[VarianceFa
 
 
 def _common(
-    first: NetworkSolution, second: NetworkSolution, points: Sequence[str] | None, held: Connection, same_point: float
+    first: NetworkSolution,
+    second: NetworkSolution,
+    points: Sequence[str] | None,
+    held: DatumConnection,
+    same_point: float,
 ) -> tuple[tuple[str, ...], dict[str, float]]:
     """Names to compare, those that carry the datum among them, and those set apart with how far they are off."""
     common = [name for name in first.network.points.names if name in second.index]
@@ -299,7 +303,7 @@ def _blocks_of(d: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return d.reshape(n, 3), q.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
 
 
-def _words(done: Comparison, rounding: float, same_point: float, same: Sequence[str]) -> list[str]:
+def _words(done: PointMovements, rounding: float, same_point: float, same: Sequence[str]) -> list[str]:
     """What was assumed and found, a line each."""
     a, b = done.first, done.second
     words = [f"datums may differ as {done.deformation.datum!r}"]

@@ -23,7 +23,7 @@ RANK = 1e-10  # of the largest eigenvalue of the scaled normal matrix
 
 
 @dataclass(frozen=True, eq=False)
-class Movements:
+class GroupMovements:
     """Movements of one group of n points that share q free parameters, for any batch of epochs (...).
 
     displacement            (..., n, 3) m; nan where undetermined
@@ -95,7 +95,7 @@ def displacements(
     *,
     u_stations: np.ndarray | float = 0.0,
     u_points: np.ndarray | float = 0.0,
-) -> Movements:
+) -> GroupMovements:
     """Movement of each point by itself from changes of its ranges; arrays come as of groups of one point (..., 1, 3).
 
     approximate_stations   (s, 3) m
@@ -172,7 +172,7 @@ def constrained(
     u_stations: np.ndarray | float = 0.0,
     u_points: np.ndarray | float = 0.0,
     u_violation: float = 0.0,
-) -> Movements:
+) -> GroupMovements:
     """Movements of a group of points that are restricted to a linear subspace.
 
     approximate_stations   (s, 3) m
@@ -226,7 +226,7 @@ def constrained(
         moved, noise + approximation + violation, noise, approximation, violation, inverse, by_points, by_stations,
         resolution, np.where(seen, residual, np.nan),
     )]  # fmt: skip
-    return Movements(
+    return GroupMovements(
         displacement=known[0],
         covariance=known[1],
         noise=known[2],
@@ -246,7 +246,7 @@ def constrained(
     )
 
 
-def constraint_test(restricted: Movements, free: Movements) -> tuple[np.ndarray, np.ndarray]:
+def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[np.ndarray, np.ndarray]:
     """Chi-square statistic (...) and p-value (...) of the constraint that leads from `free` to `restricted`.
 
     restricted, free   movements of the same changes; the basis of the first lies within that of the second

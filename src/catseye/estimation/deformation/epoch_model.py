@@ -14,7 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.deformation.congruence import DATUMS, HELD_APART, Epochs
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.least_squares.rows import Rows
+from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.network.datum import Floating, floating_motions, to_datum, transformed
 from catseye.estimation.network.model import NetworkSolution
 from catseye.estimation.observations.kinds import Linear
@@ -34,15 +34,15 @@ REWEIGHTED = (
 )
 
 
-def _rows(solution: NetworkSolution) -> tuple[list[Rows], np.ndarray]:
+def _rows(solution: NetworkSolution) -> tuple[list[ActiveRows], np.ndarray]:
     """All observations of a solution, priors among them, as they were used, and the whole parameter vector."""
     parameters, offset = solution.network.parameters, solution.x.size
-    rows = [Rows.of(g, fit.active) for g, fit in zip(solution.network.groups, solution.fits, strict=True)]
+    rows = [ActiveRows.of(g, fit.active) for g, fit in zip(solution.network.groups, solution.fits, strict=True)]
     sigma = np.array([p.sigma for p in parameters])
     known = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
     if len(known):
         start = np.array([parameters[k].start for k in known])
-        rows.append(Rows.of(Linear("priors", start, sigma[known] ** 2, offset + known, np.eye(len(known)))))
+        rows.append(ActiveRows.of(Linear("priors", start, sigma[known] ** 2, offset + known, np.eye(len(known)))))
     return rows, np.concatenate([solution.x.ravel(), solution.parameters])
 
 
@@ -55,7 +55,7 @@ def _floating(solution: NetworkSolution) -> Floating:
 
 
 @dataclass(frozen=True, eq=False)
-class Connection:
+class DatumConnection:
     """How the two datums hang together.
 
     datum       what they may differ by
@@ -74,7 +74,9 @@ class Connection:
     released: tuple[Floating | None, Floating | None]
 
     @classmethod
-    def of(cls, first: NetworkSolution, second: NetworkSolution, datum: str | None, rounding: float) -> "Connection":
+    def of(
+        cls, first: NetworkSolution, second: NetworkSolution, datum: str | None, rounding: float
+    ) -> "DatumConnection":
         """Of two adjusted epochs; arguments as of `compare`."""
         if datum is not None and datum not in DATUMS:
             raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
@@ -171,7 +173,7 @@ class EpochModel:
 
     @classmethod
     def of(
-        cls, first: NetworkSolution, second: NetworkSolution, names: tuple[str, ...], held: Connection
+        cls, first: NetworkSolution, second: NetworkSolution, names: tuple[str, ...], held: DatumConnection
     ) -> "EpochModel":
         """Of the points named, those that carry the datum among them."""
         columns = [

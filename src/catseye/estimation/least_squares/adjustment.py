@@ -14,8 +14,8 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import Covariance, Dense
 from catseye.estimation.least_squares.normal import NormalEquations
-from catseye.estimation.least_squares.rows import Rows, variances
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.least_squares.rows import ActiveRows, variances
+from catseye.estimation.observations.kinds import ObservationGroup
 
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
@@ -30,7 +30,7 @@ ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not
 
 
 @dataclass(frozen=True)
-class Fit:
+class GroupFit:
     """How one group of observations fits; arrays over its m observations.
 
     name              the group's
@@ -57,7 +57,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Solution:
+class LeastSquaresSolution:
     """The answer of an adjustment.
 
     x            (n,) parameters
@@ -73,7 +73,7 @@ class Solution:
     q: Covariance
     status: str
     iterations: int
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
     floating: np.ndarray
 
     @cached_property
@@ -81,7 +81,7 @@ class Solution:
         """(n, n), whole; EstimationError for a system too large for that."""
         return self.q.matrix()
 
-    def require_converged(self) -> "Solution":
+    def require_converged(self) -> "LeastSquaresSolution":
         """This solution, or EstimationError with its status."""
         if self.status != CONVERGED:
             raise EstimationError(self.status)
@@ -107,7 +107,7 @@ class Solution:
 
 def adjust(
     x0: np.ndarray,
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     *,
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
@@ -117,7 +117,7 @@ def adjust(
     iterations: int = 50,
     tests: bool = True,
     sparse: bool | None = None,
-) -> Solution:
+) -> LeastSquaresSolution:
     """The parameters that fit groups of observations best, with full covariance and a fit per observation.
 
     x0              (n,) start values
@@ -139,7 +139,7 @@ def adjust(
     n = len(x)
     moving = np.arange(n) if free is None else np.flatnonzero(free)
     given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
-    rows = [Rows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
+    rows = [ActiveRows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
     normal = NormalEquations.of(rows, moving, n, sparse)
     q: Covariance = Dense(np.zeros((n, n))) if not normal.sparse else _Nothing(n)
     floating = np.zeros((0, n))
@@ -170,10 +170,10 @@ def adjust(
     if status == NOT_CONVERGED:
         status = NOT_CONVERGED.format(step=size, iterations=taken)
     fits = tuple(_fit(r, x, q, tests) for r in rows)
-    return Solution(x, q, status, taken, fits, floating)
+    return LeastSquaresSolution(x, q, status, taken, fits, floating)
 
 
-def _lower(rows: Sequence[Rows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
+def _lower(rows: Sequence[ActiveRows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
     """The first of x + step, x + step/2, ... that does not raise the cost; x itself where none does."""
     for halving in range(11):
         trial = x + step * 0.5**halving
@@ -212,14 +212,14 @@ class _Nothing:
         return np.full(self.size, self.value)
 
 
-def _undefined(rows: Sequence[Rows], x: np.ndarray) -> list[str]:
+def _undefined(rows: Sequence[ActiveRows], x: np.ndarray) -> list[str]:
     """Names of the groups that have no finite value or derivative, each once."""
     bad = [r.group.name for r in rows for v in r.group.predict(x) if not np.isfinite(v[r.active]).all()]
     bad += [r.group.name for r in rows if not np.isfinite(r.group.observed[r.active]).all()]
     return list(dict.fromkeys(bad)) or ["the sum of squares"]
 
 
-def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
+def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFit:
     """Residuals and tests of one group, exact with correlations inside the group.
 
     With P = C^-1 and P_v = P - P A Q A' P over the active rows: w = (P v) / sqrt(diag P_v), estimated error
@@ -234,7 +234,7 @@ def _fit(rows: Rows, x: np.ndarray, q: Covariance, tests: bool) -> Fit:
     v = np.where(on, residual, 0.0)
     redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
     pvv = float(np.sum(rows.whiten(v) ** 2))
-    fit = Fit(group.name, on, residual, np.sqrt(variance), redundancy, standardised, error, detectable, pvv)
+    fit = GroupFit(group.name, on, residual, np.sqrt(variance), redundancy, standardised, error, detectable, pvv)
     if not tests:
         return fit
     wide = rows.spread(jacobian)

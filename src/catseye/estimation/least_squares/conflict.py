@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri
 
-from catseye.estimation.least_squares.adjustment import Solution, adjust
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.observations.kinds import ObservationGroup
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
@@ -79,11 +79,11 @@ class LocalConflict:
 
 def search(
     columns: np.ndarray,
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
     removable: Sequence[np.ndarray],
-    solution: Solution,
-    advice: Sequence[Observations] = (),
+    solution: LeastSquaresSolution,
+    advice: Sequence[ObservationGroup] = (),
 ) -> tuple[LocalConflict, tuple[int, ...] | None]:
     """The smallest conflict at a point; where there is none, searched again about the place of the best explanation.
 
@@ -106,11 +106,11 @@ def search(
 
 def at_point(
     columns: np.ndarray,
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
     removable: Sequence[np.ndarray],
-    solution: Solution,
-    advice: Sequence[Observations] = (),
+    solution: LeastSquaresSolution,
+    advice: Sequence[ObservationGroup] = (),
     *,
     slack: float,
 ) -> LocalConflict:
@@ -139,7 +139,7 @@ def at_point(
 
 
 def _slopes(
-    columns: np.ndarray, group: Observations, jacobian: np.ndarray
+    columns: np.ndarray, group: ObservationGroup, jacobian: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives (m, 3) of a group by a point, which rows depend on it, and which on nothing else."""
     here = group.columns[..., None] == columns  # in any order, and perhaps not all three
@@ -153,7 +153,7 @@ def _slopes(
 
 def touched(
     points: Sequence[np.ndarray],
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
     chosen: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
@@ -166,7 +166,7 @@ def touched(
     return [p for p in points if columns.intersection(p.tolist())]
 
 
-def _columns_of(group: Observations, jacobian: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def _columns_of(group: ObservationGroup, jacobian: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Columns that some rows of a group depend on."""
     used = jacobian[rows] != 0.0
     return group.columns[np.any(used, axis=0)] if group.columns.ndim == 1 else group.columns[rows][used]

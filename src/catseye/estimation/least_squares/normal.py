@@ -14,7 +14,7 @@ from scipy.linalg import cho_solve, lapack
 from scipy.sparse import csc_array, csr_array
 
 from catseye.estimation.least_squares.covariance import Covariance, Dense, Sparse
-from catseye.estimation.least_squares.rows import Rows
+from catseye.estimation.least_squares.rows import ActiveRows
 
 FLOATS = 1e-15  # |A v|^2 / |v|^2: correlation of one parameter with all others within 5e-16 of 1
 DOUBTFUL = 1e-10  # reciprocal condition of the scaled normal matrix from which directions are examined one by one
@@ -32,7 +32,7 @@ class NormalEquations:
     sparse   form
     """
 
-    rows: Sequence[Rows]
+    rows: Sequence[ActiveRows]
     moving: np.ndarray
     size: int
     sparse: bool
@@ -44,7 +44,7 @@ class NormalEquations:
     _pattern: csc_array | None = None
 
     @classmethod
-    def of(cls, rows: Sequence[Rows], moving: np.ndarray, size: int, sparse: bool | None) -> "NormalEquations":
+    def of(cls, rows: Sequence[ActiveRows], moving: np.ndarray, size: int, sparse: bool | None) -> "NormalEquations":
         """Sparse when asked, or when large and no group ties most parameters together."""
         if sparse is None:
             sparse = len(moving) > LARGEST_DENSE and all(r.columns.shape[-1] < len(moving) / 3 for r in rows)
@@ -221,7 +221,7 @@ def _places(matrix: csc_array) -> np.ndarray:
     return np.repeat(np.arange(columns, dtype=np.int64), np.diff(matrix.indptr)) * rows + matrix.indices
 
 
-def _gram(r: Rows, j: np.ndarray, size: int) -> csr_array:
+def _gram(r: ActiveRows, j: np.ndarray, size: int) -> csr_array:
     """A' A (n, n), sparse, of rows with columns of their own."""
     at = r.row_columns()
     m = len(at)

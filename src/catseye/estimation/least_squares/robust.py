@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.observations.kinds import ObservationGroup
 
 UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
 UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"
@@ -22,17 +22,17 @@ MOST_RETURNS = 2  # of one observation; so the rounds end
 
 def adjust_robustly(
     x0: np.ndarray,
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
     *,
     points: Sequence[np.ndarray] = (),
-    advice: Sequence[Observations] = (),
+    advice: Sequence[ObservationGroup] = (),
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
     critical: float = 3.5,
     rounds: int = 100,
-) -> Solution:
+) -> LeastSquaresSolution:
     """An adjustment without the observations that do not belong to it; the fits say which (`active`).
 
     x0          (n,) start values
@@ -96,7 +96,7 @@ def adjust_robustly(
     return replace(solution, status=UNDECIDED.format(rounds=rounds))
 
 
-def _checked(fit: Fit) -> np.ndarray:
+def _checked(fit: GroupFit) -> np.ndarray:
     """Which observations the others check: an error of some sigmas would be found; of the inactive, all.
 
     Without correlations this is redundancy > UNCHECKED. With them a redundancy number may be zero or negative although
@@ -106,14 +106,14 @@ def _checked(fit: Fit) -> np.ndarray:
 
 
 def _without_undecided(
-    solution: Solution,
-    groups: Sequence[Observations],
+    solution: LeastSquaresSolution,
+    groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
     points: Sequence[np.ndarray],
-    advice: Sequence[Observations],
+    advice: Sequence[ObservationGroup],
     free: np.ndarray | None,
     names: Sequence[str] | None,
-) -> Solution:
+) -> LeastSquaresSolution:
     """The solution without observations that might be the wrong ones just as well as those rejected.
 
     Of two that contradict each other alone at a point, the test cannot say which is wrong: both go. Nothing comes back
@@ -153,11 +153,11 @@ def _without_undecided(
 
 def _reweighted(
     x0: np.ndarray,
-    groups: Sequence[Observations],
+    groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
     free: np.ndarray | None,
     names: Sequence[str] | None,
-) -> Solution:
+) -> LeastSquaresSolution:
     """A fit in which every observation that may be wrong weighs by its own residual."""
     extra = [np.zeros(len(g.observed)) for g in groups]
     solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
@@ -171,11 +171,11 @@ def _reweighted(
 
 
 def _searched(
-    solution: Solution,
-    groups: Sequence[Observations],
+    solution: LeastSquaresSolution,
+    groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
     points: Sequence[np.ndarray],
-    advice: Sequence[Observations],
+    advice: Sequence[ObservationGroup],
     suspects: Sequence[np.ndarray],
     active: Sequence[np.ndarray],
 ) -> list[np.ndarray]:

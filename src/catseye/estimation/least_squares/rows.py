@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.observations.kinds import ObservationGroup
 
 
 def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -26,21 +26,21 @@ def dense_jacobian(jacobian: np.ndarray, position: np.ndarray, width: int) -> np
     return np.bincount(flat, jacobian.ravel(), m * (width + 1)).reshape(m, width + 1)[:, :width]
 
 
-def full_jacobian(group: Observations, x: np.ndarray) -> np.ndarray:
+def full_jacobian(group: ObservationGroup, x: np.ndarray) -> np.ndarray:
     """(m, n) derivatives of a group by all n parameters, whichever form its columns have."""
     jacobian = group.predict(x)[1]
     columns = np.broadcast_to(group.columns, jacobian.shape)
     return dense_jacobian(jacobian, np.where(columns < 0, len(x), columns), len(x))
 
 
-def variances(group: Observations) -> np.ndarray:
+def variances(group: ObservationGroup) -> np.ndarray:
     """(m,) variances of the observed values."""
     c = group.covariance
     return c if c.ndim == 1 else np.diag(c) if c.ndim == 2 else np.diagonal(c, axis1=1, axis2=2).ravel()
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ActiveRows:
     """The active rows of a group.
 
     group       whose
@@ -51,7 +51,7 @@ class Rows:
     columns     (k,) shared; or (m, w) of independent rows, or (b, r w) of blocks
     """
 
-    group: Observations
+    group: ObservationGroup
     active: np.ndarray
     factor: np.ndarray
     weight: np.ndarray
@@ -61,11 +61,11 @@ class Rows:
     @classmethod
     def of(
         cls,
-        group: Observations,
+        group: ObservationGroup,
         active: np.ndarray | None = None,
         extra: np.ndarray | None = None,
         inflation: np.ndarray | None = None,
-    ) -> "Rows":
+    ) -> "ActiveRows":
         """Rows of a group; EstimationError where the covariance of the active ones is none.
 
         active      (m,) bool, all if None

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Solution, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.least_squares.rows import Rows, variances
+from catseye.estimation.least_squares.rows import ActiveRows, variances
 from catseye.estimation.network.datum import (
     Floating,
     datum_conditions,
@@ -18,8 +18,8 @@ from catseye.estimation.network.datum import (
     transformed,
 )
 from catseye.estimation.network.diagnosis import diagnosed, floating_text, unconnected
-from catseye.estimation.network.model import Network, NetworkSolution
-from catseye.estimation.observations.kinds import Linear, Observations
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
+from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
 FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
 DATUMS = ("free", "fixed")
@@ -35,7 +35,7 @@ check the starting coordinates"
 NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
 
 
-def with_datum(network: Network, datum: str | None) -> Network:
+def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNetwork:
     """The network with its datum as asked.
 
     datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
@@ -60,7 +60,7 @@ def with_datum(network: Network, datum: str | None) -> Network:
 
 
 def adjust_network(
-    network: Network,
+    network: ObservationNetwork,
     *,
     datum: str | None = None,
     active: Sequence[np.ndarray] | None = None,
@@ -118,7 +118,7 @@ def adjust_network(
     return solution
 
 
-def _with_reference(network: Network) -> Network:
+def _with_reference(network: ObservationNetwork) -> ObservationNetwork:
     """The network, with the places found for its points as their coordinates where not one is given.
 
     The inner constraints then refer to these; where the network lies is a convention in any case.
@@ -131,7 +131,7 @@ def _with_reference(network: Network) -> Network:
     return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
 
-def _factor_alone(network: Network) -> NetworkSolution:
+def _factor_alone(network: ObservationNetwork) -> NetworkSolution:
     """A quick trial: coordinates and variance factor, no tests."""
     large = len(network.points.names) >= FEWEST_POINTS
     try:
@@ -152,17 +152,17 @@ def _listed(reasons: dict[str, str], most: int = 4) -> str:
 class _Problem:
     """The network as one vector of parameters."""
 
-    network: Network
+    network: ObservationNetwork
     x0: np.ndarray
     free: np.ndarray
-    groups: list[Observations]
+    groups: list[ObservationGroup]
     found: tuple[str, ...]
     missing: dict[str, str]
     assumed: tuple[str, ...]
     replaced: tuple[str, ...]
 
     @classmethod
-    def of(cls, network: Network, start: NetworkSolution | None) -> "_Problem":
+    def of(cls, network: ObservationNetwork, start: NetworkSolution | None) -> "_Problem":
         points, parameters = network.points, network.parameters
         values = np.array([p.start for p in parameters])
         found: tuple[str, ...] = ()
@@ -211,10 +211,10 @@ class _Problem:
         if larger is not None and inflation[1]:
             finite = [np.where(np.isfinite(f), f, 1.0) for f in larger]
             larger, added = None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
-        rows = [Rows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
+        rows = [ActiveRows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
         x, taken = self.x0, 0
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
-        solution: Solution | None = None
+        solution: LeastSquaresSolution | None = None
         settled = False
         for _ in range(PASSES):
             try:
@@ -283,7 +283,7 @@ class _Problem:
             words.append(f"inner constraints on {on} points against {floating.words()}")
         return "; ".join(words) or "held by observations and priors"
 
-    def answer(self, solution: Solution, q: Covariance, datum: str) -> NetworkSolution:
+    def answer(self, solution: LeastSquaresSolution, q: Covariance, datum: str) -> NetworkSolution:
         count = len(self.network.points.names)
         own = solution.fits[: len(self.network.groups)]
         factor, degrees = solution.variance_factor()
@@ -321,7 +321,9 @@ class _Problem:
         )
 
 
-def _padded(given: Sequence[np.ndarray] | None, groups: Sequence[Observations], rest: float) -> list[np.ndarray] | None:
+def _padded(
+    given: Sequence[np.ndarray] | None, groups: Sequence[ObservationGroup], rest: float
+) -> list[np.ndarray] | None:
     """One array a group: those given, then for the priors' group all the same."""
     if given is None:
         return None

@@ -12,7 +12,7 @@ from scipy.linalg import qr
 
 from catseye.estimation.least_squares.covariance import Covariance, Transformed
 from catseye.estimation.least_squares.normal import FLOATS
-from catseye.estimation.least_squares.rows import Rows
+from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.shapes.motions import MOTIONS, figure_size, motions
 
 UNHELD = 1e-7  # share of a unit motion in the datum's coordinates, below which they do not hold it
@@ -53,7 +53,7 @@ def _largest(kinds: np.ndarray, first: int) -> list[str]:
     return [MOTIONS[first + i] for i in sorted(np.argsort(-share, kind="stable")[:count])]
 
 
-def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free: np.ndarray) -> Floating:
+def floating_motions(rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray, free: np.ndarray) -> Floating:
     """The motions of the network that no observation, prior or held coordinate holds.
 
     rows   groups of observations, priors among them
@@ -95,7 +95,7 @@ def floating_motions(rows: Sequence[Rows], x: np.ndarray, xyz: np.ndarray, free:
     return Floating(found / largest, allowed @ combination[:k, moving] / largest, centre, size)
 
 
-def _row_form(rows: Rows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _row_form(rows: ActiveRows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Columns (m, w) of each row and the whitened Jacobian there; zero where there is none."""
     _, j = rows.linear(x)
     at = rows.row_columns()

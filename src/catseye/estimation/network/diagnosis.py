@@ -9,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtrc
 
-from catseye.estimation.least_squares.adjustment import CONVERGED, Solution
-from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.shapes.rigid_body import closed_form
 
 PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
@@ -30,7 +30,7 @@ EXCHANGE_ALL = 300  # points up to which all pairs are tried
 EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
 
 
-def unconnected(network: Network) -> str | None:
+def unconnected(network: ObservationNetwork) -> str | None:
     """The status of a network in pieces; None where it is in one, or each piece is held by itself."""
     count = len(network.points.names)
     size = 3 * count + len(network.parameters)
@@ -55,7 +55,7 @@ def unconnected(network: Network) -> str | None:
     return PIECES.format(count=number, pieces=text)
 
 
-def floating_text(network: Network, solution: Solution) -> str:
+def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -> str:
     """The status of a solution in which something floats: which points, why, and what would hold them."""
     names, count = network.points.names, len(network.points.names)
     directions = solution.floating
@@ -76,14 +76,14 @@ def floating_text(network: Network, solution: Solution) -> str:
     return FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
 
 
-def _observations_at(network: Network, points: list[int]) -> list[int]:
+def _observations_at(network: ObservationNetwork, points: list[int]) -> list[int]:
     return [
         sum(int(np.any([end == i for end in points_of(g)], axis=0).sum()) for g in network.groups if points_of(g))
         for i in points
     ]
 
 
-def _advice(network: Network, solution: Solution, point: int) -> str:
+def _advice(network: ObservationNetwork, solution: LeastSquaresSolution, point: int) -> str:
     """The range to another point, or the coordinate, that would hold a floating point best."""
     count = len(network.points.names)
     x = solution.x[: 3 * count].reshape(-1, 3)
@@ -104,7 +104,7 @@ def _advice(network: Network, solution: Solution, point: int) -> str:
     return f"{text}: no range within the network would hold it, its {network.axis_names[axis]} or a height would"
 
 
-def diagnosed(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
+def diagnosed(solution: NetworkSolution, solve: Callable[[ObservationNetwork], NetworkSolution]) -> str:
     """The status of a solution, which says more where it did not converge or its observations contradict grossly.
 
     solution   with an answer, converged or not
@@ -131,7 +131,7 @@ def diagnosed(solution: NetworkSolution, solve: Callable[[Network], NetworkSolut
     return CONTRADICTS.format(factor=factor, degrees=degrees, worst=worst, guess=_guess(solution, solve))
 
 
-def label(network: Network, group: int, row: int) -> str:
+def label(network: ObservationNetwork, group: int, row: int) -> str:
     """What an observation is called: its kind, its points, and its place in the file."""
     kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
     ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
@@ -180,7 +180,7 @@ def _one_explains(solution: NetworkSolution) -> bool:
     return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares
 
 
-def _guess(solution: NetworkSolution, solve: Callable[[Network], NetworkSolution]) -> str:
+def _guess(solution: NetworkSolution, solve: Callable[[ObservationNetwork], NetworkSolution]) -> str:
     """A guess, in words, at the cause: two points exchanged, or where most of the contradiction is."""
     network, names = solution.network, solution.network.points.names
     total, number = np.zeros(len(names)), np.zeros(len(names))

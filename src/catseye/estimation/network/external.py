@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.estimation.least_squares.rows import Rows
+from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.network.model import NetworkSolution
 
 BATCH = 50_000  # observations at a time, so that memory stays bounded
@@ -25,7 +25,7 @@ def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
         if not ends or not np.isfinite(solution.covariance).all():
             result.append(np.full(len(group.observed), np.nan))
             continue
-        rows = Rows.of(group, fit.active)
+        rows = ActiveRows.of(group, fit.active)
         seen = np.where(fit.active[:, None], rows.spread(group.predict(x)[1]), 0.0)
         weighted, columns = rows.weigh(seen), rows.row_columns()
         largest = np.zeros(len(columns))

@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import Fit
+from catseye.estimation.least_squares.adjustment import GroupFit
 from catseye.estimation.least_squares.covariance import Covariance
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.observations.kinds import ObservationGroup
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class NetworkPoints:
     """The points of a network.
 
     names   unique
@@ -36,7 +36,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class NetworkParameter:
     """An unknown beside the points.
 
     name    for reports: "zero ZY101", "scale ZY101", "orientation 4901 set 1", "refractivity morning", "x of FRAME"
@@ -52,7 +52,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class ObservationNetwork:
     """Points, other parameters and groups of observations.
 
     points       see there
@@ -65,9 +65,9 @@ class Network:
     description  the file's own words
     """
 
-    points: Points
-    parameters: tuple[Parameter, ...]
-    groups: tuple[Observations, ...]
+    points: NetworkPoints
+    parameters: tuple[NetworkParameter, ...]
+    groups: tuple[ObservationGroup, ...]
     places: tuple[tuple[str, ...], ...] = ()
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
     axis_names: tuple[str, str, str] = ("x", "y", "z")
@@ -97,14 +97,14 @@ class NetworkSolution:
     q                    covariance of the whole parameter vector, for what is not above
     """
 
-    network: Network
+    network: ObservationNetwork
     x: np.ndarray
     covariance: np.ndarray
     parameters: np.ndarray
     u_parameters: np.ndarray
     status: str
     iterations: int
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
     variance_factor: float
     degrees_of_freedom: float
     datum: str
@@ -127,6 +127,6 @@ class NetworkSolution:
         return self.q.within((first[:, None] + np.arange(3)).ravel())
 
 
-def points_of(group: Observations) -> tuple[np.ndarray, ...]:
+def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
     """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
     return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))

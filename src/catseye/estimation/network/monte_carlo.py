@@ -9,7 +9,7 @@ from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances, ZenithAngles
 
 XY = np.arange(2)
@@ -34,7 +34,7 @@ class Disturbance:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class MonteCarloScatter:
     """What came of the runs.
 
     runs          that converged, of those asked for
@@ -56,8 +56,8 @@ class Scatter:
 
 
 def measured(
-    network: Network, truth: np.ndarray, generator: np.random.Generator, disturbance: Disturbance
-) -> tuple[Network, list[np.ndarray]]:
+    network: ObservationNetwork, truth: np.ndarray, generator: np.random.Generator, disturbance: Disturbance
+) -> tuple[ObservationNetwork, list[np.ndarray]]:
     """The network with observations drawn about a truth, and which of them (m,) bool a group are blunders.
 
     truth   parameter vector: coordinates and other parameters
@@ -90,14 +90,14 @@ def measured(
 
 
 def scatter(
-    network: Network,
-    solve: Callable[[Network], NetworkSolution],
+    network: ObservationNetwork,
+    solve: Callable[[ObservationNetwork], NetworkSolution],
     *,
     runs: int,
     seed: int,
     disturbance: Disturbance | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-) -> Scatter:
+) -> MonteCarloScatter:
     """How well the claimed uncertainties hold when the network is measured `runs` times.
 
     network      its coordinates and parameters are the truth of every run
@@ -135,7 +135,7 @@ def scatter(
             lost, good = lost + int(np.sum(~bad & ~fit.active)), good + int(np.sum(~bad))
     if not done:
         raise EstimationError(f"none of {runs} runs on paper converged: {status}")
-    return Scatter(
+    return MonteCarloScatter(
         runs=done,
         asked=runs,
         rms=np.sqrt(squares / done),

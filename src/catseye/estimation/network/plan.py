@@ -12,7 +12,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.network.adjustment import adjust_network, with_datum
-from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances
 
 BATCH = 200  # ranges whose effect is computed at once
@@ -60,7 +60,7 @@ class Candidate:
     at_s: float = float("nan")
 
 
-def predicted(network: Network) -> Network:
+def predicted(network: ObservationNetwork) -> ObservationNetwork:
     """The network with every observation replaced by what its points and parameters predict.
 
     Raises EstimationError where a point has no coordinates: a plan needs a place for everything.
@@ -82,7 +82,9 @@ def predicted(network: Network) -> Network:
     return replace(network, groups=tuple(groups))
 
 
-def plan(network: Network, *, datum: str | None = None, interest: Sequence[str] | None = None, most: int = 20) -> Plan:
+def plan(
+    network: ObservationNetwork, *, datum: str | None = None, interest: Sequence[str] | None = None, most: int = 20
+) -> Plan:
     """What a network will be worth, and which further ranges would help it most.
 
     network    coordinates of all points; observed values are not looked at

@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
-from catseye.estimation.network.model import Network, NetworkSolution
+from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
 from catseye.estimation.network.multilateration.solution import RangingSolution
 from catseye.estimation.network.multilateration.terms import PointPriors, StationRanges
 from catseye.estimation.network.ranging_covariance import RangingCovariance
-from catseye.estimation.observations.kinds import Coordinates, Distances
+from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 
 FEWEST_POINTS = 200  # below it the dense form is as fast, and names what is wrong with more care
 MOST_STATIONS = 600  # their parameters make a dense system
 
 
 def adjusted_as_ranges(
-    network: Network,
+    network: ObservationNetwork,
     *,
     active: Sequence[np.ndarray] | None,
     inflation: Sequence[np.ndarray] | None,
@@ -86,14 +86,14 @@ class _Split:
     scale: np.ndarray
 
 
-def _split(network: Network) -> tuple[str, _Split | None]:
+def _split(network: ObservationNetwork) -> tuple[str, _Split | None]:
     """The roles, or why there are none."""
     count = len(network.points.names)
     from_ = np.zeros(count, dtype=bool)
     gauge = {"zero": np.full(count, -1), "scale": np.full(count, -1)}
     plain, priors = [], []
     for k, group in enumerate(network.groups):
-        if isinstance(group, Coordinates) and len(group.observed) % 3 == 0:
+        if isinstance(group, ObservedCoordinates) and len(group.observed) % 3 == 0:
             shape = group.covariance.shape
             whole = np.array_equal(group.axis, np.tile(np.arange(3), len(group.axis) // 3))
             if whole and (len(shape) == 1 or shape[1:] == (3, 3) or shape == (3, 3)):
@@ -145,7 +145,7 @@ def _split(network: Network) -> tuple[str, _Split | None]:
 
 
 def _problem(
-    network: Network, split: _Split, start: NetworkSolution | None
+    network: ObservationNetwork, split: _Split, start: NetworkSolution | None
 ) -> tuple[RangingNetwork, tuple[tuple[str, ...], tuple[str, ...]]] | str:
     """The ranging network and the names of points placed, and of those assumed; or why it cannot start."""
     points, groups = network.points, network.groups
@@ -207,7 +207,7 @@ def _problem(
     ), placed_by
 
 
-def _priors(network: Network, split: _Split, role: np.ndarray) -> PointPriors | None:
+def _priors(network: ObservationNetwork, split: _Split, role: np.ndarray) -> PointPriors | None:
     """Coordinates observed of the points of one role."""
     index, observed, covariance = [], [], []
     for k in split.priors:
@@ -225,7 +225,7 @@ def _priors(network: Network, split: _Split, role: np.ndarray) -> PointPriors | 
 
 
 def _inflation(
-    network: Network,
+    network: ObservationNetwork,
     active: Sequence[np.ndarray] | None,
     inflation: Sequence[np.ndarray] | None,
     split: _Split,
@@ -243,7 +243,7 @@ def _inflation(
 
 
 def _answer(
-    network: Network,
+    network: ObservationNetwork,
     split: _Split,
     solution: RangingSolution,
     placed_by: tuple[tuple[str, ...], tuple[str, ...]],
@@ -282,7 +282,9 @@ def _answer(
     )
 
 
-def _fits(network: Network, split: _Split, solution: RangingSolution, inflation: np.ndarray) -> tuple[Fit, ...]:
+def _fits(
+    network: ObservationNetwork, split: _Split, solution: RangingSolution, inflation: np.ndarray
+) -> tuple[GroupFit, ...]:
     """The fits in the groups and the order of the network."""
     by_name = {f.name: f for f in solution.fits}
     fields = ("active", "residual", "sigma", "redundancy", "standardised", "estimated_error", "detectable_error")
@@ -290,7 +292,7 @@ def _fits(network: Network, split: _Split, solution: RangingSolution, inflation:
         {f: np.zeros(len(g.observed), dtype=bool if f == "active" else float) for f in fields} for g in network.groups
     ]
 
-    def place(fit: Fit, parts: list[tuple[int, np.ndarray]]) -> None:
+    def place(fit: GroupFit, parts: list[tuple[int, np.ndarray]]) -> None:
         low = 0
         for k, rows in parts:
             for f in fields:
@@ -319,5 +321,5 @@ def _fits(network: Network, split: _Split, solution: RangingSolution, inflation:
         else:
             blocks = group.covariance.reshape(-1, 3, 3)
             pvv = float(np.einsum("bi,bi->", v.reshape(-1, 3), np.linalg.solve(blocks, v.reshape(-1, 3, 1))[:, :, 0]))
-        result.append(Fit(group.name, **column, pvv=pvv))
+        result.append(GroupFit(group.name, **column, pvv=pvv))
     return tuple(result)

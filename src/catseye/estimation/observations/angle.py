@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import bearing, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Angles(Kind):
+class HorizontalAngles(ObservationKind):
     """observed = azimuth of foresight - azimuth of backsight + error, both from the point `at`.
 
     name             what the group is, for reports
@@ -49,7 +49,7 @@ class Angles(Kind):
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (m,), on the turn nearest to the observed, and Jacobian (m, 9); nan for a vertical sight.
 
-        >>> a = Angles("a", np.ones(1), np.ones(1), np.array([0]), np.array([3]), np.array([6]))
+        >>> a = HorizontalAngles("a", np.ones(1), np.ones(1), np.array([0]), np.array([3]), np.array([6]))
         >>> a.predict(np.array([0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 2.0, 0.0, 0.0]))[0] == np.pi / 2
         array([ True])
         """

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import bearing, both, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Azimuths(Kind):
+class Azimuths(ObservationKind):
     """observed = azimuth of target from origin + error.
 
     name         what the group is, for reports

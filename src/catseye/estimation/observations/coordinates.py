@@ -7,12 +7,12 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import triples
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates(Kind):
+class ObservedCoordinates(ObservationKind):
     """observed = coordinate of a point + error, a row a coordinate.
 
     name         what the group is, for reports
@@ -32,7 +32,7 @@ class Coordinates(Kind):
     axis: np.ndarray
 
     @classmethod
-    def of_points(cls, name: str, xyz: np.ndarray, covariance: np.ndarray, point: np.ndarray) -> "Coordinates":
+    def of_points(cls, name: str, xyz: np.ndarray, covariance: np.ndarray, point: np.ndarray) -> "ObservedCoordinates":
         """All three coordinates of b points.
 
         name         what the group is, for reports
@@ -40,7 +40,7 @@ class Coordinates(Kind):
         covariance   (3b,), (3b, 3b) or (b, 3, 3) m^2, point by point
         point        (b,) columns of their x
 
-        >>> Coordinates.of_points("c", np.ones((2, 3)), np.ones(6), np.array([0, 6])).columns.ravel().tolist()
+        >>> ObservedCoordinates.of_points("c", np.ones((2, 3)), np.ones(6), np.array([0, 6])).columns.ravel().tolist()
         [0, 1, 2, 6, 7, 8]
         """
         return cls(name, np.ravel(xyz), covariance, np.repeat(point, 3), np.tile(np.arange(3), len(point)))

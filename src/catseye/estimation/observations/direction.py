@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.sight import bearing, both, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Directions(Kind):
+class Directions(ObservationKind):
     """observed = azimuth of target from origin - x[orientation] + error, clockwise seen from above.
 
     The orientation is the azimuth of the circle's zero: azimuth = reading + orientation.

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.reading import reading, reading_columns
 from catseye.estimation.observations.sight import both, length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Distances(Kind):
+class Distances(ObservationKind):
     """observed = (scale + sum s_q x[scaling_q]) |target - origin + shift| + offset + sum c_q x[nuisance_q] + error.
 
     name                  what the group is, for reports

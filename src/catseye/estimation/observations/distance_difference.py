@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.reading import reading, reading_columns
 from catseye.estimation.observations.sight import both, length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class DistanceDifferences(Kind):
+class DistanceDifferences(ObservationKind):
     """observed = (scale + sum s_q x[scaling_q]) (|target - origin| - |target_2 - origin_2|) + offset + ... + error.
 
     With one target, origin B and origin_2 A it is |P - B| - |P - A|; the four points may all differ.

@@ -6,14 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import both, length, sight, triples
 
 U_FIXED = 1e-7  # m: below what any ranger sees, above what rounding in double precision does to coordinates of 1 km
 
 
 @dataclass(frozen=True, eq=False)
-class FixedDistances(Kind):
+class FixedDistances(ObservationKind):
     """observed = |target - origin + shift| + error, with a standard uncertainty that is small but not zero.
 
     With zero the covariance would have no inverse, and two conditions that contradict would be hidden: with 0.1 um the

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class HeightDifferences(Kind):
+class HeightDifferences(ObservationKind):
     """observed = z of target - z of origin + shift_z + error.
 
     name         what the group is, for reports

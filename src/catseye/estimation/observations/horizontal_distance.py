@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.reading import reading, reading_columns
 from catseye.estimation.observations.sight import both, level_length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class HorizontalDistances(Kind):
+class HorizontalDistances(ObservationKind):
     """observed = (scale + sum s_q x[scaling_q]) hypot(dx, dy) + offset + sum c_q x[nuisance_q] + error.
 
     The height of the points does not enter, nor do heights of instrument and target; `shift` serves eccentric ones.

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.sight import both, elevation, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Inclinations(Kind):
+class Inclinations(ObservationKind):
     """observed = elevation of target above the horizontal through origin + x[zero] + error, positive upward.
 
     name         what the group is, for reports

@@ -6,11 +6,11 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, Reported
+from catseye.estimation.observations.kind import ObservationKind, Reported
 
 
 @dataclass(frozen=True, eq=False)
-class Joint(Kind):
+class Joint(ObservationKind):
     """The rows of all parts in order; what the parts say of their own covariances does not count.
 
     name         what the group is, for reports

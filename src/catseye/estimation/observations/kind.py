@@ -7,7 +7,7 @@ import numpy as np
 from catseye.errors import EstimationError
 
 
-class Observations(Protocol):
+class ObservationGroup(Protocol):
     """A group of m observations whose errors may be correlated with each other, but not with another group's.
 
     name         what the group is, for reports
@@ -32,8 +32,8 @@ class Observations(Protocol):
         ...
 
 
-class Reported(Observations, Protocol):
-    """A group that can be named row by row: any kind of ours; see `Kind`."""
+class Reported(ObservationGroup, Protocol):
+    """A group that can be named row by row: any kind of ours; see `ObservationKind`."""
 
     kind: ClassVar[str]
     unit: ClassVar[str]
@@ -48,7 +48,7 @@ class Reported(Observations, Protocol):
     def ends(self) -> tuple[np.ndarray, ...]: ...
 
 
-class Kind:
+class ObservationKind:
     """Base of the kinds: shapes are checked when a group is made, and a report can name each row.
 
     kind   what one observation is
@@ -58,7 +58,7 @@ class Kind:
     kind: ClassVar[str] = ""
     unit: ClassVar[str] = ""
 
-    def __post_init__(self: Observations) -> None:
+    def __post_init__(self: ObservationGroup) -> None:
         m, covariance, columns = len(self.observed), self.covariance, self.columns
         blocks = covariance.ndim == 3 and covariance.shape[1:] == (covariance.shape[-1],) * 2
         if covariance.shape not in ((m,), (m, m)) and not (blocks and covariance.shape[0] * covariance.shape[1] == m):
@@ -80,7 +80,7 @@ class Kind:
         return np.full(len(self.observed), self.kind)
 
     @property
-    def component(self: Observations) -> np.ndarray:
+    def component(self: ObservationGroup) -> np.ndarray:
         """(m,) "x", "y" or "z" ("1" or "2" across a line) where a row is one component of a vector, else ""."""
         return np.full(len(self.observed), "")
 

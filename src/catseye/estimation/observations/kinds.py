@@ -1,13 +1,13 @@
 """Kinds of observation, one file each: what is predicted from the parameters, its derivatives, its covariance.
 
-The solver knows only the protocol `Observations`. A new kind is a new file and one line here.
+The solver knows only the protocol `ObservationGroup`. A new kind is a new file and one line here.
 
 Points are known by the column of their x in the parameter vector; y and z follow it. Other parameters are known by
 their own column, and -1 stands for none. Axes are x east, y north, z up; azimuths run clockwise from +y to +x, zenith
 angles from +z. Angles are predicted on the turn nearest to the observed value.
 """
 
-from catseye.estimation.observations.angle import Angles
+from catseye.estimation.observations.angle import HorizontalAngles
 from catseye.estimation.observations.azimuth import Azimuths
 from catseye.estimation.observations.bodies.frame_point import FramePoints
 from catseye.estimation.observations.bodies.level_plane import LevelPlanes
@@ -16,7 +16,7 @@ from catseye.estimation.observations.bodies.point_on_plane import PointsOnPlane
 from catseye.estimation.observations.bodies.point_on_sphere import PointsOnSphere
 from catseye.estimation.observations.bodies.rigid_body import RigidBodies
 from catseye.estimation.observations.bodies.rigid_triplet import RigidTriplets
-from catseye.estimation.observations.coordinates import Coordinates
+from catseye.estimation.observations.coordinates import ObservedCoordinates
 from catseye.estimation.observations.direction import Directions
 from catseye.estimation.observations.distance import Distances
 from catseye.estimation.observations.distance_difference import DistanceDifferences
@@ -25,38 +25,38 @@ from catseye.estimation.observations.height_difference import HeightDifferences
 from catseye.estimation.observations.horizontal_distance import HorizontalDistances
 from catseye.estimation.observations.inclination import Inclinations
 from catseye.estimation.observations.joint import Joint
-from catseye.estimation.observations.kind import Kind, Observations, Reported
+from catseye.estimation.observations.kind import ObservationGroup, ObservationKind, Reported
 from catseye.estimation.observations.linear import Linear
 from catseye.estimation.observations.moving_distance import MovingDistances
-from catseye.estimation.observations.tilt import Tilts
+from catseye.estimation.observations.tilt import ObservedTilts
 from catseye.estimation.observations.vector import Vectors
 from catseye.estimation.observations.zenith_angle import ZenithAngles
 
 __all__ = [
-    "Angles",
     "Azimuths",
-    "Coordinates",
     "Directions",
     "DistanceDifferences",
     "Distances",
     "FixedDistances",
     "FramePoints",
     "HeightDifferences",
+    "HorizontalAngles",
     "HorizontalDistances",
     "Inclinations",
     "Joint",
-    "Kind",
     "LevelPlanes",
     "Linear",
     "MovingDistances",
-    "Observations",
+    "ObservationGroup",
+    "ObservationKind",
+    "ObservedCoordinates",
+    "ObservedTilts",
     "PointsOnLine",
     "PointsOnPlane",
     "PointsOnSphere",
     "Reported",
     "RigidBodies",
     "RigidTriplets",
-    "Tilts",
     "Vectors",
     "ZenithAngles",
 ]

@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind
+from catseye.estimation.observations.kind import ObservationKind
 
 
 @dataclass(frozen=True, eq=False)
-class Linear(Kind):
+class Linear(ObservationKind):
     """observed = matrix @ x[columns] + error.
 
     name         what the group is, for reports

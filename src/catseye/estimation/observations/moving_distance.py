@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.reading import reading, reading_columns
 from catseye.estimation.observations.sight import length, triples
 
 
 @dataclass(frozen=True, eq=False)
-class MovingDistances(Kind):
+class MovingDistances(ObservationKind):
     """observed = scale |B target + b - A origin - a| + offset + sum c_q x[nuisance_q] + error.
 
     The parameters are the points at one instant, the epoch; A, a and B, b carry them to the instant of each shot, as a

@@ -7,12 +7,12 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.estimation.observations.bodies.pose import require_rotation, turned_back
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.unit_direction import require_direction
 
 
 @dataclass(frozen=True, eq=False)
-class Tilts(Kind):
+class ObservedTilts(ObservationKind):
     """observed = asin(axis . R' up / |axis|) + x[zero] + error: how far a sensitive axis points above the horizontal.
 
     R = exp([w]x) R0 is ground from frame, see `bodies.pose`. A two-axis inclinometer gives two rows, with axes (1, 0,
@@ -53,7 +53,7 @@ class Tilts(Kind):
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (m,) and Jacobian (m, 4) at the parameters x; nan where an axis is vertical.
 
-        >>> t = Tilts("t", np.zeros(1), np.ones(1), np.array([0.0, 1.0, 0.0]), np.arange(3), np.eye(3))
+        >>> t = ObservedTilts("t", np.zeros(1), np.ones(1), np.array([0.0, 1.0, 0.0]), np.arange(3), np.eye(3))
         >>> t.predict(np.array([0.25, 0.0, 0.0]))[0]
         array([0.25])
         """

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside
+from catseye.estimation.observations.kind import ObservationKind, beside
 from catseye.estimation.observations.sight import sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class Vectors(Kind):
+class Vectors(ObservationKind):
     """observed = target - origin + shift + error, three rows x, y, z a vector.
 
     name         what the group is, for reports

@@ -6,14 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.sight import both, elevation, level_length, nearest_turn, sight, triples
 
 EARTH_RADIUS = 6_371_000.0  # m, the mean one: refraction is defined by it, and is not known to its 0.3 %
 
 
 @dataclass(frozen=True, eq=False)
-class ZenithAngles(Kind):
+class ZenithAngles(ObservationKind):
     """observed = pi/2 - elevation + (curved - k) D / 2R + error, with k = refraction + x[refraction_column].
 
     D is the horizontal distance, R the Earth's radius. A ray that curves with radius R / k is an arc over D: at its end

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, chdtri, nctdtr, ndtr, ndtri, stdtr, stdtrit
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 
 UNCHECKED = 1e-4  # sigma^2 over the variance of the estimated error below which w is a ratio of rounding and curvature
 
@@ -312,7 +312,7 @@ class ObservationTests:
 
 
 @dataclass(frozen=True)
-class Suspect:
+class SuspectObservation:
     """An observation that the tests reject: group and row, statistic, p-values, estimated and detectable error."""
 
     group: int
@@ -324,14 +324,14 @@ class Suspect:
     detectable_error: float
 
 
-def checked(fit: Fit) -> np.ndarray:
+def checked(fit: GroupFit) -> np.ndarray:
     """Which (m,) observations the others check; right with correlations too, where redundancy numbers mislead."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return fit.sigma**2 > UNCHECKED * (fit.detectable_error / NONCENTRALITY) ** 2
 
 
 def observation_tests(
-    fits: Sequence[Fit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
+    fits: Sequence[GroupFit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
 ) -> ObservationTests:
     """The test of every observation of an adjustment, corrected for their number.
 
@@ -369,8 +369,8 @@ def _filled(where: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def suspects(
-    fits: Sequence[Fit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
-) -> list[Suspect]:
+    fits: Sequence[GroupFit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
+) -> list[SuspectObservation]:
     """Observations that the tests reject, worst first; arguments as `observation_tests`.
 
     One wrong observation can make its neighbours suspect too; `robustness.snoop` tells them apart.
@@ -379,7 +379,7 @@ def suspects(
     """
     tests = observation_tests(fits, level=level, correction=correction, known_sigma=known_sigma)
     found = [
-        Suspect(
+        SuspectObservation(
             group=i,
             row=int(k),
             statistic=float(tests.statistic[i][k]),

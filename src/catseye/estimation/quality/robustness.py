@@ -1,8 +1,8 @@
 """Robust estimation and data snooping over any engine that solves least squares.
 
 The engine is one function: `solve(inflation)` adjusts with the sigma of each observation multiplied by its inflation
-(one (m,) array a group, 1 or more; infinite leaves it out) and returns one `Fit` a group. In the fits, `sigma` is the
-claimed one, not inflated; the tests belong to the inflated one. Of correlated observations, inflation k adds
+(one (m,) array a group, 1 or more; infinite leaves it out) and returns one `GroupFit` a group. In the fits, `sigma` is
+the claimed one, not inflated; the tests belong to the inflated one. Of correlated observations, inflation k adds
 (k^2 - 1) sigma^2 to the variance of that one alone. An observation left out is inactive, and its `standardised` is that
 of its prediction by the others. Each call should start from the same approximate parameters: an answer on the way may
 be far off. Where the parameters are not held, solve raises EstimationError (or returns nan).
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, Fit
+from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit
 from catseye.estimation.quality.reliability import UNCHECKED, single_level, w_critical
 
-Solve = Callable[[Sequence[np.ndarray]], Sequence[Fit]]
+Solve = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
 NOT_CONVERGED = "not converged: weights still changed by {change:.2g} after {iterations} iterations"
 UNDECIDED = (
@@ -92,7 +92,7 @@ class RobustEstimate:
     scale: float
     iterations: int
     status: str
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
 
 
 class _Rows:
@@ -342,7 +342,7 @@ class Snooped:
     critical: float
     solutions: int
     status: str
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
 
 
 def snoop(

@@ -6,7 +6,7 @@ strict solution); for rows it needs v, sigma and the redundancy numbers alone.
 
 The engine is one function: `solve(scale)` adjusts with the claimed sigma of each observation multiplied by its scale
 (one (m,) array a group, any positive number; within a correlated group one number, for its whole covariance) and
-returns one `Fit` a group, whose `pvv` and `redundancy` belong to the scaled sigmas and whose `residual` is plain.
+returns one `GroupFit` a group, whose `pvv` and `redundancy` belong to the scaled sigmas and whose `residual` is plain.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,9 +16,9 @@ from typing import Protocol
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
+from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
 
-Scaled = Callable[[Sequence[np.ndarray]], Sequence[Fit]]
+Scaled = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
 NOT_CONVERGED = (
     "not converged: {name} still moved by {step:.2g} of its standard uncertainty after {iterations} iterations"
@@ -31,7 +31,7 @@ STEP = 1e-3  # relative change of a variance in the derivative of the redundanci
 WORST_CONDITION = 1e-5  # of the information scaled to a unit diagonal; the derivative is good to 1e-6
 
 
-class Model(Protocol):
+class VarianceModel(Protocol):
     """What the components mean.
 
     names                  of the K components
@@ -46,7 +46,7 @@ class Model(Protocol):
     @property
     def start(self) -> np.ndarray: ...
     def scales(self, theta: np.ndarray) -> list[np.ndarray]: ...
-    def equations(self, fits: Sequence[Fit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    def equations(self, fits: Sequence[GroupFit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class GroupFactors:
         factor = np.append(theta, 1.0)[self._member]
         return [np.full(m, np.sqrt(f)) for m, f in zip(self.sizes, factor, strict=True)]
 
-    def equations(self, fits: Sequence[Fit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(self, fits: Sequence[GroupFit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         observed, expected = np.zeros(len(theta)), np.zeros(len(theta))
         for fit, k in zip(fits, self._member, strict=True):
             if k >= 0:
@@ -129,7 +129,7 @@ class RowModel:
     def scales(self, theta: np.ndarray) -> list[np.ndarray]:
         return [np.sqrt(v) / s for v, s in zip(self.variances(theta), self.sigmas, strict=True)]
 
-    def equations(self, fits: Sequence[Fit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def equations(self, fits: Sequence[GroupFit], theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         k = len(theta)
         observed, expected, bound = np.zeros(k), np.zeros(k), np.zeros((k, k))
         for fit, q, at, variance in zip(fits, self.cofactors, self.columns, self.variances(theta), strict=True):
@@ -190,7 +190,7 @@ class Components:
     at_zero: np.ndarray
     status: str
     iterations: int
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
 
     @property
     def u(self) -> np.ndarray:
@@ -210,7 +210,9 @@ class Components:
         return self
 
 
-def variance_components(solve: Scaled, model: Model, *, iterations: int = 100, tolerance: float = 1e-4) -> Components:
+def variance_components(
+    solve: Scaled, model: VarianceModel, *, iterations: int = 100, tolerance: float = 1e-4
+) -> Components:
     """Restricted maximum likelihood estimate of variance components, not negative.
 
     solve        the engine, see the top of this file
@@ -278,7 +280,7 @@ def _least_squares_not_negative(normal: np.ndarray, right: np.ndarray) -> np.nda
 
 
 def _inverse_information(
-    solve: Scaled, model: Model, theta: np.ndarray, size: np.ndarray
+    solve: Scaled, model: VarianceModel, theta: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, list[int]]:
     """Covariance of the components, and which are not separable, if any; `size` (K,) is the step of each.
 

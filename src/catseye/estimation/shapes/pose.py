@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError, FrameError
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.estimation.quality.robustness import estimate_robustly
 from catseye.estimation.shapes.rigid_body import (
@@ -221,7 +221,7 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
     """(n,) bool which points stay, and (n,) the largest |w| of each, nothing being left out for being unchecked."""
     sigma = np.sqrt(np.diag(problem.spread(np.eye(3))))
 
-    def solve(inflation: Sequence[np.ndarray]) -> list[Fit]:
+    def solve(inflation: Sequence[np.ndarray]) -> list[GroupFit]:
         (factor,) = inflation
         extra = (np.square(factor) - 1.0) * sigma**2
         motion = problem.fit(extra)
@@ -240,7 +240,7 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
     return keep, statistic
 
 
-def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sigma: np.ndarray) -> Fit:
+def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sigma: np.ndarray) -> GroupFit:
     """One group of 3n rows for `estimate_robustly`; its own weight undone is the estimator's business.
 
     The error in row i alone that explains the residuals best is (P v)_i / P_ii, of variance 1 / P_ii.
@@ -249,7 +249,7 @@ def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sig
     with np.errstate(divide="ignore", invalid="ignore"):
         estimated = np.where(weight > 0.0, linear.weighted_residual / weight, 0.0)
         u = np.where(weight > 0.0, 1.0 / np.sqrt(weight), np.inf)
-    return Fit(
+    return GroupFit(
         name="points",
         active=np.ones(len(sigma), dtype=bool),
         residual=motion.residual.ravel(),

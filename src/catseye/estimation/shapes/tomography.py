@@ -45,7 +45,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Prior:
+class FieldPrior:
     """What is known of a field beforehand.
 
     mean     expected mean, in the field's unit
@@ -153,8 +153,8 @@ class Tomogram:
     """
 
     observations: LineMeans
-    scalar: Prior
-    vector: Prior | None
+    scalar: FieldPrior
+    vector: FieldPrior | None
     chi_square: float
     degrees_of_freedom: int
     predicted: np.ndarray
@@ -204,7 +204,7 @@ class Tomogram:
         return np.diag(variance) - with_parameters @ self.inverse @ with_parameters.T
 
 
-def tomogram(observations: LineMeans, scalar: Prior, vector: Prior | None = None) -> Tomogram:
+def tomogram(observations: LineMeans, scalar: FieldPrior, vector: FieldPrior | None = None) -> Tomogram:
     """The fields that best explain means along lines, given what was known beforehand.
 
     observations   means along lines, in the scalar's unit
@@ -291,7 +291,7 @@ def _correlation(a: Lines, b: Lines, lengths: np.ndarray) -> np.ndarray:
     return total
 
 
-def _check(observations: LineMeans, vector: Prior | None) -> None:
+def _check(observations: LineMeans, vector: FieldPrior | None) -> None:
     m, q = len(observations.observed), len(observations.sigmas)
     shapes = {
         "start": (observations.lines.start.shape, (m, 3)),

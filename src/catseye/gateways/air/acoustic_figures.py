@@ -8,7 +8,7 @@ import numpy as np
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.acoustic_recording import AcousticPath, Trace
+    from catseye.reduction.air.acoustic_recording import AcousticPath, ChannelTrace
 
 HEARD = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
 
@@ -27,7 +27,7 @@ def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
         return drawn
 
 
-def _recording(traces: Sequence["Trace"]) -> Figure:
+def _recording(traces: Sequence["ChannelTrace"]) -> Figure:
     figure = Figure(figsize=(9.4, 1.7 * len(traces) + 0.5), layout="constrained")
     for ax, trace, colour in zip(figure.subplots(len(traces), 1, squeeze=False)[:, 0], traces, SERIES, strict=False):
         ax.plot(trace.time * 1e3, trace.samples, color=colour, lw=0.6)
@@ -39,7 +39,7 @@ def _recording(traces: Sequence["Trace"]) -> Figure:
     return figure
 
 
-def _correlation(traces: Sequence["Trace"]) -> Figure:
+def _correlation(traces: Sequence["ChannelTrace"]) -> Figure:
     figure = Figure(figsize=(9.4, 1.9 * len(traces) + 0.5), layout="constrained")
     panels = figure.subplots(len(traces), 2, squeeze=False, gridspec_kw={"width_ratios": (2.2, 1.0)})
     for (wide, near), trace, colour in zip(panels, traces, SERIES, strict=False):

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.atmosphere.index.air import MODELS, Air, air
-from catseye.atmosphere.index.model import Model
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.index.air import MODELS, AirState, air
+from catseye.atmosphere.index.model import IndexModel
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import PPM
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
@@ -28,9 +28,15 @@ NAMES = {  # for readers; a model without one goes by its own
 COLOURS = {name: SERIES[i % len(SERIES)] for i, name in enumerate(MODELS)}
 DISTANCE = 100.0  # m, over which the bars say micrometres
 UNCERTAINTIES = {
-    "u_temperature_c": Limit("u of temperature", "C", 0.0, 100.0, "the notion of a small standard uncertainty", 1),
-    "u_pressure_hpa": Limit("u of pressure", "hPa", 0.0, 1000.0, "the notion of a small standard uncertainty", 1),
-    "u_humidity_percent": Limit("u of humidity", "%", 0.0, 100.0, "the notion of a small standard uncertainty", 1),
+    "u_temperature_c": ValidInterval(
+        "u of temperature", "C", 0.0, 100.0, "the notion of a small standard uncertainty", 1
+    ),
+    "u_pressure_hpa": ValidInterval(
+        "u of pressure", "hPa", 0.0, 1000.0, "the notion of a small standard uncertainty", 1
+    ),
+    "u_humidity_percent": ValidInterval(
+        "u of humidity", "%", 0.0, 100.0, "the notion of a small standard uncertainty", 1
+    ),
 }
 
 
@@ -49,7 +55,7 @@ class Variable:
     around: float | None
     ends: tuple[float, float] = (0.0, 0.0)
 
-    def values(self, given: float, model: Model) -> NDArray[np.float64]:
+    def values(self, given: float, model: IndexModel) -> NDArray[np.float64]:
         """What is drawn of it, within the model's limits."""
         low, high = self.ends if self.around is None else (given - self.around, given + self.around)
         limit = model.limits[self.key]
@@ -123,7 +129,7 @@ def air_plot(
     return text, _told(state, here, parts, not_drawn)
 
 
-def _parts(here: Air, u: dict[str, float]) -> dict[str, float]:
+def _parts(here: AirState, u: dict[str, float]) -> dict[str, float]:
     """Standard uncertainty of the index, ppm, by where it comes from."""
     slope = here.sensitivity
     return {
@@ -185,7 +191,7 @@ def _slope(variable: Variable, state: dict[str, float], model: str) -> str:
     return f"{slope:+.4f} ppm per {unit} here".replace("-", "−")
 
 
-def _inside(model: Model, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _inside(model: IndexModel, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Where a model holds: within its limits, and with room for the vapour."""
     inside = np.ones(shape, bool)
     for key, value in values.items():
@@ -225,7 +231,7 @@ def _key(pairs) -> tuple[list, list]:
     return list(found.values()), list(found)
 
 
-def _title(state: dict[str, float], here: Air, not_drawn: list[str]) -> str:
+def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str:
     text = (
         f"{_name(here.model)} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
         f"{state['humidity_percent']:g} %, {state['wavelength_um']:g} µm: group refractivity "
@@ -235,7 +241,7 @@ def _title(state: dict[str, float], here: Air, not_drawn: list[str]) -> str:
     return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
 
 
-def _told(state: dict[str, float], here: Air, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
+def _told(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
     differences = {}
     for name, model in MODELS.items():
         if name != here.model and bool(_inside(model, state, ()).all()):

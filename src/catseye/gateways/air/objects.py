@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from catseye.atmosphere.index.air import Air
+    from catseye.atmosphere.index.air import AirState
 
 
-def air_object(air: "Air", wavelength_um: float, u: Any) -> dict[str, Any]:
+def air_object(air: "AirState", wavelength_um: float, u: Any) -> dict[str, Any]:
     """The air as `catseye air --json` gives it.
 
     u   standard uncertainty of the group index, formula and instruments

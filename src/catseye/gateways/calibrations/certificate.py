@@ -10,7 +10,7 @@ from catseye.gateways.calibrations.certificate_figure import calibration_figure
 from catseye.gateways.calibrations.certificate_record import record_lines
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
-from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
 
 TITLE = "Certificate of calibration"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours
@@ -150,7 +150,7 @@ def _tests(found: Calibration) -> str:
     )
 
 
-def _outcome(decision: Decision) -> str:
+def _outcome(decision: TestOutcome) -> str:
     return "–" if decision.passed is None else "passed" if decision.passed else "FAILED"
 
 

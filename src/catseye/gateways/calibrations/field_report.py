@@ -12,8 +12,8 @@ from catseye.gateways.calibrations.certificate import SIGNATURES
 from catseye.gateways.calibrations.field_report_fields import (
     FORMS,
     HEADED,
-    Field,
     Report,
+    ReportField,
     written_aid,
     written_matrix,
     written_u,
@@ -95,11 +95,11 @@ def field_report(report: Report, when: datetime) -> str:
     return page(f"{form.title} {name}".strip(), "\n".join(part for part in parts if part))
 
 
-def _headed(field: Field) -> str:
+def _headed(field: ReportField) -> str:
     return f"<div><span>{field.entry.name}</span><b>{escape(written_value(field))}</b></div>"
 
 
-def _rows(fields: Sequence[Field]) -> str:
+def _rows(fields: Sequence[ReportField]) -> str:
     lines = "\n".join(
         f'<tr><td class="f">{f.entry.name}{_small(f.entry.sense)}</td>'
         f'<td class="v">{escape(written_value(f))}{_small(written_aid(f))}</td>'
@@ -112,7 +112,7 @@ def _rows(fields: Sequence[Field]) -> str:
     )
 
 
-def _servo(axes: Sequence[Sequence[Field]]) -> str:
+def _servo(axes: Sequence[Sequence[ReportField]]) -> str:
     """Both axes' settings side by side, each a table."""
     if not axes:
         return ""

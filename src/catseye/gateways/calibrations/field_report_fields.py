@@ -23,7 +23,7 @@ SUBSCRIPTS = "₁₂₃"
 
 
 @dataclass(frozen=True)
-class Entry:
+class ReportEntry:
     """A field as the form has it.
 
     name    as the notes print it
@@ -49,7 +49,7 @@ class Form:
     title: str
     figure: str
     record: type[MonumentGeometry] | type[MirrorGeometry]
-    entries: tuple[Entry, ...]
+    entries: tuple[ReportEntry, ...]
     symbol: str
     matrix: str
     angles: tuple[str, ...]
@@ -59,10 +59,10 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Field:
+class ReportField:
     """A field with what the record says: value None where it says nothing, u None where it is not known."""
 
-    entry: Entry
+    entry: ReportEntry
     value: Any = None
     u: float | None = None
 
@@ -82,17 +82,17 @@ class Report:
     kind: str
     file: str
     sha256: str
-    fields: tuple[Field, ...]
+    fields: tuple[ReportField, ...]
     said: dict[str, Any]
     notes: str = ""
 
     @property
-    def missing(self) -> tuple[Entry, ...]:
+    def missing(self) -> tuple[ReportEntry, ...]:
         """What the record does not say; a blank form misses nothing."""
         return tuple(field.entry for field in self.fields if field.value is None) if self.file else ()
 
 
-def _servo(axis: int) -> tuple[Entry, ...]:
+def _servo(axis: int) -> tuple[ReportEntry, ...]:
     """The motion chip's settings of an axis, 0 azimuth, 1 elevation."""
     commands = (
         ("ABV", "velocity", "2⁻¹⁶ counts/sample"),
@@ -104,7 +104,9 @@ def _servo(axis: int) -> tuple[Entry, ...]:
         ("FSI", "derivative interval", ""),
         ("ERL", "position error limit", "counts"),
     )
-    return tuple(Entry(f"{name} {axis}", f"{name.lower()}_{axis}", unit, sense=what) for name, what, unit in commands)
+    return tuple(
+        ReportEntry(f"{name} {axis}", f"{name.lower()}_{axis}", unit, sense=what) for name, what, unit in commands
+    )
 
 
 FORMS = {
@@ -113,26 +115,30 @@ FORMS = {
         "after the notes' Figure 2.2, rev 1/20/96",
         MonumentGeometry,
         (
-            Entry("ZY", "monument"),
-            Entry("DATE", "measured_on"),
-            Entry("INITIALS", "by"),
-            Entry("ZP NUMBER", "zp"),
-            Entry("CONTROL PANEL", "control_panel"),
-            Entry("ETHERNET ADDRESS", "ethernet_address"),
-            Entry("IP ADDRESS", "ip_address"),
-            Entry("x", "x_mm", "mm", "u_x_mm", "fixed point, east"),
-            Entry("y", "y_mm", "mm", "u_y_mm", "fixed point, north"),
-            Entry("z", "z_mm", "mm", "u_z_mm", "fixed point, up"),
-            Entry("azimuth", "azimuth_deg", "deg", "u_alpha1_rad", "of ẑ, clockwise from north", "dms"),
-            Entry("α₁ (π − azimuth)", "alpha1_rad", "rad", "u_alpha1_rad", "+ : ẑ from south towards east", "dms"),
-            Entry("α₂ (rotation about ẑ)", "alpha2_rad", "rad", "u_alpha2_rad", "+ : x̂ rises", "arcsec"),
-            Entry("α₃ (rotation about x̂)", "alpha3_rad", "rad", "u_alpha3_rad", "+ : ẑ (v-block) sinks", "arcsec"),
-            Entry("LATITUDE", "latitude_deg", "deg", sense="north", aid="dms"),
-            Entry("LONGITUDE", "longitude_deg", "deg", sense="east; west is negative", aid="dms"),
-            Entry("ELEVATION", "elevation_m", "m", sense="above sea level"),
-            Entry("WV X", "wv_x_m", "m", sense="state plane, east"),
-            Entry("WV Y", "wv_y_m", "m", sense="state plane, north"),
-            Entry("WV Z", "wv_z_m", "m", sense="NAVD88, up"),
+            ReportEntry("ZY", "monument"),
+            ReportEntry("DATE", "measured_on"),
+            ReportEntry("INITIALS", "by"),
+            ReportEntry("ZP NUMBER", "zp"),
+            ReportEntry("CONTROL PANEL", "control_panel"),
+            ReportEntry("ETHERNET ADDRESS", "ethernet_address"),
+            ReportEntry("IP ADDRESS", "ip_address"),
+            ReportEntry("x", "x_mm", "mm", "u_x_mm", "fixed point, east"),
+            ReportEntry("y", "y_mm", "mm", "u_y_mm", "fixed point, north"),
+            ReportEntry("z", "z_mm", "mm", "u_z_mm", "fixed point, up"),
+            ReportEntry("azimuth", "azimuth_deg", "deg", "u_alpha1_rad", "of ẑ, clockwise from north", "dms"),
+            ReportEntry(
+                "α₁ (π − azimuth)", "alpha1_rad", "rad", "u_alpha1_rad", "+ : ẑ from south towards east", "dms"
+            ),
+            ReportEntry("α₂ (rotation about ẑ)", "alpha2_rad", "rad", "u_alpha2_rad", "+ : x̂ rises", "arcsec"),
+            ReportEntry(
+                "α₃ (rotation about x̂)", "alpha3_rad", "rad", "u_alpha3_rad", "+ : ẑ (v-block) sinks", "arcsec"
+            ),
+            ReportEntry("LATITUDE", "latitude_deg", "deg", sense="north", aid="dms"),
+            ReportEntry("LONGITUDE", "longitude_deg", "deg", sense="east; west is negative", aid="dms"),
+            ReportEntry("ELEVATION", "elevation_m", "m", sense="above sea level"),
+            ReportEntry("WV X", "wv_x_m", "m", sense="state plane, east"),
+            ReportEntry("WV Y", "wv_y_m", "m", sense="state plane, north"),
+            ReportEntry("WV Z", "wv_z_m", "m", sense="NAVD88, up"),
         ),
         "γ",
         "gamma",
@@ -146,28 +152,28 @@ FORMS = {
         "after the notes' Figure 2.4, rev 1/20/96",
         MirrorGeometry,
         (
-            Entry("ZP", "zp"),
-            Entry("DATE", "measured_on"),
-            Entry("INITIALS", "by"),
-            Entry("LASER NUMBER", "laser_number"),
-            Entry("DETECTOR NUMBER", "detector_number"),
-            Entry("HEAD NUMBER", "head_number"),
-            Entry("OSCILLATOR NUMBER", "oscillator_number"),
-            Entry("LEAKAGE SIGNAL", "leakage_amplitude_volt", "V", "u_leakage_volt", "amplitude"),
-            Entry("LEAKAGE SIGNAL", "leakage_phase_rad", "rad", "u_leakage_volt", "phase"),
-            Entry("D₀", "d0_mm", "mm", "u_d0_mm", "scan point to internal cube"),
-            Entry("Δx", "dx_mm", "mm", "u_offset_mm", "+ : ball to scan point along x̂"),
-            Entry("Δy", "dy_mm", "mm", "u_offset_mm", "+ : up, along ŷ"),
-            Entry("Δz", "dz_mm", "mm", "u_offset_mm", "+ : towards v-block, along ẑ"),
-            Entry("β₁ rotation about x (θ)", "beta1_rad", "rad", "u_beta_rad", "+ : z̃ sinks", "arcsec"),
-            Entry("β₂ rotation about y (ϕ)", "beta2_rad", "rad", "u_beta_rad", "+ : z̃ to x̂", "arcsec"),
-            Entry("Nₐ₀", "na0", "counts", "u_zero_counts", "Θ = 0: beam along x̃ at Φ = 90°"),
-            Entry("Nₑ₀", "ne0", "counts", "u_zero_counts", "Φ = 0: beam along z̃"),
-            Entry("AZ LOW LIMIT", "az_low_limit", "counts"),
-            Entry("AZ HIGH LIMIT", "az_high_limit", "counts"),
-            Entry("AZM ZRG", "azm_zrg", "counts", sense="at the cube"),
+            ReportEntry("ZP", "zp"),
+            ReportEntry("DATE", "measured_on"),
+            ReportEntry("INITIALS", "by"),
+            ReportEntry("LASER NUMBER", "laser_number"),
+            ReportEntry("DETECTOR NUMBER", "detector_number"),
+            ReportEntry("HEAD NUMBER", "head_number"),
+            ReportEntry("OSCILLATOR NUMBER", "oscillator_number"),
+            ReportEntry("LEAKAGE SIGNAL", "leakage_amplitude_volt", "V", "u_leakage_volt", "amplitude"),
+            ReportEntry("LEAKAGE SIGNAL", "leakage_phase_rad", "rad", "u_leakage_volt", "phase"),
+            ReportEntry("D₀", "d0_mm", "mm", "u_d0_mm", "scan point to internal cube"),
+            ReportEntry("Δx", "dx_mm", "mm", "u_offset_mm", "+ : ball to scan point along x̂"),
+            ReportEntry("Δy", "dy_mm", "mm", "u_offset_mm", "+ : up, along ŷ"),
+            ReportEntry("Δz", "dz_mm", "mm", "u_offset_mm", "+ : towards v-block, along ẑ"),
+            ReportEntry("β₁ rotation about x (θ)", "beta1_rad", "rad", "u_beta_rad", "+ : z̃ sinks", "arcsec"),
+            ReportEntry("β₂ rotation about y (ϕ)", "beta2_rad", "rad", "u_beta_rad", "+ : z̃ to x̂", "arcsec"),
+            ReportEntry("Nₐ₀", "na0", "counts", "u_zero_counts", "Θ = 0: beam along x̃ at Φ = 90°"),
+            ReportEntry("Nₑ₀", "ne0", "counts", "u_zero_counts", "Φ = 0: beam along z̃"),
+            ReportEntry("AZ LOW LIMIT", "az_low_limit", "counts"),
+            ReportEntry("AZ HIGH LIMIT", "az_high_limit", "counts"),
+            ReportEntry("AZM ZRG", "azm_zrg", "counts", sense="at the cube"),
             *_servo(0),
-            Entry("ELV ZRG", "elv_zrg", "counts", sense="at the cube"),
+            ReportEntry("ELV ZRG", "elv_zrg", "counts", sense="at the cube"),
             *_servo(1),
         ),
         "λ",
@@ -219,11 +225,11 @@ def report_object(report: Report, written: str | None) -> dict[str, Any]:
     }
 
 
-def written_value(field: Field) -> str:
+def written_value(field: ReportField) -> str:
     """A value with the digits that belong to its u; as the record has it where u is not known.
 
-    >>> at = Entry("x", "x_mm", "mm")
-    >>> [written_value(Field(at, value, u)) for value, u in ((29503.7431, 0.1), (-2.4e-5, None), (12, 0.3))]
+    >>> at = ReportEntry("x", "x_mm", "mm")
+    >>> [written_value(ReportField(at, value, u)) for value, u in ((29503.7431, 0.1), (-2.4e-5, None), (12, 0.3))]
     ['29503.74', '-0.000024', '12']
     """
     value = field.value
@@ -234,17 +240,17 @@ def written_value(field: Field) -> str:
     return rounded(value, field.u)[0] if field.u else np.format_float_positional(value, trim="0")
 
 
-def written_u(field: Field) -> str:
+def written_u(field: ReportField) -> str:
     """Its standard uncertainty with two digits; held where it is zero, which fixes a coordinate."""
     if field.u is None or field.value is None:
         return ""
     return rounded(0.0, field.u)[1] if field.u else "held"
 
 
-def written_aid(field: Field) -> str:
+def written_aid(field: ReportField) -> str:
     """The same angle in degrees, minutes and seconds, or in seconds alone.
 
-    >>> written_aid(Field(Entry("azimuth", "azimuth_deg", "deg", aid="dms"), 122.19722))
+    >>> written_aid(ReportField(ReportEntry("azimuth", "azimuth_deg", "deg", aid="dms"), 122.19722))
     '122° 11′ 50.0″'
     """
     if field.value is None or not field.entry.aid:
@@ -256,7 +262,7 @@ def written_aid(field: Field) -> str:
     return f"{'-' if seconds < -0.05 else ''}{minutes // 60}° {minutes % 60:02d}′ {tenths / 10.0:04.1f}″"
 
 
-def written_matrix(fields: tuple[Field, ...]) -> list[str]:
+def written_matrix(fields: tuple[ReportField, ...]) -> list[str]:
     """The elements with one number of decimals, that of the greatest u among them, six at least."""
     if fields[0].value is None:
         return ["" for _ in fields]
@@ -265,13 +271,13 @@ def written_matrix(fields: tuple[Field, ...]) -> list[str]:
     return [f"{round(field.value, places) + 0.0:.{places}f}" for field in fields]
 
 
-def _filled(form: Form, record: Any) -> tuple[Field, ...]:
+def _filled(form: Form, record: Any) -> tuple[ReportField, ...]:
     """Every field of the form, the matrix last."""
-    stated = [Field(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
+    stated = [ReportField(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
     return (*stated, *_matrix(form, record))
 
 
-def _uncertainty(entry: Entry, record: Any) -> float | None:
+def _uncertainty(entry: ReportEntry, record: Any) -> float | None:
     """u of a field in its own unit."""
     u = getattr(record, entry.u, None) if entry.u else None
     if u is None or getattr(record, entry.key) is None:
@@ -284,22 +290,22 @@ def _uncertainty(entry: Entry, record: Any) -> float | None:
     return float(u)
 
 
-def _matrix(form: Form, record: Any) -> tuple[Field, ...]:
+def _matrix(form: Form, record: Any) -> tuple[ReportField, ...]:
     """The nine direction cosines, row by row, with the u that those of the angles give them."""
     entries = [
-        Entry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
+        ReportEntry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
         for i in range(3)
         for j in range(3)
     ]
     if record is None:
-        return tuple(Field(entry) for entry in entries)
+        return tuple(ReportField(entry) for entry in entries)
     angles = np.array([getattr(record, key) for key in form.angles])
     u = [getattr(record, key, None) for key in form.u_angles]
     values = form.turned(*angles).ravel()
     if any(each is None for each in u):
-        return tuple(Field(e, float(value)) for e, value in zip(entries, values, strict=True))
+        return tuple(ReportField(e, float(value)) for e, value in zip(entries, values, strict=True))
     spread = matrix_uncertainty(form.turned, angles, np.array(u, dtype=float)).ravel()
-    return tuple(Field(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
+    return tuple(ReportField(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
 
 
 def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
-from catseye.records.night.shot import Shot
+from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
 
@@ -69,7 +69,7 @@ class CampaignExport:
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ExportedShot:
     """A shot that goes into the campaign."""
 
     ticks: int
@@ -163,10 +163,10 @@ def _chosen(
     site: SiteFolder,
     left: LeftOut,
     weather: list[int],
-) -> list[Chosen]:
+) -> list[ExportedShot]:
     """The shots that a campaign holds, in order of time."""
     refusal = _refusals(site, weather)
-    found: list[Chosen] = []
+    found: list[ExportedShot] = []
     for seq, entry in reader.shots(run):
         shot = entry.shot
         if span is not None and not span[0] <= shot.ticks < span[1]:
@@ -175,9 +175,9 @@ def _chosen(
             left.add(reason, f"shot {shot.number} of {shot.ranger}")
             continue
         taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
-        found.append(Chosen(shot.ticks, seq, *taken))
+        found.append(ExportedShot(shot.ticks, seq, *taken))
     found.sort(key=lambda shot: (shot.ticks, shot.seq))
-    kept: list[Chosen] = []
+    kept: list[ExportedShot] = []
     latest: dict[str, int] = {}
     for shot_ in found:
         which = f"shot {shot_.number} of {shot_.ranger}"
@@ -222,7 +222,7 @@ def _as_it_stood(
     reader: JournalReader,
     run: int,
     site: SiteFolder,
-    chosen: list[Chosen],
+    chosen: list[ExportedShot],
     readings: list[LiveWeather],
     notes: list[str],
 ) -> SiteFolder:
@@ -254,8 +254,8 @@ def _as_it_stood(
     return replace(site, site=site.site.model_copy(update={"campaign": posture, "weather_station": stations}))
 
 
-def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples_per_cycle: int, frame: int) -> Shot:
-    return Shot(
+def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples_per_cycle: int, frame: int) -> ShotRow:
+    return ShotRow(
         shot=number,
         mjd_utc=ticks / TICKS_PER_DAY,
         ranger=ranger,
@@ -266,7 +266,7 @@ def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples
     )
 
 
-def _shots_csv(chosen: list[Chosen], notes: list[str]) -> str:
+def _shots_csv(chosen: list[ExportedShot], notes: list[str]) -> str:
     """Shots by their numbers; by their seq where numbers are not each once."""
     numbers = [shot.number for shot in chosen]
     if len(set(numbers)) < len(numbers) or min(numbers) < 0:
@@ -274,7 +274,7 @@ def _shots_csv(chosen: list[Chosen], notes: list[str]) -> str:
         notes.append("shot numbers are not each once: shots.csv has the journal's seq instead")
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Shot.model_fields)
+    writer.writerow(ShotRow.model_fields)
     for frame, (number, shot) in enumerate(zip(numbers, chosen, strict=True)):
         row = (number, stamp(shot.ticks), shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, frame)
         writer.writerow(row)
@@ -291,7 +291,7 @@ def _weather_csv(readings: list[LiveWeather]) -> str:
     return text.getvalue()
 
 
-def _write_frames(reader: JournalReader, run: int, chosen: list[Chosen], path: Path) -> None:
+def _write_frames(reader: JournalReader, run: int, chosen: list[ExportedShot], path: Path) -> None:
     """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time."""
     width = max(shot.cycles * shot.samples_per_cycle for shot in chosen)
     rows = {shot.seq: row for row, shot in enumerate(chosen)}

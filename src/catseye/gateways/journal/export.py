@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
-from catseye.coordinator.journal.entries import Entry, Solution
+from catseye.coordinator.journal.entries import Entry, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind
 from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page, plain
@@ -31,7 +31,7 @@ Cells = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Field:
+class TableColumn:
     """A column.
 
     name      in CSV, unit at its end
@@ -49,15 +49,15 @@ class Field:
     shift: float = 0.0
 
 
-RUN = (Field("run", "RUN", "i"), Field("seq", "SEQ", "i"), Field("mjd_utc", "DMJD", "s", "d"))
+RUN = (TableColumn("run", "RUN", "i"), TableColumn("seq", "SEQ", "i"), TableColumn("mjd_utc", "DMJD", "s", "d"))
 
 
 @dataclass(frozen=True)
-class Table:
+class ExportTable:
     """A quantity: what it is read from, its columns after run, seq and time, and its rows of one entry."""
 
     kind: Kind
-    fields: tuple[Field, ...]
+    fields: tuple[TableColumn, ...]
     rows: Callable[[Any], Iterable[Cells]]
 
 
@@ -68,7 +68,7 @@ def _shot(entry: Any) -> Iterable[Cells]:
     yield (*taken, shot.amplitude, shot.phase, entry.status, entry.text, *found)
 
 
-def _solution(entry: Solution) -> Iterable[Cells]:
+def _solution(entry: EpochSolution) -> Iterable[Cells]:
     answer = entry.answer
     names = ("number", "variance_factor", "degrees_of_freedom", "refractivity_ppm")
     numbers = (float("nan") if answer.get(name) is None else answer[name] for name in names[1:])
@@ -81,7 +81,7 @@ def _solution(entry: Solution) -> Iterable[Cells]:
     )
 
 
-def _coordinates(entry: Solution) -> Iterable[Cells]:
+def _coordinates(entry: EpochSolution) -> Iterable[Cells]:
     names, x = entry.answer.get("names"), entry.answer.get("x")
     if not isinstance(names, list) or not isinstance(x, list) or len(names) != len(x):
         return
@@ -94,85 +94,85 @@ def _coordinates(entry: Solution) -> Iterable[Cells]:
         yield (name, *place, *np.sqrt(np.diag(c)).tolist(), *c[(0, 0, 1), (1, 2, 2)].tolist())
 
 
-TABLES: dict[str, Table] = {
-    "shots": Table(
+TABLES: dict[str, ExportTable] = {
+    "shots": ExportTable(
         "shots",
         (
-            Field("number", "NUMBER", "i"),
-            Field("ranger", "RANGER", "s"),
-            Field("target", "TARGET", "s"),
-            Field("cycles", "CYCLES", "i"),
-            Field("samples_per_cycle", "SAMPLES", "i"),
-            Field("if_hz", "IFFREQ", "i", "Hz"),
-            Field("amplitude_v", "AMPLITUDE", "f", "V"),
-            Field("phase_rad", "PHASE", "f", "rad"),
-            Field("status", "STATUS", "s"),
-            Field("text", "TEXT", "s"),
-            Field("range_m", "RANGE", "f", "m"),
-            Field("u_range_mm", "U_RANGE", "f", "mm"),
-            Field("misfit_mm", "MISFIT", "f", "mm"),
+            TableColumn("number", "NUMBER", "i"),
+            TableColumn("ranger", "RANGER", "s"),
+            TableColumn("target", "TARGET", "s"),
+            TableColumn("cycles", "CYCLES", "i"),
+            TableColumn("samples_per_cycle", "SAMPLES", "i"),
+            TableColumn("if_hz", "IFFREQ", "i", "Hz"),
+            TableColumn("amplitude_v", "AMPLITUDE", "f", "V"),
+            TableColumn("phase_rad", "PHASE", "f", "rad"),
+            TableColumn("status", "STATUS", "s"),
+            TableColumn("text", "TEXT", "s"),
+            TableColumn("range_m", "RANGE", "f", "m"),
+            TableColumn("u_range_mm", "U_RANGE", "f", "mm"),
+            TableColumn("misfit_mm", "MISFIT", "f", "mm"),
         ),
         _shot,
     ),
-    "weather": Table(
+    "weather": ExportTable(
         "weather",
         (
-            Field("station", "STATION", "s"),
-            Field("temperature_c", "TEMPERATURE", "f", "K", shift=ZERO_CELSIUS_K),  # FITS has no degree Celsius
-            Field("pressure_hpa", "PRESSURE", "f", "hPa"),
-            Field("humidity_percent", "HUMIDITY", "f", factor=0.01),
+            TableColumn("station", "STATION", "s"),
+            TableColumn("temperature_c", "TEMPERATURE", "f", "K", shift=ZERO_CELSIUS_K),  # FITS has no degree Celsius
+            TableColumn("pressure_hpa", "PRESSURE", "f", "hPa"),
+            TableColumn("humidity_percent", "HUMIDITY", "f", factor=0.01),
         ),
         lambda read: [(read.station, read.temperature_c, read.pressure_hpa, read.humidity_percent)],
     ),
-    "postures": Table(
+    "postures": ExportTable(
         "postures",
         (
-            Field("azimuth_deg", "AZIMUTH", "f", "deg"),
-            Field("elevation_deg", "ELEVATION", "f", "deg"),
-            Field("azimuth_rate_deg_s", "AZRATE", "f", "deg / s"),
-            Field("elevation_rate_deg_s", "ELRATE", "f", "deg / s"),
+            TableColumn("azimuth_deg", "AZIMUTH", "f", "deg"),
+            TableColumn("elevation_deg", "ELEVATION", "f", "deg"),
+            TableColumn("azimuth_rate_deg_s", "AZRATE", "f", "deg / s"),
+            TableColumn("elevation_rate_deg_s", "ELRATE", "f", "deg / s"),
         ),
         lambda read: [
             tuple(v / DEGREE for v in (read.azimuth, read.elevation, read.azimuth_rate, read.elevation_rate))
         ],
     ),
-    "commands": Table(
+    "commands": ExportTable(
         "commands",
         (
-            Field("ranger", "RANGER", "s"),
-            Field("tid", "TID", "i"),
-            Field("line", "LINE", "s"),
-            Field("reply", "REPLY", "s"),
-            Field("ok", "OK", "s"),
+            TableColumn("ranger", "RANGER", "s"),
+            TableColumn("tid", "TID", "i"),
+            TableColumn("line", "LINE", "s"),
+            TableColumn("reply", "REPLY", "s"),
+            TableColumn("ok", "OK", "s"),
         ),
         lambda sent: [(sent.ranger, sent.tid, sent.line, sent.reply, "" if sent.ok is None else str(int(sent.ok)))],
     ),
-    "happenings": Table(
+    "happenings": ExportTable(
         "happenings",
-        tuple(Field(name, name.upper(), "s") for name in ("severity", "who", "kind", "text", "details")),
+        tuple(TableColumn(name, name.upper(), "s") for name in ("severity", "who", "kind", "text", "details")),
         lambda what: [
             (what.severity, what.who, what.kind, what.text, json.dumps(what.details) if what.details else "")
         ],
     ),
-    "solutions": Table(
+    "solutions": ExportTable(
         "solutions",
         (
-            Field("number", "NUMBER", "i"),
-            Field("variance_factor", "VARFACTOR"),
-            Field("degrees_of_freedom", "FREEDOM"),
-            Field("refractivity_ppm", "REFRACTIVITY", factor=1e-6),
-            Field("points", "POINTS", "i"),
-            Field("pose", "POSE", "s"),
+            TableColumn("number", "NUMBER", "i"),
+            TableColumn("variance_factor", "VARFACTOR"),
+            TableColumn("degrees_of_freedom", "FREEDOM"),
+            TableColumn("refractivity_ppm", "REFRACTIVITY", factor=1e-6),
+            TableColumn("points", "POINTS", "i"),
+            TableColumn("pose", "POSE", "s"),
         ),
         _solution,
     ),
-    "coordinates": Table(
+    "coordinates": ExportTable(
         "solutions",
         (
-            Field("point", "POINT", "s"),
-            *(Field(f"{axis}_m", axis.upper(), "f", "m") for axis in "xyz"),
-            *(Field(f"u_{axis}_mm", f"U_{axis.upper()}", "f", "mm") for axis in "xyz"),
-            *(Field(f"cov_{pair}_mm2", f"COV_{pair.upper()}", "f", "mm2") for pair in ("xy", "xz", "yz")),
+            TableColumn("point", "POINT", "s"),
+            *(TableColumn(f"{axis}_m", axis.upper(), "f", "m") for axis in "xyz"),
+            *(TableColumn(f"u_{axis}_mm", f"U_{axis.upper()}", "f", "mm") for axis in "xyz"),
+            *(TableColumn(f"cov_{pair}_mm2", f"COV_{pair.upper()}", "f", "mm2") for pair in ("xy", "xz", "yz")),
         ),
         _coordinates,
     ),
@@ -214,7 +214,9 @@ def export_tables(
     return counts
 
 
-def rows_of(reader: JournalReader, table: Table, runs: Sequence[int], span: tuple[int, int] | None) -> Iterator[Cells]:
+def rows_of(
+    reader: JournalReader, table: ExportTable, runs: Sequence[int], span: tuple[int, int] | None
+) -> Iterator[Cells]:
     """The rows of a quantity: run, seq, the stamp as text of eight decimals, then its own."""
     for run in runs:
         for seq, entry in reader.events(run, kinds=[table.kind], buffers=False):
@@ -256,7 +258,7 @@ def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> 
     (directory / PROVENANCE).write_bytes(page.encode("utf-8"))
 
 
-def _csv(path: Path, name: str, table: Table, rows: Iterable[Cells]) -> int:
+def _csv(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
     """Numbers as Python writes them, which reads back without the loss of a bit; empty where there is none."""
     count = 0
     with path.open("w", encoding="utf-8", newline="") as stream:
@@ -268,7 +270,7 @@ def _csv(path: Path, name: str, table: Table, rows: Iterable[Cells]) -> int:
     return count
 
 
-def _fits(path: Path, name: str, table: Table, rows: Iterable[Cells]) -> int:
+def _fits(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
     """One binary table; times are doubles (0.6 us) in DMJD and exact in TICKS."""
     from astropy.io import fits
 

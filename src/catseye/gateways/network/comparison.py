@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.deformation.comparison import Comparison as Moved
+from catseye.estimation.deformation.comparison import PointMovements
 from catseye.estimation.deformation.congruence import VarianceFactor
 from catseye.estimation.deformation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network.findings import Findings, in_file_axes
@@ -29,7 +29,7 @@ DISPLACEMENTS: Formats = {
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class ComparedEpochs:
     """Two epochs and what moved between them.
 
     first, second   their adjustments
@@ -38,7 +38,7 @@ class Comparison:
 
     first: Findings
     second: Findings
-    moved: Moved
+    moved: PointMovements
 
     @property
     def deformation(self) -> Deformation:
@@ -91,7 +91,7 @@ class Comparison:
         ]
 
 
-def comparison_object(compared: Comparison) -> dict[str, Any]:
+def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
     """What moved, as `catseye adjust A B --json` gives it; SI units.
 
     compared   two epochs
@@ -167,7 +167,7 @@ def _epoch(found: Findings) -> dict[str, Any]:
     }
 
 
-def comparison_passages(compared: Comparison) -> list[Passage]:
+def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
     """What moved and what was assumed, in sentences.
 
     compared   two epochs
@@ -191,7 +191,7 @@ def comparison_passages(compared: Comparison) -> list[Passage]:
     return told + ([Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else [])
 
 
-def displacements_csv(compared: Comparison) -> Iterator[str]:
+def displacements_csv(compared: ComparedEpochs) -> Iterator[str]:
     """Every common point: where it was, how far it moved, how sure that is.
 
     compared   two epochs

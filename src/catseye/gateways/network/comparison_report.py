@@ -12,8 +12,16 @@ from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.quality.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.network.comparison import Comparison, comparison_passages
-from catseye.gateways.network.figures import Drawn, file_ticks, looking, point_names, scale_bar, thousands, view_frame
+from catseye.gateways.network.comparison import ComparedEpochs, comparison_passages
+from catseye.gateways.network.figures import (
+    CaptionedFigure,
+    file_ticks,
+    looking,
+    point_names,
+    scale_bar,
+    thousands,
+    view_frame,
+)
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.report import network_cards, provenance_section
 from catseye.gateways.network.summary import quantity, verdict
@@ -26,7 +34,7 @@ STILL = "#1f5a99"
 SHARE = 0.12  # of the network's extent that the longest displacement or ellipse is drawn as, about
 
 
-def comparison_report(compared: Comparison, when: datetime, inputs: Mapping[str, str]) -> str:
+def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page.
 
     compared   two epochs
@@ -47,7 +55,7 @@ def comparison_report(compared: Comparison, when: datetime, inputs: Mapping[str,
     return page(f"catseye: {second} against {first}", "\n".join([*body, provenance_section(when, inputs, settings)]))
 
 
-def _summary(compared: Comparison) -> str:
+def _summary(compared: ComparedEpochs) -> str:
     d = compared.deformation
     moved = [i for i, word in enumerate(compared.verdicts) if word == "moved"]
     cards = [card("Moved", f"{len(moved)} of {len(d.names)}", ", ".join(d.names[i] for i in moved[:6]) or "no point")]
@@ -90,7 +98,7 @@ def _chance(p: float, level: float) -> str:
     return "more than chance explains" if p < level else "no more than chance explains"
 
 
-def _displacements(compared: Comparison) -> str:
+def _displacements(compared: ComparedEpochs) -> str:
     d, names = compared.deformation, compared.first.network.axis_names
     drawn = comparison_figures(compared)
     order = np.argsort(np.nan_to_num(d.p, nan=2.0), kind="stable").tolist()
@@ -129,7 +137,7 @@ def _cell(value: float, form: str) -> str:
     return format(float(value), form) if np.isfinite(value) else "–"
 
 
-def _epochs(compared: Comparison) -> str:
+def _epochs(compared: ComparedEpochs) -> str:
     parts = []
     for title, found in (("First epoch", compared.first), ("Second epoch", compared.second)):
         good, text = verdict(found)
@@ -142,7 +150,7 @@ def _epochs(compared: Comparison) -> str:
     return section("epochs", CONTENTS["epochs"], *parts)
 
 
-def comparison_figures(compared: Comparison) -> dict[str, Drawn]:
+def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
     """Plan and elevation with displacements and their confidence ellipses.
 
     compared   two epochs
@@ -151,10 +159,10 @@ def comparison_figures(compared: Comparison) -> dict[str, Drawn]:
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         drawn = {"plan": _view(compared, None), "elevation": _view(compared, looking(compared.first))}
-        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: CaptionedFigure(svg(figure), caption) for name, (figure, caption) in drawn.items()}
 
 
-def _view(compared: Comparison, bearing: float | None) -> tuple[Figure, str]:
+def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]:
     d, found = compared.deformation, compared.first
     axes = PLAN if bearing is None else elevation_view(bearing)
     flat = found.solution.x @ axes.T
@@ -188,7 +196,7 @@ def _view(compared: Comparison, bearing: float | None) -> tuple[Figure, str]:
     )
 
 
-def _arrows(ax: Any, compared: Comparison, drawn: tuple[np.ndarray, np.ndarray], shape: tuple[Any, float]) -> None:
+def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarray], shape: tuple[Any, float]) -> None:
     """Displacements and ellipses by verdict."""
     (base, shift), (shown, scale) = drawn, shape
     verdicts = np.array(compared.verdicts)

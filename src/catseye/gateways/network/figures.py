@@ -27,14 +27,14 @@ ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (0.8, 0.8), (-0.8, 0.8), (0.
 
 
 @dataclass(frozen=True)
-class Drawn:
+class CaptionedFigure:
     """A figure and what its caption has to say."""
 
     svg: str
     caption: str
 
 
-def network_figures(found: Findings) -> dict[str, Drawn]:
+def network_figures(found: Findings) -> dict[str, CaptionedFigure]:
     """Plan, elevation, residuals and redundancy by name, in the axes x east, y north, z up.
 
     found   what is told of a solution
@@ -45,7 +45,7 @@ def network_figures(found: Findings) -> dict[str, Drawn]:
         drawn = {"plan": _view(found, None), "elevation": _view(found, looking(found))}
         if np.isfinite(found.table.standardised).any():
             drawn |= {"residuals": _residuals(found), "redundancy": _redundancy(found)}
-        return {name: Drawn(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: CaptionedFigure(svg(figure), caption) for name, (figure, caption) in drawn.items()}
 
 
 def looking(found: Findings) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catseye.gateways.network.comparison import FORMAT as COMPARISON
-from catseye.gateways.network.comparison import Comparison, comparison_object, displacements_csv
+from catseye.gateways.network.comparison import ComparedEpochs, comparison_object, displacements_csv
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import FORMAT, network_json
 from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
@@ -16,7 +16,7 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, Progress, origin, write_files
 
 if TYPE_CHECKING:
-    from catseye.reduction.network import Adjusted
+    from catseye.reduction.network import AdjustedNetwork
 
 
 def input_hashes(source: Path) -> dict[str, str]:
@@ -34,7 +34,7 @@ def write_network(
     inputs: Mapping[str, str],
     progress: Progress | None = None,
     *,
-    treated: "Adjusted | None" = None,
+    treated: "AdjustedNetwork | None" = None,
 ) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others.
 
@@ -50,7 +50,7 @@ def write_network(
 
 
 def write_comparison(
-    compared: Comparison, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    compared: ComparedEpochs, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
 ) -> None:
     """What moved, then the files of each epoch with its number before their names, last the provenance.
 
@@ -91,7 +91,7 @@ def _files(
     inputs: Mapping[str, str],
     *,
     prefix: str = "",
-    treated: "Adjusted | None" = None,
+    treated: "AdjustedNetwork | None" = None,
 ) -> Files:
     from catseye.gateways.network.report import network_report  # matplotlib is heavy
 

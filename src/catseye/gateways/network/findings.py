@@ -12,7 +12,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
 from catseye.estimation.network.diagnosis import label
 from catseye.estimation.network.external import effects_at_ends
-from catseye.estimation.network.model import Network, NetworkSolution, points_of
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
 from catseye.estimation.quality.reliability import (
     GlobalTest,
@@ -163,7 +163,7 @@ def _each(group: object, name: str) -> np.ndarray:
     return np.asarray(own) if own is not None else np.full(len(group.observed), group.name)  # type: ignore[attr-defined]
 
 
-def _components(network: Network, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _components(network: ObservationNetwork, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Components as the file calls them, and the sign with which it counts them."""
     called, sign = component.astype("U8"), np.ones(len(component))
     for k, name in enumerate(COMPONENTS):
@@ -174,7 +174,7 @@ def _components(network: Network, component: np.ndarray) -> tuple[np.ndarray, np
     return called, sign
 
 
-def in_file_axes(network: Network, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def in_file_axes(network: ObservationNetwork, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates or displacements (n, 3) and covariances (n, 3, 3) turned into the axes of the network's file.
 
     By exchange and sign, not by a product: an unknown coordinate leaves the others known.
@@ -184,7 +184,7 @@ def in_file_axes(network: Network, x: np.ndarray, covariance: np.ndarray) -> tup
     return sign * x[:, at], np.outer(sign, sign) * covariance[:, at[:, None], at]
 
 
-def _file_order(network: Network) -> np.ndarray:
+def _file_order(network: ObservationNetwork) -> np.ndarray:
     """Rows of all groups, one after another, in the order of their places in the file; as they are if one has none."""
     total = sum(len(g.observed) for g in network.groups)
     if len(network.groups) < 2 or len(network.places) != len(network.groups) or not all(network.places):
@@ -255,7 +255,7 @@ class Findings:
     relative: tuple[Relative, ...] = ()
 
     @property
-    def network(self) -> Network:
+    def network(self) -> ObservationNetwork:
         return self.solution.network
 
     @property

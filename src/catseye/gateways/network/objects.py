@@ -14,13 +14,13 @@ from catseye.gateways.network.findings import MEASURES, ROLES, Findings
 from catseye.gateways.writers.objects import plain
 
 if TYPE_CHECKING:
-    from catseye.reduction.network import Adjusted
+    from catseye.reduction.network import AdjustedNetwork
 
 FORMAT = "catseye-adjustment-1"
 PIECE = 5_000  # rows of a piece
 
 
-def network_object(found: Findings, treated: "Adjusted | None" = None) -> dict[str, Any]:
+def network_object(found: Findings, treated: "AdjustedNetwork | None" = None) -> dict[str, Any]:
     """An adjusted network as `catseye adjust --json` gives it, whole.
 
     found     what is told of a solution
@@ -41,7 +41,7 @@ def network_object(found: Findings, treated: "Adjusted | None" = None) -> dict[s
     return {**_head(found, treated), "points": points, "observations": observations}
 
 
-def network_json(found: Findings, *, lines: bool = False, treated: "Adjusted | None" = None) -> Iterator[str]:
+def network_json(found: Findings, *, lines: bool = False, treated: "AdjustedNetwork | None" = None) -> Iterator[str]:
     """The text of `network_object` in pieces.
 
     found     what is told of a solution
@@ -78,7 +78,7 @@ def _starts(count: int) -> range:
     return range(0, count, PIECE)
 
 
-def _head(found: Findings, treated: "Adjusted | None") -> dict[str, Any]:
+def _head(found: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
     """All but the points and the observations."""
     solution, whole = found.solution, found.whole
     degrees = solution.degrees_of_freedom
@@ -134,7 +134,7 @@ def _head(found: Findings, treated: "Adjusted | None") -> dict[str, Any]:
     )
 
 
-def _treatment(found: Findings, treated: "Adjusted") -> dict[str, Any]:
+def _treatment(found: Findings, treated: "AdjustedNetwork") -> dict[str, Any]:
     """What was left out or weighed down, by rows of the observations; and estimated components of variance."""
     sign, components = found.table.sign, treated.components
     rejections = []
@@ -197,7 +197,7 @@ def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
         )
 
 
-def _observations(found: Findings, low: int, treated: "Adjusted | None") -> dict[str, list[Any]]:
+def _observations(found: Findings, low: int, treated: "AdjustedNetwork | None") -> dict[str, list[Any]]:
     """Columns of the observations from row `low` on, a piece of them."""
     table, part = found.table, slice(low, low + PIECE)
     names = [*found.names, None]  # the last one for none, which is -1

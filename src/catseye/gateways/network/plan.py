@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.estimation.network.monte_carlo import Scatter
+from catseye.estimation.network.monte_carlo import MonteCarloScatter
 from catseye.estimation.network.plan import Candidate, Plan
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import network_object
@@ -48,7 +48,7 @@ class PlanFindings:
     found: Findings
     plan: Plan
     picked: tuple[Candidate, ...]
-    scatter: Scatter | None
+    scatter: MonteCarloScatter | None
 
     @property
     def weakest(self) -> np.ndarray:
@@ -98,7 +98,7 @@ def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
     return {**found, "at_s": c.at_s} if scheduled else found
 
 
-def _scatter(scatter: Scatter | None) -> dict[str, Any] | None:
+def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     if scatter is None:
         return None
     return {
@@ -176,7 +176,7 @@ def plan_passages(told: PlanFindings) -> list[Passage]:
     return passages
 
 
-def scatter_words(s: Scatter) -> str:
+def scatter_words(s: MonteCarloScatter) -> str:
     """What measuring on paper said."""
     text = (
         f"measured {s.asked} times, {s.runs} of them with an answer: departures are {s.ratio:.2f} of the claimed "

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.network.figures import Drawn, network_figures
+from catseye.gateways.network.figures import CaptionedFigure, network_figures
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.summary import passages, quantity, treatment_passages, verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 
 if TYPE_CHECKING:
-    from catseye.reduction.network import Adjusted
+    from catseye.reduction.network import AdjustedNetwork
 
 CONTENTS = {
     "summary": "Summary",
@@ -38,7 +38,7 @@ def network_report(
     inputs: Mapping[str, str],
     *,
     prefix: str = "",
-    treated: "Adjusted | None" = None,
+    treated: "AdjustedNetwork | None" = None,
 ) -> str:
     """The whole page.
 
@@ -73,7 +73,7 @@ def network_report(
     return page(f"catseye: {name}", "\n".join(body))
 
 
-def _summary(found: Findings, treated: "Adjusted | None") -> str:
+def _summary(found: Findings, treated: "AdjustedNetwork | None") -> str:
     axis = found.ellipsoid.semi_axes[:, 0]
     known = axis[np.isfinite(axis) & (axis > 0.0)]
     good, text = verdict(found)
@@ -117,13 +117,13 @@ def network_cards(found: Findings) -> list[str]:
     ]
 
 
-def _network(drawn: dict[str, Drawn]) -> str:
+def _network(drawn: dict[str, CaptionedFigure]) -> str:
     return section(
         "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
     )
 
 
-def _observations(found: Findings, drawn: dict[str, Drawn], file: str) -> str:
+def _observations(found: Findings, drawn: dict[str, CaptionedFigure], file: str) -> str:
     rows = found.table.worst_first[:WORST]
     total = len(found.table)
     told = (
@@ -173,7 +173,7 @@ def observation_rows(found: Findings, rows: Sequence[int] | np.ndarray) -> str:
     return table(columns, lines, "tnntnnnnnt")
 
 
-def _reliability(found: Findings, drawn: dict[str, Drawn]) -> str:
+def _reliability(found: Findings, drawn: dict[str, CaptionedFigure]) -> str:
     if not found.answered:
         return section("reliability", CONTENTS["reliability"], paragraph("Unknown without an answer."))
     rows = np.flatnonzero(found.table.active & ~found.table.checked)

@@ -10,7 +10,7 @@ from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.passage import Passage
 
 if TYPE_CHECKING:
-    from catseye.reduction.network import Adjusted
+    from catseye.reduction.network import AdjustedNetwork
 
 NAMED = 5  # names in a sentence at most
 WEAK = 5.0  # times the usual uncertainty: such a point is named
@@ -95,7 +95,7 @@ def passages(found: Findings) -> list[Passage]:
     return told
 
 
-def treatment_passages(treated: "Adjusted", found: Findings) -> list[Passage]:
+def treatment_passages(treated: "AdjustedNetwork", found: Findings) -> list[Passage]:
     """What was left out or weighed down, and which uncertainties the observations themselves ask for.
 
     treated   how observations were treated
@@ -119,7 +119,7 @@ def treatment_passages(treated: "Adjusted", found: Findings) -> list[Passage]:
     return told + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
 
 
-def _claims(treated: "Adjusted") -> str:
+def _claims(treated: "AdjustedNetwork") -> str:
     """Estimated components of variance; those of rangers are squares of a constant, m, and of a ratio."""
     components = treated.components
     assert components is not None

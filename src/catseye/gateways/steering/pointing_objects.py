@@ -7,7 +7,7 @@ import numpy as np
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.stations import Pointings
-from catseye.reduction.steering.guard import Verdict
+from catseye.reduction.steering.guard import GuardAnswer
 from catseye.reduction.steering.sighting import Sighting
 from catseye.reduction.steering.visibility import Visibility
 
@@ -66,7 +66,7 @@ def _sighting_object(seen: Sighting) -> dict[str, Any]:
     return item
 
 
-def _verdict_object(verdict: Verdict) -> dict[str, Any]:
+def _verdict_object(verdict: GuardAnswer) -> dict[str, Any]:
     return {
         "allowed": verdict.allowed,
         "reason": verdict.reason,

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
-from catseye.simulator.servo.axis import Trace
+from catseye.simulator.servo.axis import AxisTrace
 from catseye.simulator.servo.tuning import Plant
 
 WIDTH = 9.4  # inches, as all figures
 
 
-def move_figure(trace: Trace, *, target: float, plant: Plant | None = None) -> str:
+def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) -> str:
     """Position, velocity, following error and drive of one move, as SVG text.
 
     trace    of the move, from its start
@@ -47,7 +47,7 @@ def move_figure(trace: Trace, *, target: float, plant: Plant | None = None) -> s
 
 
 def step_figure(
-    responses: Mapping[str, Trace], *, target: float, linear: Mapping[str, NDArray[np.float64]] | None = None
+    responses: Mapping[str, AxisTrace], *, target: float, linear: Mapping[str, NDArray[np.float64]] | None = None
 ) -> str:
     """Step responses beside one another, as SVG text: the first moments, and what is left at the end.
 
@@ -81,7 +81,7 @@ def step_figure(
         return svg(figure)
 
 
-def _speed(trace: Trace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _speed(trace: AxisTrace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times and mean speeds, counts/s, over about 10 ms of encoder readings."""
     sample = float(trace.time[1] - trace.time[0])
     n = max(1, min(round(0.01 / sample), len(trace.time) - 1))
@@ -89,7 +89,7 @@ def _speed(trace: Trace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return 0.5 * (trace.time[n:] + trace.time[:-n]), speed
 
 
-def _asked(trace: Trace, plant: Plant) -> NDArray[np.float64]:
+def _asked(trace: AxisTrace, plant: Plant) -> NDArray[np.float64]:
     """Converter steps that an axis needs to do as its profile says."""
     acceleration = np.gradient(trace.velocity, trace.time[1] - trace.time[0])
     return (acceleration + plant.decay * trace.velocity) / plant.gain + plant.friction * np.sign(trace.velocity)

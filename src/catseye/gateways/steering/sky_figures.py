@@ -14,10 +14,10 @@ from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYL
 from catseye.geometry.clearance.keep_out import TOUCH
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
 from catseye.geometry.mirror.pointing import ray
-from catseye.geometry.mirror.slew import Slew, trapezoid
+from catseye.geometry.mirror.slew import MirrorSlew, trapezoid
 from catseye.geometry.sky.sun import altitude_azimuth
 from catseye.geometry.sky.time_tag import utc_text
-from catseye.reduction.site.earth_rotation import Place, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, sun_at
 from catseye.reduction.steering.guard import Guard
 from catseye.reduction.steering.reroute import Route
 
@@ -92,7 +92,7 @@ def _map(ax, guard: Guard, mjd: float) -> None:
         _sun_way(ax, guard.place, mjd)
 
 
-def _sun_way(ax, place: Place, mjd: float) -> None:
+def _sun_way(ax, place: FramePlace, mjd: float) -> None:
     """The Sun from half a day before to half a day after, a dot and its hour (UTC) at each full hour."""
     way = _on_map(sun_at(mjd + np.linspace(-0.5, 0.5, 289), place).direction)
     ax.plot(way[:, 0], way[:, 1], color=SUN, lw=1.0, alpha=0.8, zorder=3)
@@ -174,7 +174,7 @@ def _ways(
             yield np.asarray(at, dtype=float)[None], {**spot, "label": label}
 
 
-def _along(move: Slew) -> NDArray[np.float64]:
+def _along(move: MirrorSlew) -> NDArray[np.float64]:
     """Counts (n, 2) of one move."""
     return move.position(np.linspace(0.0, float(move.total), STEPS))
 

@@ -5,7 +5,7 @@ import numpy as np
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.mirror.search_pattern import count_size
 from catseye.reduction.steering.spot_fit import Spot
-from catseye.reduction.steering.tracking import Following, Track
+from catseye.reduction.steering.tracking import CountTrack, Following
 from catseye.reduction.steering.visibility import Sight, Visibility
 
 SIGHTS = {
@@ -20,7 +20,7 @@ MOST_LABELS = 60  # on an axis
 ELLIPSE = 3.0  # standard deviations drawn
 
 
-def miss_figure(track: Track, misses: np.ndarray, shares: np.ndarray, limit: float = 1e-3) -> str:
+def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, limit: float = 1e-3) -> str:
     """SVG: how far the beams pass their targets, over the track; the worst pair, the median, and the limit.
 
     track     that was followed

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
-from catseye.coordinator.journal.entries import Solution
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
@@ -165,7 +165,7 @@ def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: 
         for _, entry in reader.events(number, kinds=["solutions", "weather"], buffers=False):
             if isinstance(entry, LiveWeather) and np.isfinite(entry.temperature_c):
                 weather.append((entry.ticks / TICKS_PER_DAY, entry.temperature_c))
-            elif isinstance(entry, Solution):
+            elif isinstance(entry, EpochSolution):
                 mjd = entry.ticks / TICKS_PER_DAY
                 if epochs and (mjd - epochs[-1].mjd) * SECONDS_PER_DAY < every_s:
                     continue
@@ -182,7 +182,7 @@ def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: 
     return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes))
 
 
-def _solved(entry: Solution, mjd: float) -> PlacesEpoch | None:
+def _solved(entry: EpochSolution, mjd: float) -> PlacesEpoch | None:
     answer, q = entry.answer, entry.covariance
     names, x = answer.get("names"), answer.get("x")
     numbers = (answer.get("azimuth"), answer.get("elevation"))

@@ -9,7 +9,7 @@ from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, 
 from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.lookup import HYSTERESIS, Lookup
-from catseye.reduction.surface.shape import Aperture, Expansion, ShapeSettings
+from catseye.reduction.surface.shape import Expansion, LitAperture, ShapeSettings
 
 LEVELS = 21
 MOST_NAMED = 60  # prisms whose names fit
@@ -17,7 +17,7 @@ PANELS = 6  # terms of an elevation figure
 
 
 def surface_map(
-    local: np.ndarray, value: np.ndarray, aperture: Aperture, label: str, names: tuple[str, ...] = ()
+    local: np.ndarray, value: np.ndarray, aperture: LitAperture, label: str, names: tuple[str, ...] = ()
 ) -> str:
     """Values at prisms, and between them by plain triangles.
 
@@ -47,7 +47,7 @@ def surface_map(
         return svg(figure)
 
 
-def actuator_map(found: Actuators, aperture: Aperture) -> str:
+def actuator_map(found: Actuators, aperture: LitAperture) -> str:
     """Corrections of all actuators, and their standard uncertainty."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
@@ -67,7 +67,7 @@ def actuator_map(found: Actuators, aperture: Aperture) -> str:
         return svg(figure)
 
 
-def _edge(ax: Any, aperture: Aperture) -> None:
+def _edge(ax: Any, aperture: LitAperture) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     (x, y), radius = aperture.centre, aperture.radius
     ax.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=FAINT, lw=0.9, ls="--")

@@ -11,7 +11,7 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
-from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.site.folder import SiteFolder
@@ -158,16 +158,16 @@ def _table(
     return Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c), folder.hashes
 
 
-def _of_kind(columns: Columns) -> Columns:
+def _of_kind(columns: TextColumns) -> TextColumns:
     """The rows of a reduction's coordinates that are prisms of the dish."""
     rows = [k for k, kind in enumerate(columns.cells["kind"]) if kind == DISH]
     if not rows:
         raise refusal(columns.file, f"has no row of kind {DISH!r} (expected prisms of the dish)")
     cells = {name: [values[k] for k in rows] for name, values in columns.cells.items()}
-    return Columns(columns.file, cells, [columns.lines[k] for k in rows])
+    return TextColumns(columns.file, cells, [columns.lines[k] for k in rows])
 
 
-def _names(columns: Columns) -> tuple[str, ...]:
+def _names(columns: TextColumns) -> tuple[str, ...]:
     names = columns.cells["point"]
     seen: set[str] = set()
     for row, name in enumerate(names):
@@ -177,13 +177,13 @@ def _names(columns: Columns) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _spread(columns: Columns, name: str) -> np.ndarray:
+def _spread(columns: TextColumns, name: str) -> np.ndarray:
     values = columns.numbers(name)
     columns.check(name, (values > 0.0) & (values <= LARGEST_U_MM), f"above 0 to {LARGEST_U_MM:g} mm")
     return values * MILLIMETRE
 
 
-def _covariance(columns: Columns, single: bool) -> np.ndarray:
+def _covariance(columns: TextColumns, single: bool) -> np.ndarray:
     """(k, 3, 3) m^2."""
     spreads: Sequence[str] = ("u_mm",) * 3 if single else SPREADS
     u = np.column_stack([_spread(columns, name) for name in spreads])

@@ -11,7 +11,7 @@ from catseye.optics.zernike import Numbering, number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
-from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, Shape
+from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, SurfaceShape
 
 FORMAT = "catseye-surface-1"
 TAKEN = 0.5  # share of a term's square from which a note is due
@@ -23,7 +23,7 @@ def root(square: float) -> float | None:
     return float(np.sqrt(square)) if square >= 0.0 else None
 
 
-def shape_object(shape: Shape) -> dict[str, Any]:
+def shape_object(shape: SurfaceShape) -> dict[str, Any]:
     """One epoch."""
     fit = shape.fit
     u = np.sqrt(np.diag(fit.deviation_covariance))
@@ -176,7 +176,7 @@ def actuators_object(found: Actuators) -> dict[str, Any]:
     }
 
 
-def shape_passages(shape: Shape) -> list[Passage]:
+def shape_passages(shape: SurfaceShape) -> list[Passage]:
     """What a person should know of one epoch, in order."""
     fit, square = shape.fit, shape.square
     u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
@@ -206,7 +206,7 @@ def shape_passages(shape: Shape) -> list[Passage]:
     return made
 
 
-def _pose(shape: Shape) -> str:
+def _pose(shape: SurfaceShape) -> str:
     fit, u = shape.fit, np.sqrt(np.diag(shape.fit.covariance))
     parts = []
     if "vertex" in fit.free:
@@ -288,7 +288,7 @@ def actuators_passage(found: Actuators) -> Passage:
     )
 
 
-def term_lines(shapes: Sequence[Shape], change: Change | None, lookup: Lookup | None) -> list[str]:
+def term_lines(shapes: Sequence[SurfaceShape], change: Change | None, lookup: Lookup | None) -> list[str]:
     """A line a Zernike term: of the change, of the model with elevation, or of the only epoch; mm."""
     shape = shapes[0]
     numbering = shape.settings.numbering

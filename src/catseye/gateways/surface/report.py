@@ -17,14 +17,14 @@ from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
-from catseye.reduction.surface.shape import Expansion, MeanSquare, Shape, ShapeSettings
+from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceResult:
     """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators."""
 
-    shapes: tuple[Shape, ...]
+    shapes: tuple[SurfaceShape, ...]
     change: Change | None = None
     lookup: Lookup | None = None
     actuators: Actuators | None = None
@@ -70,7 +70,7 @@ def _cards(square: MeanSquare, extra: list[str]) -> str:
     return f'<div class="cards">{first}{"".join(extra)}</div>'
 
 
-def _shape(shape: Shape, epoch: int, of: int) -> str:
+def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
     title = "The dish" if of == 1 else f"Epoch {epoch}: {shape.prisms.source}"
     gains = [
         card(f"Gain at {g.frequency / 1e9:g} GHz", f"{g.ruze:.3f}", f"± {g.u_ruze:.3f} of the perfect surface's, Ruze")
@@ -168,7 +168,7 @@ def _lookup(lookup: Lookup) -> str:
     )
 
 
-def _actuators(found: Actuators, shape: Shape) -> str:
+def _actuators(found: Actuators, shape: SurfaceShape) -> str:
     return section(
         "actuators",
         "Actuators",

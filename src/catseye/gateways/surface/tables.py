@@ -11,7 +11,7 @@ from catseye.optics.zernike import Numbering, number
 from catseye.records.panels.actuators import ActuatorCorrection
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
-from catseye.reduction.surface.shape import Expansion, Shape
+from catseye.reduction.surface.shape import Expansion, SurfaceShape
 
 PRISMS = ("point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm", "half_path_mm", "weight")
 ZERNIKE = (
@@ -21,7 +21,7 @@ ZERNIKE = (
 ACTUATOR_MARK = ",".join(ActuatorCorrection.model_fields)  # the header, by which a file is known as ours
 
 
-def prisms_csv(shape: Shape) -> str:
+def prisms_csv(shape: SurfaceShape) -> str:
     """A row a prism, in the fitted paraboloid's frame; the weight is its share of the illumination."""
     u = np.sqrt(np.diag(shape.fit.deviation_covariance)) / MILLIMETRE
     cells = zip(

@@ -23,7 +23,7 @@ RINGS, SPOKES = 24, 64  # of the aperture: quadrature good to 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Aperture:
+class ApertureNodes:
     """Nodes of a quadrature over a round aperture of a paraboloid.
 
     focal_length   m
@@ -48,7 +48,7 @@ class Aperture:
         return np.asarray((self.weight[:, None] * self.inside).T @ np.asarray(way, dtype=float) / moment)
 
 
-def aperture(focal_length: float, centre: ArrayLike, radius: float) -> Aperture:
+def aperture(focal_length: float, centre: ArrayLike, radius: float) -> ApertureNodes:
     """Gauss-Legendre rings and even spokes over a round aperture.
 
     focal_length   m, of the paraboloid, above 0
@@ -62,10 +62,10 @@ def aperture(focal_length: float, centre: ArrayLike, radius: float) -> Aperture:
     inside = (rho[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)).reshape(-1, 2)
     xy = inside + np.asarray(centre, dtype=float)
     surface = np.column_stack([xy, np.sum(xy**2, axis=1) / (4.0 * focal_length)])
-    return Aperture(focal_length, inside, surface, np.repeat(weights * rho, SPOKES))
+    return ApertureNodes(focal_length, inside, surface, np.repeat(weights * rho, SPOKES))
 
 
-def prime_focus_tilt(of: Aperture) -> Array:
+def prime_focus_tilt(of: ApertureNodes) -> Array:
     """Slopes (2, 3) of the wavefront, rad/m, by a shift of a feed at the prime focus. Source: the top of this file."""
     way = of.focus - of.surface
     return of.tilt(way / np.linalg.norm(way, axis=1)[:, None])
@@ -91,7 +91,7 @@ class Gregorian:
         """(3,) m, F2, from F1 (3,)."""
         return focus + self.interfocal * np.array([0.0, -np.sin(self.tilt), -np.cos(self.tilt)])
 
-    def reflections(self, of: Aperture) -> Array:
+    def reflections(self, of: ApertureNodes) -> Array:
         """(m, 3) m, where the rays of an aperture meet the ellipsoid after they have crossed in F1.
 
         |P - F1| + |P - F2| = 2a along the direction v from F1 at the angle q to F2 gives
@@ -110,7 +110,7 @@ class Gregorian:
         return np.asarray(of.focus + v * ((a * a - c * c) / (a - c * (v @ axis)))[:, None])
 
 
-def subreflector_tilt(of: Aperture, gregorian: Gregorian, pivot: ArrayLike) -> Array:
+def subreflector_tilt(of: ApertureNodes, gregorian: Gregorian, pivot: ArrayLike) -> Array:
     """Slopes (2, 6) of the wavefront by a subreflector's shift (rad/m) and its turn (rad/rad) about a pivot (3,) m."""
     p = gregorian.reflections(of)
     back, on = p - of.surface, p - gregorian.second_focus(of.focus)
@@ -120,7 +120,7 @@ def subreflector_tilt(of: Aperture, gregorian: Gregorian, pivot: ArrayLike) -> A
     return of.tilt(np.concatenate([normal, turn], axis=1))
 
 
-def receiver_tilt(of: Aperture, gregorian: Gregorian) -> Array:
+def receiver_tilt(of: ApertureNodes, gregorian: Gregorian) -> Array:
     """Slopes (2, 3) of the wavefront, rad/m, by a shift of a receiver at the second focus."""
     way = gregorian.second_focus(of.focus) - gregorian.reflections(of)
     return of.tilt(way / np.linalg.norm(way, axis=1)[:, None])

@@ -35,7 +35,7 @@ SMALL_ANGLE = 1e-4  # rad: below it the series of the left Jacobian is exact to 
 
 
 @dataclass(frozen=True, eq=False)
-class Posture:
+class TelescopePosture:
     """How the telescope stands, and how warm its structure is; arrays (...) that broadcast.
 
     azimuth         rad, clockwise from north
@@ -63,7 +63,7 @@ class Validity:
     elevation: tuple[float, float]
     temperature_c: tuple[float, float]
 
-    def refuse_outside(self, posture: Posture) -> None:
+    def refuse_outside(self, posture: TelescopePosture) -> None:
         """Raises ValidityError for the first posture outside: a model is not extrapolated."""
         slack = 1e-12  # rad or degrees C: rounding of a conversion from degrees is not outside
         for name, value, (low, high), scale, unit in (
@@ -80,16 +80,16 @@ class Validity:
                 )
 
 
-def factors(term: str) -> list[Callable[[Posture, float], NDArray[np.float64]]]:
+def factors(term: str) -> list[Callable[[TelescopePosture, float], NDArray[np.float64]]]:
     """The functions of posture and reference temperature whose product a term is.
 
     Raises ValidityError for a factor that is not known.
 
-    >>> posture = Posture(0.0, np.pi / 6, 25.0)
+    >>> posture = TelescopePosture(0.0, np.pi / 6, 25.0)
     >>> [float(f(posture, 15.0).round(12)) for f in factors("sinE*t^2")]
     [0.5, 100.0]
     """
-    found: list[Callable[[Posture, float], NDArray[np.float64]]] = []
+    found: list[Callable[[TelescopePosture, float], NDArray[np.float64]]] = []
     for factor in term.replace(" ", "").split("*"):
         wave, power = WAVE.fullmatch(factor), POWER.fullmatch(factor)
         if wave:
@@ -104,15 +104,15 @@ def factors(term: str) -> list[Callable[[Posture, float], NDArray[np.float64]]]:
     return found
 
 
-def _wave(function: np.ufunc, multiple: int, angle: str) -> Callable[[Posture, float], NDArray[np.float64]]:
-    def value(posture: Posture, _reference_c: float) -> NDArray[np.float64]:
+def _wave(function: np.ufunc, multiple: int, angle: str) -> Callable[[TelescopePosture, float], NDArray[np.float64]]:
+    def value(posture: TelescopePosture, _reference_c: float) -> NDArray[np.float64]:
         return function(multiple * np.asarray(posture.azimuth if angle == "A" else posture.elevation, dtype=float))
 
     return value
 
 
-def _power(quantity: str, exponent: int) -> Callable[[Posture, float], NDArray[np.float64]]:
-    def value(posture: Posture, reference_c: float) -> NDArray[np.float64]:
+def _power(quantity: str, exponent: int) -> Callable[[TelescopePosture, float], NDArray[np.float64]]:
+    def value(posture: TelescopePosture, reference_c: float) -> NDArray[np.float64]:
         if quantity == "E":
             return np.asarray(posture.elevation, dtype=float) ** exponent
         return (np.asarray(posture.temperature_c, dtype=float) - reference_c) ** exponent
@@ -121,7 +121,7 @@ def _power(quantity: str, exponent: int) -> Callable[[Posture, float], NDArray[n
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class PostureTerms:
     """Functions of posture given by name.
 
     names         such as ("1", "sinE", "cosE", "t")
@@ -138,7 +138,7 @@ class Terms:
     def __len__(self) -> int:
         return len(self.names)
 
-    def rows(self, posture: Posture) -> NDArray[np.float64]:
+    def rows(self, posture: TelescopePosture) -> NDArray[np.float64]:
         """Their values (..., k)."""
         columns = []
         for name in self.names:
@@ -150,7 +150,7 @@ class Terms:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class KnotTable:
     """Weights of the knots of a grid over elevation and temperature.
 
     elevation       (n,), rad, rising
@@ -179,7 +179,7 @@ class Table:
         ends = (float(warm[0]), float(warm[-1])) if len(warm) > 1 else (-np.inf, np.inf)
         return Validity((float(self.elevation[0]), float(self.elevation[-1])), ends)
 
-    def rows(self, posture: Posture) -> NDArray[np.float64]:
+    def rows(self, posture: TelescopePosture) -> NDArray[np.float64]:
         """Weights (..., n m), elevation by elevation, of the table's values."""
         self.limits.refuse_outside(posture)
         by_elevation = _weights(self.elevation, posture.elevation)
@@ -200,7 +200,7 @@ def _weights(knots: NDArray[np.float64], at: ArrayLike) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PostureMotion:
     """Shift and turn of a frame or group as functions of posture.
 
     basis          Terms or Table, k functions
@@ -210,7 +210,7 @@ class Motion:
     u              (6,), m and rad, above zero: what the model leaves in any one posture, each time anew
     """
 
-    basis: Terms | Table
+    basis: PostureTerms | KnotTable
     coefficients: NDArray[np.float64]
     pivot: NDArray[np.float64]
     u: NDArray[np.float64]
@@ -224,11 +224,11 @@ class Motion:
             raise ValidityError(f"motion of {k} functions has shapes {shapes}, expected (6, {k}), (3,), (6,), (6k, 6k)")
         object.__setattr__(self, "covariance", covariance)
 
-    def six(self, posture: Posture) -> NDArray[np.float64]:
+    def six(self, posture: TelescopePosture) -> NDArray[np.float64]:
         """Shift and turn (..., 6), m and rad."""
         return self.basis.rows(posture) @ self.coefficients.T
 
-    def six_covariance(self, posture: Posture) -> NDArray[np.float64]:
+    def six_covariance(self, posture: TelescopePosture) -> NDArray[np.float64]:
         """Covariance (..., 6, 6) of shift and turn in one posture: of the coefficients, and what is left in each."""
         rows = self.basis.rows(posture)
         k = len(self.basis)

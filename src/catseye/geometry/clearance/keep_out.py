@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
-from catseye.geometry.mirror.pointing import Station, beam
-from catseye.geometry.mirror.slew import Slew
+from catseye.geometry.mirror.pointing import MirrorStation, beam
+from catseye.geometry.mirror.slew import MirrorSlew
 
 BOXES_NEAR = 0.05  # rad: further off, a path asks for the sphere about a box, which is quicker
 COMPILED_FROM = 5000  # moves: loading numba takes longer than the plain form for these
@@ -52,7 +52,7 @@ class Entries:
 
 
 @dataclass(frozen=True, eq=False)
-class Cone:
+class ConeZone:
     """Directions nearer than `half_angle` to a direction that moves evenly from `direction` to `later` during a path.
 
     direction     (..., 3), ground, any length; one for each path
@@ -94,16 +94,16 @@ class Cone:
         # A point that runs evenly along the chord turns fastest half-way, by 2 tan(a/2) where the arc has a.
         return 2.0 * np.tan(0.5 * _angle(self.direction, self.later)) / np.where(total > 0.0, total, np.inf)
 
-    def __getitem__(self, index: Any) -> "Cone":
+    def __getitem__(self, index: Any) -> "ConeZone":
         """Of some of the paths."""
         direction = self.direction if self.direction.ndim == 1 else self.direction[index]
         later = self.later if self.later is None or self.later.ndim == 1 else self.later[index]
         half = self.half_angle if self.half_angle.ndim == 0 else self.half_angle[index]
-        return Cone(direction, half, later, self.name)
+        return ConeZone(direction, half, later, self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class BoxZone:
     """A solid with edges along x, y, z, turned about its vertical middle axis.
 
     centre    (3,), m, ground
@@ -164,7 +164,7 @@ class Outline:
     radius: float
 
     @classmethod
-    def of(cls, box: Box, origin: NDArray[np.float64]) -> "Outline":
+    def of(cls, box: BoxZone, origin: NDArray[np.float64]) -> "Outline":
         """As seen from origin (3,), m, ground."""
         to_box = _upright(box.turn)
         at, half = to_box @ (origin - box.centre), 0.5 * box.size
@@ -189,7 +189,7 @@ class Outline:
         )
 
     def clearance(self, direction: NDArray[np.float64], exact_below: float = np.inf) -> NDArray[np.float64]:
-        """As `Box.clearance`; where it is above `exact_below`, rad, perhaps less: that of the sphere about the box."""
+        """As `BoxZone.clearance`; where it is above `exact_below`, rad, perhaps less: that of the box's sphere."""
         if self.near == 0.0:
             return np.zeros(direction.shape[:-1])
         if self.near > self.length:
@@ -216,7 +216,7 @@ class Outline:
         return np.where(_hits(self.at, d, self.half, self.length), 0.0, least)
 
 
-Zone = Cone | Box
+Zone = ConeZone | BoxZone
 
 
 def servo_margin(counts: ArrayLike) -> float:
@@ -234,7 +234,7 @@ def servo_margin(counts: ArrayLike) -> float:
 def clearances(
     zones: Sequence[Zone], origin: ArrayLike, direction: ArrayLike, exact_below: float = np.inf
 ) -> NDArray[np.float64]:
-    """Clearance of beams (..., zones), rad, at the start of their paths; see `Cone` and `Box`.
+    """Clearance of beams (..., zones), rad, at the start of their paths; see `ConeZone` and `BoxZone`.
 
     zones        of which a cone has one direction, or one for each beam
     origin       (3,), m, ground: the scan point
@@ -243,13 +243,18 @@ def clearances(
     """
     d = np.asarray(direction, dtype=float)
     shape = d.shape[:-1]
-    each = [z.clearance(d) if isinstance(z, Cone) else z.clearance(origin, d, exact_below) for z in zones]
+    each = [z.clearance(d) if isinstance(z, ConeZone) else z.clearance(origin, d, exact_below) for z in zones]
     each = [np.broadcast_to(one, shape) for one in each]
     return np.stack(each, axis=-1) if each else np.zeros((*shape, 0))
 
 
 def first_entry(
-    station: Station, slews: Slew, zones: Sequence[Zone], margin: float = 0.0, *, compiled: bool | None = None
+    station: MirrorStation,
+    slews: MirrorSlew,
+    zones: Sequence[Zone],
+    margin: float = 0.0,
+    *,
+    compiled: bool | None = None,
 ) -> Entries:
     """When paths of one mirror first come into a zone, with nothing between two looks unseen.
 
@@ -272,8 +277,8 @@ def first_entry(
     if zones and (slews.shape[0] >= COMPILED_FROM if compiled is None else compiled):
         return _compiled_entries(station, slews, zones, margin)
     n, total = slews.shape[0], slews.total
-    views = [z if isinstance(z, Cone) else Outline.of(z, station.scan_point) for z in zones]
-    drift = [v.rate(total) if isinstance(v, Cone) else np.zeros(n) for v in views]
+    views = [z if isinstance(z, ConeZone) else Outline.of(z, station.scan_point) for z in zones]
+    drift = [v.rate(total) if isinstance(v, ConeZone) else np.zeros(n) for v in views]
     status, looks = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64)
     entry, zone = np.full(n, np.nan), np.full(n, -1)
     at, now = np.arange(n if zones else 0), np.zeros(n if zones else 0)
@@ -286,7 +291,7 @@ def first_entry(
         gap, step = np.full(len(at), np.inf), np.full(len(at), np.inf)
         nearest = np.zeros(len(at), dtype=int)
         for i, view in enumerate(views):
-            if isinstance(view, Cone):
+            if isinstance(view, ConeZone):
                 one = view[at].clearance(direction, share) - margin
             else:
                 one = view.clearance(direction, margin + BOXES_NEAR) - margin
@@ -303,14 +308,14 @@ def first_entry(
     return Entries(status, entry, zone, looks)
 
 
-def _compiled_entries(station: Station, slews: Slew, zones: Sequence[Zone], margin: float) -> Entries:
+def _compiled_entries(station: MirrorStation, slews: MirrorSlew, zones: Sequence[Zone], margin: float) -> Entries:
     """`first_entry` of many moves by the kernel."""
     from catseye.geometry.clearance.keep_out_kernel import first_entries
 
     n, total = slews.shape[0], slews.total
-    cones = [z for z in zones if isinstance(z, Cone)]
-    views = [Outline.of(z, station.scan_point) for z in zones if isinstance(z, Box)]
-    order = sorted(range(len(zones)), key=lambda i: isinstance(zones[i], Box))
+    cones = [z for z in zones if isinstance(z, ConeZone)]
+    views = [Outline.of(z, station.scan_point) for z in zones if isinstance(z, BoxZone)]
+    order = sorted(range(len(zones)), key=lambda i: isinstance(zones[i], BoxZone))
     axes = np.zeros((2, len(cones), n, 3))
     for i, cone in enumerate(cones):
         axes[0, i], axes[1, i] = cone.direction, cone.direction if cone.later is None else cone.later

@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class SolidBox:
     """A box turned about z.
 
     centre   (3,) m
     size     (3,) m, above 0: full lengths along its own axes
     turn     rad: of its x axis from the frame's, by the right hand about z
 
-    >>> Box((5.0, 0.0, 0.0), (2.0, 2.0, 2.0)).first_hit([0.0, 0.0, 0.0], [10.0, 0.0, 0.0]).item()
+    >>> SolidBox((5.0, 0.0, 0.0), (2.0, 2.0, 2.0)).first_hit([0.0, 0.0, 0.0], [10.0, 0.0, 0.0]).item()
     0.4
     """
 
@@ -57,19 +57,19 @@ class Box:
         high = np.where(along, np.where(inside, np.inf, -np.inf), high)
         return _first(low.max(axis=-1), high.min(axis=-1))
 
-    def grown(self, margin: float) -> "Box":
+    def grown(self, margin: float) -> "SolidBox":
         """The box with every face moved out."""
         return replace(self, size=np.asarray(self.size, dtype=float) + 2.0 * margin)
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
+class SolidSphere:
     """A ball.
 
     centre   (3,) m
     radius   m, above 0
 
-    >>> Sphere((5.0, 0.0, 0.0), 1.0).first_hit([0.0, 0.0, 0.0], [10.0, 0.0, 0.0]).item()
+    >>> SolidSphere((5.0, 0.0, 0.0), 1.0).first_hit([0.0, 0.0, 0.0], [10.0, 0.0, 0.0]).item()
     0.4
     """
 
@@ -90,19 +90,19 @@ class Sphere:
         low, high = _between_roots(_dot(d, d), _dot(p, d), _dot(p, p) - self.radius**2)
         return _first(low, high)
 
-    def grown(self, margin: float) -> "Sphere":
+    def grown(self, margin: float) -> "SolidSphere":
         """The ball with a larger radius."""
         return replace(self, radius=self.radius + margin)
 
 
 @dataclass(frozen=True, eq=False)
-class Cone:
+class SolidCone:
     """A round bar, a tower, a cone or a piece of one: between two flat ends square to its axis.
 
     start, end                (3,) m, centres of its ends, apart
     start_radius, end_radius  m, 0 or more, not both 0; equal: a cylinder
 
-    >>> tower = Cone((5.0, 0.0, -1.0), (5.0, 0.0, 9.0), 1.0, 1.0)
+    >>> tower = SolidCone((5.0, 0.0, -1.0), (5.0, 0.0, 9.0), 1.0, 1.0)
     >>> tower.first_hit([0.0, 0.0, 0.0], [[10.0, 0.0, 0.0], [10.0, 0.0, 30.0]]).tolist()
     [0.4, inf]
     """
@@ -143,14 +143,14 @@ class Cone:
         a, b, c = _dot(d_out, d_out) - d_r**2, _dot(p_out, d_out) - r * d_r, _dot(p_out, p_out) - r**2
         return _first_below(a, b, c, np.maximum(low, 0.0), np.minimum(high, 1.0))
 
-    def grown(self, margin: float) -> "Cone":
+    def grown(self, margin: float) -> "SolidCone":
         """The solid with its ends moved out and its side by at least the margin."""
         foot, top = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
         height = float(np.linalg.norm(top - foot))
         slope = (self.end_radius - self.start_radius) / height
         out = margin * (np.hypot(1.0, slope) + abs(slope))  # square to the side, and what the longer ends take off
         step = margin * (top - foot) / height
-        return Cone(foot - step, top + step, self.start_radius + out, self.end_radius + out)
+        return SolidCone(foot - step, top + step, self.start_radius + out, self.end_radius + out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ class Dish:
         )
 
 
-Solid = Box | Sphere | Cone | Dish
+Solid = SolidBox | SolidSphere | SolidCone | Dish
 
 
 def _first(low: Array, high: Array) -> Array:

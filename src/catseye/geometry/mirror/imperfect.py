@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, HALF_TURN
 from catseye.geometry.mirror.mirror_path import direction_angles
-from catseye.geometry.mirror.pointing import Ray, Station, in_mirror_axes
+from catseye.geometry.mirror.pointing import MirrorBeam, MirrorStation, in_mirror_axes
 
 ITERATIONS = 60  # each gains a factor of the largest tilt, or of offset over distance
 SETTLED = 2e-15  # of a direction
@@ -60,7 +60,7 @@ class Imperfections:
         return any(np.any(part) for part in (self.axes, self.tilts, self.azimuth_waves, self.elevation_waves))
 
 
-def imperfect_ray(station: Station, imperfections: Imperfections, at_counts: ArrayLike) -> Ray:
+def imperfect_ray(station: MirrorStation, imperfections: Imperfections, at_counts: ArrayLike) -> MirrorBeam:
     """The beam at encoder counts: the point where it leaves the face, m, and its direction, both (..., 3), ground.
 
     station      of batch shape that broadcasts with the counts'
@@ -73,11 +73,11 @@ def imperfect_ray(station: Station, imperfections: Imperfections, at_counts: Arr
     leaves, u = _beam(_mount(station, imperfections, at_counts), imperfections)
     to_ground = np.swapaxes(station.mirror_from_ground, -1, -2)
     turned = [np.einsum("...ij,...j->...i", to_ground, v) for v in (leaves, u)]
-    return Ray(station.scan_point + turned[0], turned[1])
+    return MirrorBeam(station.scan_point + turned[0], turned[1])
 
 
 def imperfect_counts(
-    station: Station, imperfections: Imperfections, points: ArrayLike, *, prime: ArrayLike = False
+    station: MirrorStation, imperfections: Imperfections, points: ArrayLike, *, prime: ArrayLike = False
 ) -> NDArray[np.float64]:
     """Encoder counts (..., 2) at which the beam meets points.
 
@@ -109,7 +109,9 @@ def imperfect_counts(
     return np.where(settled[..., None], _read(station, imperfections, mount), np.nan)
 
 
-def imperfect_face_counts(station: Station, imperfections: Imperfections, points: ArrayLike) -> NDArray[np.float64]:
+def imperfect_face_counts(
+    station: MirrorStation, imperfections: Imperfections, points: ArrayLike
+) -> NDArray[np.float64]:
     """Encoder counts (..., 2) at which the mirror's face looks at points: autocollimation, direct pointing.
 
     station, points    as for `imperfect_counts`
@@ -132,7 +134,7 @@ def imperfect_face_counts(station: Station, imperfections: Imperfections, points
 
 
 def imperfect_back_counts(
-    station: Station, imperfections: Imperfections, face_counts: ArrayLike
+    station: MirrorStation, imperfections: Imperfections, face_counts: ArrayLike
 ) -> NDArray[np.float64]:
     """Elevation counts (...) of the back retroreflector that looks where the face does at `face_counts` (..., 2).
 
@@ -168,7 +170,7 @@ def _beam(mount: NDArray, imperfections: Imperfections) -> tuple[NDArray, NDArra
         return start + along[..., None] * d, d - 2.0 * facing[..., None] * m
 
 
-def _mount(station: Station, imperfections: Imperfections, at_counts: ArrayLike) -> NDArray:
+def _mount(station: MirrorStation, imperfections: Imperfections, at_counts: ArrayLike) -> NDArray:
     """Theta', Phi' (..., 2), rad, of the mount from what its encoders read."""
     n = np.asarray(at_counts, dtype=float)
     if n.shape[-1:] != (2,):
@@ -185,7 +187,7 @@ def _mount(station: Station, imperfections: Imperfections, at_counts: ArrayLike)
     return np.stack(np.broadcast_arrays(turns[0], 2.0 * turns[1]), axis=-1)
 
 
-def _read(station: Station, imperfections: Imperfections, mount: NDArray) -> NDArray:
+def _read(station: MirrorStation, imperfections: Imperfections, mount: NDArray) -> NDArray:
     """Counts (..., 2) that the encoders read with the mount at Theta', Phi'."""
     turns = (mount[..., 0], 0.5 * mount[..., 1])
     waves = (imperfections.azimuth_waves, imperfections.elevation_waves)

@@ -36,7 +36,7 @@ COMPILED_FROM = 1_000_000  # points: loading numba takes longer than the plain f
 
 
 @dataclass(frozen=True, eq=False)
-class Station:
+class MirrorStation:
     """One or many mirrors on their monuments: 13 numbers each, `PARAMETERS` in this order.
 
     fixed_point    (..., 3), m, ground: centre of the Kelvin mount's tooling ball
@@ -51,7 +51,7 @@ class Station:
 
     Source: [PARKER04] section 2.2.
 
-    >>> zy3 = Station([5.5862, 20.8500, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [0.0, 0.25, 0.0], [0.0, 0.0], [0, 0])
+    >>> zy3 = MirrorStation([5.5862, 20.85, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [0.0, 0.25, 0.0], [0, 0], [0, 0])
     >>> zy3.gamma[0].round(5).tolist(), zy3.scan_point.round(3).tolist()
     ([0.53284, 0.84622, -2e-05], [5.586, 20.85, 0.244])
     """
@@ -75,7 +75,7 @@ class Station:
     @classmethod
     def from_matrix(
         cls, point: ArrayLike, gamma_matrix: ArrayLike, *, offset: ArrayLike, beta: ArrayLike, zeros: ArrayLike
-    ) -> "Station":
+    ) -> "MirrorStation":
         """Of the scan point (..., 3), m, and gamma (..., 3, 3) of a mount turned anyhow, as on the feed arm."""
         g = np.asarray(gamma_matrix, dtype=float)
         away = np.einsum("...ji,...j->...i", g, np.asarray(offset, dtype=float))
@@ -99,17 +99,19 @@ class Station:
         return np.concatenate(parts, axis=-1)
 
     @classmethod
-    def of_parameters(cls, parameters: ArrayLike) -> "Station":
+    def of_parameters(cls, parameters: ArrayLike) -> "MirrorStation":
         """The station whose `parameters` (..., 13) these are."""
         values = np.asarray(parameters, dtype=float)
         if values.shape[-1:] != (len(PARAMETERS),):
             raise ValidityError(f"parameters of a station have shape {values.shape}, expected (..., {len(PARAMETERS)})")
         return cls(*np.split(values, np.cumsum(list(SIZES.values()))[:-1], axis=-1))
 
-    def __getitem__(self, index: object) -> "Station":
+    def __getitem__(self, index: object) -> "MirrorStation":
         """Stations of the batch, or new axes in it, as numpy's indices do it."""
         whole = self.parameters
-        return Station.of_parameters(whole[(*index, slice(None)) if isinstance(index, tuple) else (index, slice(None))])
+        return MirrorStation.of_parameters(
+            whole[(*index, slice(None)) if isinstance(index, tuple) else (index, slice(None))]
+        )
 
     @cached_property
     def gamma(self) -> NDArray[np.float64]:
@@ -142,14 +144,14 @@ class Aim(NamedTuple):
     elevation_counts: NDArray[np.float64]
 
 
-class Ray(NamedTuple):
+class MirrorBeam(NamedTuple):
     """A beam: the scan point (..., 3), m, and its unit direction (..., 3), both ground."""
 
     origin: NDArray[np.float64]
     direction: NDArray[np.float64]
 
 
-def in_mirror_axes(station: Station, points: ArrayLike) -> NDArray[np.float64]:
+def in_mirror_axes(station: MirrorStation, points: ArrayLike) -> NDArray[np.float64]:
     """Points (..., 3), m, ground, in the mirror's axes, from the scan point.
 
     Source: [PARKER04] eq. 2.12. Exact.
@@ -159,7 +161,7 @@ def in_mirror_axes(station: Station, points: ArrayLike) -> NDArray[np.float64]:
     return np.einsum("...ij,...j->...i", station.mirror_from_ground, at - station.scan_point)
 
 
-def aim(station: Station, points: ArrayLike) -> Aim:
+def aim(station: MirrorStation, points: ArrayLike) -> Aim:
     """Range, beam angles and encoder counts for points, in the direct pointing.
 
     station    of batch shape that broadcasts with the points'
@@ -169,7 +171,7 @@ def aim(station: Station, points: ArrayLike) -> Aim:
 
     Source: [PARKER04] eq. 2.12 to 2.22. Good to 1e-15 rad.
 
-    >>> zy3 = Station([5.5862, 20.85, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [-7.5e-5, 0.247459, -7.62e-4],
+    >>> zy3 = MirrorStation([5.5862, 20.85, -0.0058], [1.008848, -2.4e-5, 1.45e-4], [-7.5e-5, 0.247459, -7.62e-4],
     ...               [-7.27e-4, 1.21e-4], [-4195, -4935])
     >>> [round(float(v), 4) for v in aim(zy3, [0.0, 100.0, 20.0])]
     [81.7696, 0.2998, 2.1814, 576.8106, 12423.7397]
@@ -184,7 +186,7 @@ def aim(station: Station, points: ArrayLike) -> Aim:
 
 
 def counts(
-    station: Station,
+    station: MirrorStation,
     points: ArrayLike,
     *,
     compiled: bool | None = None,
@@ -247,7 +249,7 @@ def _stations_by_points(stations: tuple[int, ...], points: tuple[int, ...]) -> b
     return not outer or not inner or outer[-1] < inner[0]
 
 
-def ray(station: Station, at_counts: ArrayLike) -> Ray:
+def ray(station: MirrorStation, at_counts: ArrayLike) -> MirrorBeam:
     """The beam at encoder counts, direct or prime pointing.
 
     station      of batch shape that broadcasts with the counts'
@@ -255,16 +257,16 @@ def ray(station: Station, at_counts: ArrayLike) -> Ray:
 
     Source: [PARKER04] eq. 2.21, 2.22, 2.16 to 2.18 and 2.12 solved for R. Good to 1e-15 rad.
 
-    >>> flat = Station([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0], [0.0, 0.0])
+    >>> flat = MirrorStation([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0], [0.0, 0.0])
     >>> (ray(flat, [25_000.0, 12_500.0]).direction.round(9) + 0.0).tolist()  # y of the mirror is up
     [0.0, 0.0, 1.0]
     """
     u = beam(station, at_counts)
     direction = np.einsum("...ji,...j->...i", station.mirror_from_ground, u)
-    return Ray(np.broadcast_to(station.scan_point, direction.shape), direction)
+    return MirrorBeam(np.broadcast_to(station.scan_point, direction.shape), direction)
 
 
-def beam(station: Station, at_counts: ArrayLike) -> NDArray[np.float64]:
+def beam(station: MirrorStation, at_counts: ArrayLike) -> NDArray[np.float64]:
     """Unit direction (..., 3) of the beam in mirror axes at encoder counts (..., 2); eq. 2.16 to 2.18."""
     n = np.asarray(at_counts, dtype=float)
     if n.shape[-1:] != (2,):
@@ -275,7 +277,7 @@ def beam(station: Station, at_counts: ArrayLike) -> NDArray[np.float64]:
     return np.stack([sine * np.cos(theta), sine * np.sin(theta), np.cos(phi) + 0.0 * theta], axis=-1)
 
 
-def counts_jacobian(station: Station, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def counts_jacobian(station: MirrorStation, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Derivatives of the counts by the points (..., 2, 3), counts/m, and by the stations' parameters (..., 2, 13).
 
     station, points    as for `aim`
@@ -284,7 +286,7 @@ def counts_jacobian(station: Station, points: ArrayLike) -> tuple[NDArray[np.flo
 
     Source: [PARKER04] eq. 2.12 to 2.22 differentiated: a turn of axes about e moves coordinates g by -e x g.
 
-    >>> by_point, _ = counts_jacobian(Station([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0, 0]), [120.0, 0.0, 0.0])
+    >>> by_point, _ = counts_jacobian(MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0, 0]), [120.0, 0.0, 0.0])
     >>> by_point.round(2).tolist()  # one count is 7.5 mm in azimuth, 15 mm in elevation
     [[0.0, 0.0, 132.63], [0.0, 66.31, 0.0]]
     """
@@ -308,7 +310,7 @@ def counts_jacobian(station: Station, points: ArrayLike) -> tuple[NDArray[np.flo
 
 
 def ray_jacobian(
-    station: Station, at_counts: ArrayLike
+    station: MirrorStation, at_counts: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Derivatives of a beam's direction by counts (..., 3, 2) and by parameters (..., 3, 13), of its origin by these.
 
@@ -341,7 +343,7 @@ def ray_jacobian(
 
 
 def counts_covariance(
-    station: Station, points: ArrayLike, *, of_station: ArrayLike, of_points: ArrayLike | None = None
+    station: MirrorStation, points: ArrayLike, *, of_station: ArrayLike, of_points: ArrayLike | None = None
 ) -> NDArray[np.float64]:
     """Covariance (..., 2, 2), counts^2, of the counts for points.
 
@@ -359,7 +361,7 @@ def counts_covariance(
 
 
 def ray_covariance(
-    station: Station, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
+    station: MirrorStation, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
 ) -> NDArray[np.float64]:
     """Covariance (..., 6, 6) of a beam's origin, m, and of its direction, rad, ground axes, in this order.
 
@@ -379,7 +381,7 @@ def ray_covariance(
     return answer
 
 
-def _turning_axes(station: Station) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _turning_axes(station: MirrorStation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Axes, a row each, about which alpha1..3 turn the mount's axes (..., 3, 3) and beta1, 2 the mirror's (..., 2, 3).
 
     gamma = Rx(alpha3) Rz(alpha2) Ry(alpha1) P: a factor's own axis, turned by the factors that come after it.

@@ -46,7 +46,7 @@ class Pace:
 
 
 @dataclass(frozen=True, eq=False)
-class Slew:
+class MirrorSlew:
     """Moves of both axes, a batch (...) of them; `trapezoid` and `straight` make them.
 
     start, end    (..., 2), counts, azimuth and elevation
@@ -75,9 +75,9 @@ class Slew:
         running = self.duration - self.ramp
         return (self.end - self.start) / np.where(running > 0.0, running, np.inf)
 
-    def __getitem__(self, index: Any) -> "Slew":
+    def __getitem__(self, index: Any) -> "MirrorSlew":
         """Some of the batch."""
-        return Slew(self.start[index], self.end[index], self.ramp[index], self.duration[index])
+        return MirrorSlew(self.start[index], self.end[index], self.ramp[index], self.duration[index])
 
     def position(self, time: ArrayLike) -> NDArray[np.float64]:
         """Counts (..., 2) at times (...) s from the start; before it the start, after the end the end."""
@@ -98,7 +98,7 @@ class Slew:
         return np.hypot(rate[..., 0], rate[..., 1])
 
 
-def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> Slew:
+def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> MirrorSlew:
     """The quickest moves between counts that stand at both ends.
 
     start, end    (..., 2), counts
@@ -119,12 +119,12 @@ def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> Slew:
         limits = (np.where(way > 0.0, v / each, np.inf) for v in (velocity, acceleration))
         fast, steep = (np.where(moves, np.min(v, axis=-1), 1.0) for v in limits)
         ramp, full = (np.where(moves, v, 0.0)[..., None] for v in _times(1.0, fast, steep))
-        return Slew(a, b, np.broadcast_to(ramp, a.shape), np.broadcast_to(full, a.shape))
+        return MirrorSlew(a, b, np.broadcast_to(ramp, a.shape), np.broadcast_to(full, a.shape))
     ramp, full = _times(way, velocity, acceleration)
-    return Slew(a, b, ramp, full)
+    return MirrorSlew(a, b, ramp, full)
 
 
-def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> Slew:
+def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> MirrorSlew:
     """Moves at constant rates, as a track between two time tags.
 
     start, end    (..., 2), counts
@@ -143,7 +143,7 @@ def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> Slew:
     if np.any(jump):
         raise ValidityError(f"duration {float(seconds[jump].flat[0])} s of a move is not above 0")
     full = np.broadcast_to(seconds[..., None], a.shape)
-    return Slew(a, b, np.zeros_like(full), full)
+    return MirrorSlew(a, b, np.zeros_like(full), full)
 
 
 def _times(way: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[NDArray, NDArray]:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT, COUNTS_PER_TURN
-from catseye.geometry.mirror.pointing import Station, ray
+from catseye.geometry.mirror.pointing import MirrorStation, ray
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def count_line(start: ArrayLike, end: ArrayLike, interval: ArrayLike) -> CountLi
     return CountLine(first, last - whole * turn, h2[..., 0])
 
 
-def miss(station: Station, counts: ArrayLike, points: ArrayLike) -> Array:
+def miss(station: MirrorStation, counts: ArrayLike, points: ArrayLike) -> Array:
     """Distance (...), m, by which the beam at given counts passes a point; from one behind it, to its start.
 
     station    ranger(s), broadcast against the rest
@@ -109,7 +109,7 @@ def apparent_motion(
 ) -> tuple[Array, Array, Array]:
     """Place, velocity and acceleration (..., 3) of a target in the axes of a ranger that may itself move and turn.
 
-    mirror_from_ground    (..., 3, 3), `Station.mirror_from_ground`
+    mirror_from_ground    (..., 3, 3), `MirrorStation.mirror_from_ground`
     relative              (..., 3), m, ground axes: target less scan point
     velocity              (..., 3), m/s, ground axes: of that vector
     acceleration          (..., 3), m/s^2, ground axes

@@ -10,7 +10,7 @@ import numpy as np
 
 from catseye.errors import ValidityError
 from catseye.optics import gaussian_beam
-from catseye.optics.safety.limits import ALPHA_MIN, CLASS_3B, PUPIL, Limit, class_limit, factors
+from catseye.optics.safety.limits import ALPHA_MIN, CLASS_3B, PUPIL, ExposureLimit, class_limit, factors
 
 NOTICE = (
     "A warning for planning, not a certificate: only the standard itself, measurement and a laser safety officer "
@@ -125,7 +125,7 @@ BINOCULARS = Viewer("7x50 binoculars", 0.050, 7.0, 0.9)  # transmission of good 
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LaserClassification:
     """A beam's class and why.
 
     laser_class    a name in CLASSES
@@ -140,7 +140,7 @@ class Verdict:
     limits: dict[str, float]
 
 
-def hazard_zone(beam: LaserBeam, limits: tuple[Limit, ...], viewer: Viewer = NAKED) -> tuple[float, float]:
+def hazard_zone(beam: LaserBeam, limits: tuple[ExposureLimit, ...], viewer: Viewer = NAKED) -> tuple[float, float]:
     """Distances (from, to), m, between which the standing beam is more than a limit allows; (0, 0) if nowhere.
 
     beam     the laser's
@@ -164,7 +164,7 @@ def hazard_zone(beam: LaserBeam, limits: tuple[Limit, ...], viewer: Viewer = NAK
 
 def classify(
     beam: LaserBeam, *, edition: str = "iec2014", long_viewing: bool = False, subtense: float = ALPHA_MIN
-) -> Verdict:
+) -> LaserClassification:
     """The class that the beam would have as a product's only accessible emission.
 
     beam           the laser's, standing still: a sweep counts only where nothing can stop it
@@ -206,7 +206,7 @@ def classify(
     else:
         name = "4"
         reasons.append("class 4: more than class 3B")
-    return Verdict(name, tuple(reasons), {"condition_1": aided, "condition_3": naked}, limits)
+    return LaserClassification(name, tuple(reasons), {"condition_1": aided, "condition_3": naked}, limits)
 
 
 def returned_power(
@@ -225,7 +225,7 @@ def returned_power(
     reflector     m, above 0: diameter of its clear face
     reflectance   0 to 1, of the retroreflector
     viewer        what the eye looks through
-    aperture      m, diameter over which the exposure is averaged: the pupil's for the retina, see `Limit`
+    aperture      m, diameter over which the exposure is averaged: the pupil's for the retina, see `ExposureLimit`
 
     Computed as for an ideal beam (M^2 = 1) of the same waist, which spreads least: the safe side.
 
@@ -249,7 +249,7 @@ def returned_power(
     return beam.power * reflectance * viewer.transmission * share
 
 
-def _zone(beam: LaserBeam, limit: Limit, viewer: Viewer) -> tuple[float, float]:
+def _zone(beam: LaserBeam, limit: ExposureLimit, viewer: Viewer) -> tuple[float, float]:
     """Where one limit is exceeded."""
     share = limit.power / (viewer.transmission * beam.power)
     if share >= 1.0:

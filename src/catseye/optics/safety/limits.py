@@ -44,7 +44,7 @@ class Factors(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Limit:
+class ExposureLimit:
     """One limit of exposure.
 
     name         what it protects from
@@ -94,7 +94,7 @@ def factors(wavelength_um: float, duration: float = 100.0, subtense: float = ALP
 
 def eye_limits(
     wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014"
-) -> tuple[Limit, ...]:
+) -> tuple[ExposureLimit, ...]:
     """Every limit that the eye's exposure must keep; all of them count.
 
     wavelength_um, duration, subtense   as for `factors`
@@ -108,19 +108,21 @@ def eye_limits(
     """
     _known(edition)
     f, nm = factors(wavelength_um, duration, subtense), _nanometres(wavelength_um)
-    found = [Limit("heat on the retina", _heat(nm, duration, f, subtense), PUPIL)]
+    found = [ExposureLimit("heat on the retina", _heat(nm, duration, f, subtense), PUPIL)]
     chemical = _chemistry(nm, duration, f, subtense)
     if chemical is not None:
-        found.append(Limit("chemistry on the retina", chemical, PUPIL))
+        found.append(ExposureLimit("chemistry on the retina", chemical, PUPIL))
     if nm >= 1200 and edition == "ansi2014":
-        found.append(Limit("heat on the cornea", _cornea(nm, duration), _corneal_aperture(duration)))
+        found.append(ExposureLimit("heat on the cornea", _cornea(nm, duration), _corneal_aperture(duration)))
     elif nm >= 1200:
         skin = skin_limit(wavelength_um, duration)
-        found.append(Limit("heat on the front of the eye", skin.irradiance, skin.aperture))
+        found.append(ExposureLimit("heat on the front of the eye", skin.irradiance, skin.aperture))
     return tuple(found)
 
 
-def eye_mpe(wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014") -> Limit:
+def eye_mpe(
+    wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014"
+) -> ExposureLimit:
     """Maximum permissible exposure of the eye: the lowest of `eye_limits`.
 
     wavelength_um, duration, subtense, edition   as for `eye_limits`
@@ -133,7 +135,7 @@ def eye_mpe(wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, 
     return min(eye_limits(wavelength_um, duration, subtense, edition), key=lambda limit: limit.irradiance)
 
 
-def skin_limit(wavelength_um: float, duration: float) -> Limit:
+def skin_limit(wavelength_um: float, duration: float) -> ExposureLimit:
     """Maximum permissible exposure of the skin, the same in both editions.
 
     wavelength_um, duration   as for `factors`
@@ -145,9 +147,9 @@ def skin_limit(wavelength_um: float, duration: float) -> Limit:
     """
     c_a = factors(wavelength_um, duration).c_a
     if duration > 10.0:
-        return Limit("heat on the skin", 2000.0 * c_a, SKIN_APERTURE)
+        return ExposureLimit("heat on the skin", 2000.0 * c_a, SKIN_APERTURE)
     energy = 200.0 if duration < 1e-7 else 1.1e4 * duration**0.25
-    return Limit("heat on the skin", energy * c_a / duration, SKIN_APERTURE)
+    return ExposureLimit("heat on the skin", energy * c_a / duration, SKIN_APERTURE)
 
 
 def class_limit(

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from catseye.errors import CatseyeError, InputError
-from catseye.ranger.cubes import Cube, Shot
+from catseye.ranger.cubes import Cube, RangerShot
 from catseye.ranger.handlers.axes import Handler, wait_until
 from catseye.ranger.handlers.cubes import illuminate, refuse_unready
-from catseye.ranger.head import Buffer, Sampling
+from catseye.ranger.head import Buffer, SamplingSettings
 from catseye.ranger.line import TICK_NS, Reply, nanoseconds_of, nanoseconds_to_ticks
 from catseye.ranger.ranging import distance_mm, group_index
-from catseye.ranger.state import Measured, Outgoing, RangerState, Stream, Values, Work
+from catseye.ranger.state import MeasuredBuffer, Outgoing, RangerState, Stream, Values, Work
 from catseye.ranger.values import Value
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.phase import detect, phasors
@@ -27,7 +27,7 @@ CONVERTER_END = 32_767  # code
 def _sampled(name: str) -> Handler:
     def handler(z: RangerState, _: int, value: int | None = None) -> Values:
         if value is not None:
-            z.sampling = Sampling(**{**vars(z.sampling), name: value})
+            z.sampling = SamplingSettings(**{**vars(z.sampling), name: value})
         return (str(getattr(z.sampling, name)),)
 
     return handler
@@ -37,7 +37,7 @@ def _shoot(z: RangerState) -> Generator[int | None, None, None]:
     owner = z.aimed
     _fire(z)
     z.measured = None
-    z.measured = Measured((yield from _taken(z)), owner)
+    z.measured = MeasuredBuffer((yield from _taken(z)), owner)
 
 
 def _fire(z: RangerState) -> None:
@@ -59,7 +59,7 @@ def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
     return buffer
 
 
-def _computed(z: RangerState) -> Measured:
+def _computed(z: RangerState) -> MeasuredBuffer:
     """Amplitude and phase of the buffer. Source: [PARKER04] eq. 5.5, 5.6."""
     measured = z.measured
     if measured is None:
@@ -87,7 +87,7 @@ def _mpc(z: RangerState, _: int) -> Values:
     return ()
 
 
-def _known(z: RangerState) -> Measured:
+def _known(z: RangerState) -> MeasuredBuffer:
     if z.measured is None or z.measured.phase is None:
         raise InputError("nothing is computed (expected TRG, then MPC, first)")
     return z.measured
@@ -110,7 +110,7 @@ def _seq(z: RangerState, _: int) -> Work:
     return None
 
 
-def _keep(z: RangerState, cube: Cube, measured: Measured) -> Shot:
+def _keep(z: RangerState, cube: Cube, measured: MeasuredBuffer) -> RangerShot:
     """The shot of a cube, with its distance where a reference phase is known."""
     amplitude, phase = measured.amplitude or 0.0, measured.phase or 0.0
     if cube.number == 0:
@@ -124,7 +124,7 @@ def _keep(z: RangerState, cube: Cube, measured: Measured) -> Shot:
         coarse, constant = z.cubes.coarse_mm(cube), cube.value_mm
         distance = distance_mm(phase, z.reference_phase, coarse, index=z.index, d0_mm=z.d0_mm, constant_mm=constant)
     ticks = nanoseconds_to_ticks(nanoseconds_of(measured.buffer.triggered))
-    shot = Shot(amplitude, phase, distance, ticks)
+    shot = RangerShot(amplitude, phase, distance, ticks)
     z.cubes.put(replace(cube, shot=shot))
     return shot
 
@@ -168,7 +168,7 @@ def _measured(z: RangerState, how: int, number: int) -> Values:
     )
 
 
-def _last(pick: Callable[[Cube, Shot], str]) -> Handler:
+def _last(pick: Callable[[Cube, RangerShot], str]) -> Handler:
     def handler(z: RangerState, _: int, key: Value) -> Values:
         cube = z.cubes.find(key)
         if cube.shot is None:
@@ -178,7 +178,7 @@ def _last(pick: Callable[[Cube, Shot], str]) -> Handler:
     return handler
 
 
-def _dst(cube: Cube, shot: Shot) -> str:
+def _dst(cube: Cube, shot: RangerShot) -> str:
     if shot.distance is None:
         raise InputError("no reference phase is known (expected CMEAS 1, 0 first: ZRG)")
     return _distance_text(cube, shot.distance)
@@ -224,7 +224,7 @@ def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | N
             try:
                 buffer = yield from _taken(z)
                 problem = fire() if left else None
-                z.measured = Measured(buffer, stream.cube)
+                z.measured = MeasuredBuffer(buffer, stream.cube)
                 yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))
                 yield Outgoing(Reply("BUF", True, _buf(z, stream.client), stream.tid), stream.client)
             except CatseyeError as trouble:

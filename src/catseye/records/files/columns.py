@@ -17,7 +17,7 @@ Check = Callable[[list[str]], None]
 
 
 @dataclass(frozen=True)
-class Columns:
+class TextColumns:
     """A CSV table by column, all cells text without spaces around them.
 
     file     its name, for refusals
@@ -66,7 +66,7 @@ class Columns:
         return tuple(map("line {}".format, self.lines))
 
 
-def columns_of(text: str, file: str, required: Sequence[str], optional: Sequence[str] = ()) -> Columns:
+def columns_of(text: str, file: str, required: Sequence[str], optional: Sequence[str] = ()) -> TextColumns:
     """The columns of a CSV text with a header, in any order.
 
     text       the whole file
@@ -89,7 +89,7 @@ def columns_of(text: str, file: str, required: Sequence[str], optional: Sequence
         raise refusal(file, "holds a header and no rows (expected at least one)")
     width, strip = len(header), str.strip
     columns = {name: list(map(strip, cells[at::width])) for at, name in enumerate(header)}
-    return Columns(file, columns, lines)
+    return TextColumns(file, columns, lines)
 
 
 def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from catseye.errors import InputError
-from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder, column
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Record, Version, Within, broken_rule
 from catseye.records.files.refusal import other_unit, refusal
@@ -67,7 +67,7 @@ class Sheet(Record):
 
 
 @dataclass(frozen=True)
-class Layout:
+class SheetLayout:
     """The columns and the sheet of one kind of calibration.
 
     kind       its name
@@ -83,7 +83,7 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class SheetReadings:
     """A table with its sheet, every number finite and within its limits.
 
     file       name of the table
@@ -138,7 +138,7 @@ class Readings:
         return refusal(self.file, f"{self.where[row]}, {problem}")
 
 
-def read_readings(path: Path | str, layout: Layout, sheet: Path | str | None = None) -> Readings:
+def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | None = None) -> SheetReadings:
     """A table and its sheet.
 
     path      of the table, CSV with a header, columns in any order
@@ -173,10 +173,10 @@ def read_readings(path: Path | str, layout: Layout, sheet: Path | str | None = N
     if all(reasons):
         raise refusal(path.name, f"every reading has a reason in {LEFT_OUT!r} (expected some without)")
     hashes = {**folder.hashes, **page.hashes}
-    return Readings(path.name, record, beside.name, numbers, words, table.where(), reasons, hashes)
+    return SheetReadings(path.name, record, beside.name, numbers, words, table.where(), reasons, hashes)
 
 
-def _within(table: Columns, name: str, bounds: Within) -> np.ndarray:
+def _within(table: TextColumns, name: str, bounds: Within) -> np.ndarray:
     values = table.numbers(name)
     good = (values >= bounds.low) & (values <= bounds.high) & ~(bounds.above & (values == bounds.low))
     if not good.all():

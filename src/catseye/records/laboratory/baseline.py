@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from catseye.constants import DEGREE
 from catseye.errors import InputError
-from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder, read_record
 from catseye.records.files.record import Certificate, Version, Within, broken_rule
 from catseye.records.files.refusal import refusal, shown
@@ -33,7 +33,7 @@ SPANS = {
 }
 
 
-class Observations:
+class BaselineShots:
     """Shots of one instrument on a baseline, each column (m,).
 
     names              of the pillars, in the order of their first appearance
@@ -46,7 +46,7 @@ class Observations:
     where              place in the file
     """
 
-    def __init__(self, table: Columns, digest: str) -> None:
+    def __init__(self, table: TextColumns, digest: str) -> None:
         self.file, self.digest = table.file, digest
         ends = table.cells["from_pillar"], table.cells["to_pillar"]
         for name, cells in zip(("from_pillar", "to_pillar"), ends, strict=True):
@@ -73,7 +73,7 @@ class Observations:
         return len(self.slope)
 
 
-def _directions(table: Columns) -> tuple[np.ndarray, np.ndarray]:
+def _directions(table: TextColumns) -> tuple[np.ndarray, np.ndarray]:
     """A cell with an exponent was rounded to its last digit by whoever printed it; others have all theirs."""
     if DIRECTION not in table.cells:
         return np.full(len(table), np.nan), np.full(len(table), np.nan)
@@ -86,7 +86,7 @@ def _directions(table: Columns) -> tuple[np.ndarray, np.ndarray]:
     return np.where(given, value, np.nan) * DEGREE, np.where(given, rounding, np.nan) * DEGREE
 
 
-def read_observations(path: Path) -> Observations:
+def read_observations(path: Path) -> BaselineShots:
     """A CSV table of shots, columns as in docs/formats/baseline.md.
 
     path   of the file
@@ -95,7 +95,7 @@ def read_observations(path: Path) -> Observations:
     """
     folder, file = Folder(path.parent), path.name
     table = columns_of(folder.text(file), str(path), REQUIRED, (DIRECTION,))
-    return Observations(table, folder.hashes[file])
+    return BaselineShots(table, folder.hashes[file])
 
 
 class Heights:
@@ -105,7 +105,7 @@ class Heights:
     u        pillar -> standard uncertainty, m; 0 for the one that the others refer to
     """
 
-    def __init__(self, table: Columns, digest: str) -> None:
+    def __init__(self, table: TextColumns, digest: str) -> None:
         self.file, self.digest = table.file, digest
         names = table.cells["pillar_name"]
         value, u = table.numbers("pillar_rl"), table.numbers("rl_standard_deviation")

@@ -16,7 +16,7 @@ LARGEST = 7200.0  # arcsec: two degrees; an instrument that leans further hangs 
 
 
 @dataclass(frozen=True, eq=False)
-class Tilts:
+class TiltReadings:
     """Readings in the order of the file.
 
     mjd       (n,) UTC
@@ -36,7 +36,7 @@ class Tilts:
         return len(self.mjd)
 
 
-def read_tilts(path: Path | str) -> Tilts:
+def read_tilts(path: Path | str) -> TiltReadings:
     """A table of inclinometer readings; InputError names file, line, value and what was expected."""
     path = Path(path)
     table = columns_of(Folder(path.parent).text(path.name), path.name, COLUMNS)
@@ -47,4 +47,4 @@ def read_tilts(path: Path | str) -> Tilts:
         table.check(name, np.abs(values) <= LARGEST, f"-{LARGEST:g} to {LARGEST:g} arcsec")
     table.check("u_arcsec", (u > 0.0) & (u <= LARGEST), f"above 0 to {LARGEST:g} arcsec")
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return Tilts(mjd, azimuth * DEGREE, np.column_stack([x, y]) * ARCSECOND, u * ARCSECOND, digest)
+    return TiltReadings(mjd, azimuth * DEGREE, np.column_stack([x, y]) * ARCSECOND, u * ARCSECOND, digest)

@@ -42,7 +42,7 @@ MISTAKEN = {
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingRange:
     """The range of a reading in its unit, and which other units to suspect of a value outside it.
 
     unit        mm, c, hpa, percent or rad
@@ -85,12 +85,12 @@ class Reading:
         return {**handler(schema), "minimum": 0.0 if self.zero else self.low, high: self.high}
 
 
-Phase = Annotated[float, Reading("rad", 0.0, TWO_PI)]
-Temperature = Annotated[float, Reading("c", -20.0, 50.0)]
-Pressure = Annotated[float, Reading("hpa", 500.0, 1100.0)]
-Humidity = Annotated[float, Reading("percent", 1.0, 100.0, zero=True)]  # 0.47 is a share of one
-Height = Annotated[float, Reading("mm", 15.0, 500.0)]
-Radius = Annotated[float, Reading("mm", 10.0, 1000.0)]
+Phase = Annotated[float, ReadingRange("rad", 0.0, TWO_PI)]
+Temperature = Annotated[float, ReadingRange("c", -20.0, 50.0)]
+Pressure = Annotated[float, ReadingRange("hpa", 500.0, 1100.0)]
+Humidity = Annotated[float, ReadingRange("percent", 1.0, 100.0, zero=True)]  # 0.47 is a share of one
+Height = Annotated[float, ReadingRange("mm", 15.0, 500.0)]
+Radius = Annotated[float, ReadingRange("mm", 10.0, 1000.0)]
 
 
 class SurfacePlate(Record):
@@ -106,7 +106,7 @@ class SurfacePlate(Record):
     l1_mm: Height
     l2_mm: Height
     l_bt_mm: Height
-    l_post_mm: Annotated[float, Reading("mm", 20.0, 500.0)]
+    l_post_mm: Annotated[float, ReadingRange("mm", 20.0, 500.0)]
     u_height_mm: Uncertainty
     u_l_post_mm: Annotated[float, Within(0, 10)] = 0.002
     top_surface_mm: Annotated[tuple[Height, ...], Field(strict=False)] = ()
@@ -116,9 +116,9 @@ class MeasuredPrism(Record):
     """[left_prism] or [right_prism]: from the data sheet of the unit."""
 
     serial: Annotated[int, Field(ge=1)]
-    height_mm: Annotated[float, Reading("mm", 10.0, 500.0)]
+    height_mm: Annotated[float, ReadingRange("mm", 10.0, 500.0)]
     u_height_mm: Annotated[float, Within(0, 10)] = 0.002
-    hrp_mm: Annotated[float, Reading("mm", 5.0, 500.0)]
+    hrp_mm: Annotated[float, ReadingRange("mm", 5.0, 500.0)]
     pc_mm: Annotated[float, Within(-2000, -1)]
 
 
@@ -143,7 +143,7 @@ class Placement(Record):
     """
 
     spacer_mm: Annotated[float, Within(0, 2000)]
-    d_toppl_mm: Annotated[float, Reading("mm", 3000.0, 200_000.0)]
+    d_toppl_mm: Annotated[float, ReadingRange("mm", 3000.0, 200_000.0)]
     h_s_mm: Annotated[float, Within(-1000, 1000)]
     phi_1_rad: Phase
     phi_2_rad: Phase
@@ -188,7 +188,7 @@ class TripletMeasurement(Certificate):
     modulation_hz: Annotated[float, Within(1e8, 1e10)]
     wavelength_um: Annotated[float, Within(0.36, 1.7)]
     air_model: Literal["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"]
-    d12_mm: Annotated[float, Reading("mm", 100.0, 5000.0)]
+    d12_mm: Annotated[float, ReadingRange("mm", 100.0, 5000.0)]
     u_d12_mm: Uncertainty
     u_lateral_mm: Annotated[float, Within(0, 10)] = 0.05
     u_temperature_c: Annotated[float, Within(0, 10)] = 0.05

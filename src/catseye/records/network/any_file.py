@@ -8,7 +8,7 @@ folder        points.csv and ranges.csv                  `folder`
 
 from pathlib import Path
 
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
@@ -23,7 +23,7 @@ READERS = {
 }
 
 
-def read_network(path: Path | str) -> Network:
+def read_network(path: Path | str) -> ObservationNetwork:
     """The network of a file, by the end of its name, or of a folder.
 
     path   a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat

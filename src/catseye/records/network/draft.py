@@ -9,8 +9,8 @@ import numpy as np
 
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
-from catseye.estimation.network.model import Network, Parameter, Points
-from catseye.estimation.observations.kinds import Observations, Reported
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
+from catseye.estimation.observations.kinds import ObservationGroup, Reported
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.kinds import TOUCHES, Row, blocks_of, group_of
 
@@ -40,7 +40,7 @@ class NetworkDraft:
     xyz: list[np.ndarray] = field(default_factory=list)
     fixed: list[np.ndarray] = field(default_factory=list)
     datum: list[np.ndarray] = field(default_factory=list)
-    parameters: list[Parameter] = field(default_factory=list)
+    parameters: list[NetworkParameter] = field(default_factory=list)
     rows: list[Row] = field(default_factory=list)
     clusters: list[tuple[range, np.ndarray]] = field(default_factory=list)
     more: list[tuple[Sequence[str], str, Maker]] = field(default_factory=list)
@@ -86,7 +86,7 @@ class NetworkDraft:
 
     def parameter(self, name: str, start: float = 0.0, sigma: float = np.inf, unit: str = "1") -> int:
         """Adds a parameter beside the points; its index among them."""
-        self.parameters.append(Parameter(name, start, sigma, unit))
+        self.parameters.append(NetworkParameter(name, start, sigma, unit))
         return len(self.parameters) - 1
 
     def observe(self, row: Row) -> None:
@@ -134,7 +134,7 @@ class NetworkDraft:
             raise self.refuse(place, "names a point twice (expected points that differ)")
         self.more.append((points, place, make))
 
-    def network(self, *, hold_untouched: bool = False) -> Network:
+    def network(self, *, hold_untouched: bool = False) -> ObservationNetwork:
         """The network; InputError for a point that the file does not have.
 
         hold_untouched   unknown coordinates that no observation depends on are held at 0: heights of a plane network
@@ -146,10 +146,10 @@ class NetworkDraft:
         if hold_untouched:
             untouched = np.isnan(xyz) & ~self._touched(len(xyz))
             xyz[untouched], fixed = 0.0, fixed | untouched
-        points = Points(tuple(self.names), xyz, fixed, np.array(self.datum).reshape(-1, 3))
+        points = NetworkPoints(tuple(self.names), xyz, fixed, np.array(self.datum).reshape(-1, 3))
         self._start_orientations(xyz)
         groups, places = self._groups()
-        return Network(
+        return ObservationNetwork(
             points,
             tuple(self.parameters),
             groups,
@@ -196,7 +196,7 @@ class NetworkDraft:
         for at, mean in turned.items():
             self.parameters[at] = replace(self.parameters[at], start=float(np.angle(mean)) % TWO_PI)
 
-    def _groups(self) -> tuple[tuple[Observations, ...], tuple[tuple[str, ...], ...]]:
+    def _groups(self) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...]]:
         """Independent rows of a kind are one group; a correlated set is one."""
         first = 3 * len(self.names)
         in_cluster = {i for rows, _ in self.clusters for i in rows}
@@ -207,7 +207,7 @@ class NetworkDraft:
         sets = [(rows, np.array([row.u**2 for row in rows])) for rows in kinds.values()]
         correlated = [([self.rows[i] for i in rows], covariance) for rows, covariance in self.clusters]
         sets += blocks_of(correlated)
-        groups: list[Observations] = []
+        groups: list[ObservationGroup] = []
         places: list[tuple[str, ...]] = []
         counts: dict[str, int] = {}
         for rows, covariance in sets:

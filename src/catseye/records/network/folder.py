@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.estimation.network.model import Network, Points
-from catseye.estimation.observations.kinds import Coordinates, Distances, Observations
-from catseye.records.files.columns import Columns, columns_of
+from catseye.estimation.network.model import NetworkPoints, ObservationNetwork
+from catseye.estimation.observations.kinds import Distances, ObservationGroup, ObservedCoordinates
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import shown
 
@@ -25,7 +25,7 @@ RANGE_COLUMNS = ("from", "to", "distance", "sigma")
 ROLES = ("free", "fixed", "datum")
 
 
-def read_network_folder(path: Path) -> Network:
+def read_network_folder(path: Path) -> ObservationNetwork:
     """The network of a folder; InputError where it cannot be used.
 
     path   a folder with points.csv and ranges.csv
@@ -35,17 +35,19 @@ def read_network_folder(path: Path) -> Network:
     ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", RANGE_COLUMNS)
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)
-    groups: list[Observations] = [_distances(ranges, names)]
+    groups: list[ObservationGroup] = [_distances(ranges, names)]
     places = [ranges.where()]
     if np.any(priors > 0.0):
         row, axis = np.nonzero(priors > 0.0)
         observed, variance = xyz[row, axis], priors[row, axis] ** 2
-        groups.append(Coordinates("coordinates", observed, variance, 3 * row, axis))
+        groups.append(ObservedCoordinates("coordinates", observed, variance, 3 * row, axis))
         places.append(tuple(f"points.csv line {points.lines[int(i)]}" for i in row))
-    return Network(Points(tuple(names), xyz, fixed, datum), (), tuple(groups), tuple(places), source=path.name)
+    return ObservationNetwork(
+        NetworkPoints(tuple(names), xyz, fixed, datum), (), tuple(groups), tuple(places), source=path.name
+    )
 
 
-def names_of(table: Columns, column: str) -> dict[str, int]:
+def names_of(table: TextColumns, column: str) -> dict[str, int]:
     """Name -> row, each name once."""
     cells = table.cells[column]
     names = dict(zip(cells, range(len(cells)), strict=True))
@@ -61,7 +63,7 @@ def names_of(table: Columns, column: str) -> dict[str, int]:
     return names
 
 
-def _places(points: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _places(points: TextColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """xyz (n, 3), fixed and datum (n, 3) bool, standard uncertainties (n, 3) with nan for none."""
     xyz = np.stack([points.numbers(axis, blank=np.nan) for axis in "xyz"], axis=1)
     role = np.array(points.cells.get("role", ["free"] * len(points)), dtype=object)
@@ -83,7 +85,7 @@ def _places(points: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
     return xyz, fixed, datum, np.where(fixed, np.nan, u)
 
 
-def _distances(ranges: Columns, names: dict[str, int]) -> Distances:
+def _distances(ranges: TextColumns, names: dict[str, int]) -> Distances:
     origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
     ranges.check("to", origin != target, "another point than from")
     distance, sigma = ranges.numbers("distance"), ranges.numbers("sigma")
@@ -92,7 +94,7 @@ def _distances(ranges: Columns, names: dict[str, int]) -> Distances:
     return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target)
 
 
-def _numbered(ranges: Columns, end: str, names: dict[str, int]) -> np.ndarray:
+def _numbered(ranges: TextColumns, end: str, names: dict[str, int]) -> np.ndarray:
     cells = ranges.cells[end]
     try:
         return np.array(list(map(names.__getitem__, cells)))

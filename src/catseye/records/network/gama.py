@@ -18,10 +18,10 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.records.files.refusal import refusal, shown, unreadable
 from catseye.records.network.draft import NetworkDraft
-from catseye.records.network.gama_xml import GON, Element, angle_of, band_matrix, number_of, tree_of
+from catseye.records.network.gama_xml import GON, XmlElement, angle_of, band_matrix, number_of, tree_of
 from catseye.records.network.kinds import Row
 
 CC = 1e-4 * GON
@@ -42,7 +42,7 @@ CASES = ("xy", "XY", "z", "Z", "xyz", "XYZ", "XYz", "xyZ")
 SIGMA_APR = 10.0  # Gama's default
 
 
-def read_gama(path: Path) -> Network:
+def read_gama(path: Path) -> ObservationNetwork:
     """The network of a .gkf file, in the axes of this package; InputError where it cannot be used.
 
     path   the file
@@ -56,7 +56,7 @@ def read_gama(path: Path) -> Network:
     return gama_network(raw, path.name)
 
 
-def gama_network(raw: bytes, file: str) -> Network:
+def gama_network(raw: bytes, file: str) -> ObservationNetwork:
     """The same of the file's content.
 
     raw    XML, in the encoding that it states
@@ -85,7 +85,7 @@ def gama_network(raw: bytes, file: str) -> Network:
     return draft.network()
 
 
-def axes_of(network: Element, file: str) -> np.ndarray:
+def axes_of(network: XmlElement, file: str) -> np.ndarray:
     """(3, 3) that turns coordinates of the file into east, north, up."""
     name = network.attributes.get("axes-xy", "ne")
     if name not in AXES:
@@ -95,7 +95,7 @@ def axes_of(network: Element, file: str) -> np.ndarray:
     return axes
 
 
-def _check_parameters(network: Element, file: str) -> None:
+def _check_parameters(network: XmlElement, file: str) -> None:
     """Values that would change the answer in a way that is not followed here are refused."""
     for element in network.children:
         if element.tag != "parameters":
@@ -111,7 +111,7 @@ def _check_parameters(network: Element, file: str) -> None:
 class _Reader:
     """Elements into a draft, with what a network's attributes and points say about them."""
 
-    def __init__(self, draft: NetworkDraft, network: Element) -> None:
+    def __init__(self, draft: NetworkDraft, network: XmlElement) -> None:
         self.draft, self.network = draft, network
         sense = network.attributes.get("angles", "left-handed")
         if sense not in ("left-handed", "right-handed"):
@@ -126,13 +126,13 @@ class _Reader:
                 if self.sigma_apr <= 0.0:
                     raise self.refuse(element, f"sigma-apr = {self.sigma_apr:.6g} (expected above 0)")
 
-    def refuse(self, element: Element, problem: str) -> InputError:
+    def refuse(self, element: XmlElement, problem: str) -> InputError:
         return self.draft.refuse(element.place, f"{element.tag}: {problem}")
 
-    def number(self, element: Element, name: str, default: float | None = None) -> float:
+    def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
         return number_of(self.draft.file, element, name, default)
 
-    def note_point(self, element: Element, *, observed: bool) -> None:
+    def note_point(self, element: XmlElement, *, observed: bool) -> None:
         """Coordinates and status of a point; a point may be told in parts, but nothing twice."""
         name = element.attributes["id"].strip()
         point = self.points.setdefault(name, {"place": element.place})
@@ -151,7 +151,7 @@ class _Reader:
                 if key == "fix" or point.get(f"is {letter.lower()}") != "fix":  # fix goes before adj
                     point[f"is {letter.lower()}"] = status
 
-    def _once(self, element: Element, name: str, key: str) -> None:
+    def _once(self, element: XmlElement, name: str, key: str) -> None:
         if key in self.points[name]:
             first = self.points[name]["place"]
             raise self.refuse(element, f"{shown(name)} has its {key} in {first} already (expected each name once)")
@@ -166,14 +166,14 @@ class _Reader:
             datum = [s == "ADJ" and not np.isnan(value) for s, value in zip(status, xyz, strict=True)]
             self.draft.point(name, xyz, fixed=fixed, datum=datum, place=point["place"])
 
-    def need(self, element: Element, name: str, axes: str) -> str:
+    def need(self, element: XmlElement, name: str, axes: str) -> str:
         """The point's name, which must have a status for each coordinate that the observation depends on."""
         for axis in axes:
             if name in self.points and f"is {axis}" not in self.points[name]:
                 raise self.refuse(element, f"needs {axis} of {shown(name)}, which is neither fix nor adj there")
         return name
 
-    def set_of(self, element: Element, section: Element) -> None:
+    def set_of(self, element: XmlElement, section: XmlElement) -> None:
         """<obs> and <height-differences>: rows, and their covariance where it is given."""
         start, scales = len(self.draft.rows), []
         matrix = next((child for child in element.children if child.tag == "cov-mat"), None)
@@ -188,7 +188,9 @@ class _Reader:
             covariance = band_matrix(self.draft.file, matrix, len(scales)) * np.outer(scales, scales)
             self.draft.correlate(start, covariance, matrix.place)
 
-    def _row(self, child: Element, parent: Element, section: Element, *, orientation: int, has_matrix: bool) -> float:
+    def _row(
+        self, child: XmlElement, parent: XmlElement, section: XmlElement, *, orientation: int, has_matrix: bool
+    ) -> float:
         """Adds the row of one element; what a unit of its stdev is, with the sign by which its value turned."""
         attributes = child.attributes
         start = attributes.get("from", parent.attributes.get("from", "")).strip()
@@ -213,7 +215,7 @@ class _Reader:
         self.draft.observe(row)
         return unit * turned
 
-    def _stdev(self, child: Element, section: Element, value: float) -> float:
+    def _stdev(self, child: XmlElement, section: XmlElement, value: float) -> float:
         """In the file's unit: the element's own, else what the section implies for its kind."""
         if "stdev" in child.attributes:
             return self.number(child, "stdev")
@@ -231,7 +233,7 @@ class _Reader:
             raise self.refuse(child, "has no stdev, and neither points-observations nor a cov-mat gives one")
         return self.number(section, name)
 
-    def _orientation(self, element: Element) -> int:
+    def _orientation(self, element: XmlElement) -> int:
         """The unknown azimuth of a set's zero; `orientation` in the file is its bearing from the x axis."""
         station = element.attributes.get("from", "").strip()
         self.sets[station] = self.sets.get(station, 0) + 1
@@ -241,7 +243,7 @@ class _Reader:
             start = float(of_x + self.clockwise * angle_of(self.draft.file, element, "orientation")[0])
         return self.draft.parameter(f"orientation {station} set {self.sets[station]}", start, unit="rad")
 
-    def coordinates(self, element: Element) -> None:
+    def coordinates(self, element: XmlElement) -> None:
         start, turns = len(self.draft.rows), []
         for point in element.children:
             if point.tag != "point":
@@ -256,7 +258,7 @@ class _Reader:
             turns.append(turn)
         self._turned_covariance(element, start, turns)
 
-    def vectors(self, element: Element) -> None:
+    def vectors(self, element: XmlElement) -> None:
         start, turns = len(self.draft.rows), []
         for vec in element.children:
             if vec.tag != "vec":
@@ -272,12 +274,12 @@ class _Reader:
         self._turned_covariance(element, start, turns)
 
     def _components(
-        self, element: Element, kind: str, ends: tuple[str, ...], values: np.ndarray, axes: list[int]
+        self, element: XmlElement, kind: str, ends: tuple[str, ...], values: np.ndarray, axes: list[int]
     ) -> None:
         for value, axis in zip(values, axes, strict=True):
             self.draft.observe(Row(kind, ends, float(value), 1.0, element.place, component="xyz"[axis]))
 
-    def _turned_covariance(self, element: Element, start: int, turns: list[np.ndarray]) -> None:
+    def _turned_covariance(self, element: XmlElement, start: int, turns: list[np.ndarray]) -> None:
         matrix = next((child for child in element.children if child.tag == "cov-mat"), None)
         size = sum(len(turn) for turn in turns)
         if matrix is None or not turns:

@@ -62,13 +62,13 @@ TEXT = ("description", "cov-mat")
 
 
 @dataclass(eq=False)
-class Element:
+class XmlElement:
     """An element of the file and the line where it starts."""
 
     tag: str
     attributes: dict[str, str]
     line: int
-    children: list["Element"] = field(default_factory=list)
+    children: list["XmlElement"] = field(default_factory=list)
     text: str = ""
 
     @property
@@ -76,7 +76,7 @@ class Element:
         return f"line {self.line}"
 
 
-def tree_of(raw: bytes, file: str) -> Element:
+def tree_of(raw: bytes, file: str) -> XmlElement:
     """The root of a .gkf file, every element and attribute known; InputError for anything else.
 
     raw    the file's bytes
@@ -85,13 +85,13 @@ def tree_of(raw: bytes, file: str) -> Element:
     if not raw.strip():
         raise refusal(file, f"holds {len(raw)} bytes and no text: empty")
     parser = expat.ParserCreate()
-    stack = [Element("", {}, 0)]
+    stack = [XmlElement("", {}, 0)]
 
     def refuse(problem: str) -> InputError:
         return refusal(file, f"line {parser.CurrentLineNumber}, {problem}")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        parent, element = stack[-1], Element(tag, attributes, parser.CurrentLineNumber)
+        parent, element = stack[-1], XmlElement(tag, attributes, parser.CurrentLineNumber)
         _check(parent, element, refuse)
         if len(stack) > MOST_DEEP:
             raise refuse(f"<{tag}> is {len(stack)} elements deep (expected at most {MOST_DEEP})")
@@ -125,7 +125,7 @@ def tree_of(raw: bytes, file: str) -> Element:
     return root
 
 
-def _check(parent: Element, element: Element, refuse: Callable[[str], InputError]) -> None:
+def _check(parent: XmlElement, element: XmlElement, refuse: Callable[[str], InputError]) -> None:
     tag = element.tag
     known = CHILDREN.get(parent.tag, ()) if parent.tag else ("gama-local",)
     if tag not in known:
@@ -145,7 +145,7 @@ def _check(parent: Element, element: Element, refuse: Callable[[str], InputError
 
 
 def number_of(
-    file: str, element: Element, name: str, default: float | None = None, *, word: str | None = None
+    file: str, element: XmlElement, name: str, default: float | None = None, *, word: str | None = None
 ) -> float:
     """An attribute as a number; the default where it is not there.
 
@@ -163,10 +163,10 @@ def number_of(
     return float(text)
 
 
-def angle_of(file: str, element: Element, name: str) -> tuple[float, bool]:
+def angle_of(file: str, element: XmlElement, name: str) -> tuple[float, bool]:
     """An attribute as an angle in rad, and whether it was written in degrees: 57-32-28.428, or else gon.
 
-    >>> angle, degrees = angle_of("a.gkf", Element("azimuth", {"val": "57-32-28.428"}, 1), "val")
+    >>> angle, degrees = angle_of("a.gkf", XmlElement("azimuth", {"val": "57-32-28.428"}, 1), "val")
     >>> round(angle / GON, 4), degrees
     (63.9347, True)
     """
@@ -181,7 +181,7 @@ def angle_of(file: str, element: Element, name: str) -> tuple[float, bool]:
     return (-size if parts[1] == "-" else size), True
 
 
-def band_matrix(file: str, element: Element, rows: int) -> np.ndarray:
+def band_matrix(file: str, element: XmlElement, rows: int) -> np.ndarray:
     """The symmetric matrix (rows, rows) of a <cov-mat>: the upper band row by row, in the file's units.
 
     file      for refusals

@@ -7,18 +7,18 @@ from itertools import pairwise
 import numpy as np
 
 from catseye.estimation.observations.kinds import (
-    Angles,
     Azimuths,
-    Coordinates,
     Directions,
     DistanceDifferences,
     Distances,
     FixedDistances,
     HeightDifferences,
+    HorizontalAngles,
     HorizontalDistances,
     Inclinations,
     Joint,
     LevelPlanes,
+    ObservedCoordinates,
     Reported,
     Vectors,
     ZenithAngles,
@@ -146,7 +146,7 @@ MAKERS: dict[str, Callable[[str, np.ndarray, np.ndarray, _Arrays], Reported]] = 
     "distance_difference": lambda n, o, c, a: DistanceDifferences(n, o, c, *map(a.end, range(4)), **a.reading()),  # type: ignore[arg-type]
     "fixed_distance": lambda n, o, c, a: FixedDistances(n, o, c, a.end(0), a.end(1)),
     "direction": lambda n, o, c, a: Directions(n, o, c, a.end(0), a.end(1), _column(a, "orientation")),
-    "angle": lambda n, o, c, a: Angles(n, o, c, a.end(0), a.end(1), a.end(2)),
+    "angle": lambda n, o, c, a: HorizontalAngles(n, o, c, a.end(0), a.end(1), a.end(2)),
     "azimuth": lambda n, o, c, a: Azimuths(n, o, c, a.end(0), a.end(1)),
     "zenith_angle": _zenith_angles,
     "height_difference": lambda n, o, c, a: HeightDifferences(n, o, c, a.end(0), a.end(1), shift=a.shift()),
@@ -154,7 +154,7 @@ MAKERS: dict[str, Callable[[str, np.ndarray, np.ndarray, _Arrays], Reported]] = 
         n, o, c, a.end(0), a.end(1), shift=a.shift(), zero=a.columns("zero")
     ),
     "level_plane": lambda n, o, c, a: LevelPlanes(n, o, c, a.end(0), _column(a, "level"), a.known("height", 0.0)),
-    "coordinates": lambda n, o, c, a: Coordinates(n, o, c, a.end(0), _axes(a)),
+    "coordinates": lambda n, o, c, a: ObservedCoordinates(n, o, c, a.end(0), _axes(a)),
     "vector": lambda n, o, c, a: Vectors(n, o, c, a.end(0)[::3], a.end(1)[::3]),
 }
 

@@ -27,12 +27,19 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import InputError
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.network.draft import NetworkDraft
 from catseye.records.network.kinds import LENGTHS, Row
-from catseye.records.network.starnet_lines import Line, Settings, angle_of, lines_of, number_of, set_option
+from catseye.records.network.starnet_lines import (
+    StarnetLine,
+    StarnetSettings,
+    angle_of,
+    lines_of,
+    number_of,
+    set_option,
+)
 
 FIXED_LENGTH = 1e-7  # m, standard uncertainty of a `!` observation: small against any survey, kind to the arithmetic
 FIXED_ANGLE = 1e-9  # rad
@@ -46,7 +53,7 @@ DEFAULTS = {  # observation -> the comment's key
 DISTANCES = ("slope_distance", "horizontal_distance")
 
 
-def read_starnet(path: Path) -> Network:
+def read_starnet(path: Path) -> ObservationNetwork:
     """The network of a STAR*NET .dat file; InputError, with its line, for what cannot be used or is not known.
 
     path   the file
@@ -56,7 +63,7 @@ def read_starnet(path: Path) -> Network:
     return starnet_network(Folder(path.parent).text(path.name), path.name)
 
 
-def starnet_network(text: str, file: str) -> Network:
+def starnet_network(text: str, file: str) -> ObservationNetwork:
     """The same of the file's text.
 
     text   lines
@@ -71,17 +78,17 @@ def starnet_network(text: str, file: str) -> Network:
 class _Reader:
     def __init__(self, file: str) -> None:
         self.draft = NetworkDraft(file, implied=True)
-        self.settings = Settings()
+        self.settings = StarnetSettings()
         self.coordinates: dict[str, dict[str, tuple[float, str, str]]] = {}
         self.sets: dict[str, int] = {}
         self.station, self.orientation = "", -1
         self.left_out: list[str] = []
         self.held: list[str] = []
 
-    def refuse(self, line: Line, problem: str) -> InputError:
+    def refuse(self, line: StarnetLine, problem: str) -> InputError:
         return self.draft.refuse(line.place, problem)
 
-    def read(self, line: Line) -> None:
+    def read(self, line: StarnetLine) -> None:
         """One line, by its code."""
         if not self.settings.data and not line.code.startswith(".DAT"):
             return
@@ -93,7 +100,7 @@ class _Reader:
             known = ", ".join(CODES)
             raise self.refuse(line, f"{shown(line.text)} is not known here (expected one of the codes {known})")
 
-    def network(self) -> Network:
+    def network(self) -> ObservationNetwork:
         """All lines together."""
         if self.orientation >= 0:
             raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
@@ -112,7 +119,7 @@ class _Reader:
             self.draft.rows = [replace(row, known=bent) if row.kind == "zenith_angle" else row for row in rows]
         return self.draft.network(hold_untouched=True)
 
-    def stations(self, line: Line, count: int) -> list[str]:
+    def stations(self, line: StarnetLine, count: int) -> list[str]:
         """Names joined by the separator, At-From-To in that order whatever the file's."""
         words = line.words
         joined = words[1] if len(words) > 1 else ""
@@ -124,7 +131,7 @@ class _Reader:
             names = [names[1], names[0], names[2]]
         return names
 
-    def place_coordinates(self, line: Line) -> None:
+    def place_coordinates(self, line: StarnetLine) -> None:
         """C: north, east, elevation; E: elevation."""
         settings, words = self.settings, line.words
         axes = "z" if line.code == "E" else ("yx" if settings.north_first else "xy") + ("z" if settings.three_d else "")
@@ -144,7 +151,7 @@ class _Reader:
             point[axis] = (value, error, line.place)
 
     def measure(
-        self, line: Line, ends: Sequence[str], kinds: Sequence[tuple[str, tuple[str, ...]]], first: int
+        self, line: StarnetLine, ends: Sequence[str], kinds: Sequence[tuple[str, tuple[str, ...]]], first: int
     ) -> None:
         """Observations from word `first` on, then none or all of their standard errors, then perhaps HI/HT."""
         words = line.words[first:]
@@ -169,7 +176,14 @@ class _Reader:
                 self._observe(line, kind, points or tuple(ends), word=word, error=error, heights=heights)
 
     def _observe(
-        self, line: Line, kind: str, ends: tuple[str, ...], *, word: str, error: str, heights: tuple[float, float]
+        self,
+        line: StarnetLine,
+        kind: str,
+        ends: tuple[str, ...],
+        *,
+        word: str,
+        error: str,
+        heights: tuple[float, float],
     ) -> None:
         length = kind in LENGTHS
         value = (
@@ -187,7 +201,7 @@ class _Reader:
         parameters = {"orientation": self.orientation} if kind == "direction" else {}
         self.draft.observe(Row(kind, ends, value, u, line.place, heights if any(heights) else (), parameters))
 
-    def _standard_error(self, line: Line, kind: str, *, error: str, value: float) -> float:
+    def _standard_error(self, line: StarnetLine, kind: str, *, error: str, value: float) -> float:
         length = kind in LENGTHS
         if error == "!":
             self.held.append(f"{kind.replace('_', ' ')} of {line.place}")
@@ -213,33 +227,33 @@ class _Reader:
             return [("horizontal_distance", ends), ("height_difference", ends)]
         return [("slope_distance", ends), ("zenith_angle", ends)]
 
-    def angle(self, line: Line) -> None:
+    def angle(self, line: StarnetLine) -> None:
         self.measure(line, self.stations(line, 3), [("angle", ())], 2)
 
-    def distance(self, line: Line) -> None:
+    def distance(self, line: StarnetLine) -> None:
         self.measure(line, self.stations(line, 2), [(self._distance_and_height(())[0][0], ())], 2)
 
-    def vertical(self, line: Line) -> None:
+    def vertical(self, line: StarnetLine) -> None:
         if not self.settings.three_d:
             raise self.refuse(line, "V: a vertical observation in two dimensions (expected .3D above it)")
         self.measure(line, self.stations(line, 2), [(self._distance_and_height(())[1][0], ())], 2)
 
-    def distance_vertical(self, line: Line) -> None:
+    def distance_vertical(self, line: StarnetLine) -> None:
         ends = tuple(self.stations(line, 2))
         self.measure(line, ends, self._distance_and_height(ends), 2)
 
-    def bearing(self, line: Line) -> None:
+    def bearing(self, line: StarnetLine) -> None:
         self.measure(line, self.stations(line, 2), [("azimuth", ())], 2)
 
-    def all_measures(self, line: Line) -> None:
+    def all_measures(self, line: StarnetLine) -> None:
         at, back, to = self.stations(line, 3)
         self.measure(line, (), [("angle", (at, back, to)), *self._distance_and_height((at, to))], 2)
 
-    def bearing_measures(self, line: Line) -> None:
+    def bearing_measures(self, line: StarnetLine) -> None:
         ends = tuple(self.stations(line, 2))
         self.measure(line, ends, [("azimuth", ends), *self._distance_and_height(ends)], 2)
 
-    def begin_set(self, line: Line) -> None:
+    def begin_set(self, line: StarnetLine) -> None:
         if self.orientation >= 0:
             raise self.refuse(line, f"DB: the set at {shown(self.station)} is still open (expected DE before it)")
         if len(line.words) != 2:
@@ -249,7 +263,7 @@ class _Reader:
         name = f"orientation {self.station} set {self.sets[self.station]}"
         self.orientation = self.draft.parameter(name, unit="rad")
 
-    def in_set(self, line: Line) -> None:
+    def in_set(self, line: StarnetLine) -> None:
         if self.orientation < 0:
             raise self.refuse(line, f"{line.code}: outside a direction set (expected DB before it)")
         if len(line.words) < 2:
@@ -258,12 +272,12 @@ class _Reader:
         more = self._distance_and_height(ends) if line.code == "DM" else []
         self.measure(line, ends, [("direction", ends), *more], 2)
 
-    def end_set(self, line: Line) -> None:
+    def end_set(self, line: StarnetLine) -> None:
         if self.orientation < 0:
             raise self.refuse(line, "DE: no direction set is open (expected DB before it)")
         self.station, self.orientation = "", -1
 
-    def level(self, line: Line) -> None:
+    def level(self, line: StarnetLine) -> None:
         """L: height difference, length of the section, standard error; the length only serves project defaults."""
         ends = tuple(self.stations(line, 2))
         words = line.words[2:]
@@ -275,7 +289,7 @@ class _Reader:
         self._observe(line, "height_difference", ends, word=words[0], error=error, heights=(0.0, 0.0))
 
 
-CODES: dict[str, Callable[[_Reader, Line], None]] = {
+CODES: dict[str, Callable[[_Reader, StarnetLine], None]] = {
     "C": _Reader.place_coordinates,
     "E": _Reader.place_coordinates,
     "A": _Reader.angle,

@@ -8,7 +8,7 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.records.files.refusal import NUMBER, shown
 
-Refuse = Callable[["Line", str], InputError]
+Refuse = Callable[["StarnetLine", str], InputError]
 
 GON = 0.9 * DEGREE
 DMS = re.compile(r"([+-]?)([0-9]+)-([0-9]+)(?:-([0-9]+(?:\.[0-9]*)?))?")
@@ -26,7 +26,7 @@ SHORTEST = 3  # letters by which an option may be called
 
 
 @dataclass(frozen=True)
-class Line:
+class StarnetLine:
     """A line of data: its words without comment and description."""
 
     place: str
@@ -39,7 +39,7 @@ class Line:
 
 
 @dataclass
-class Settings:
+class StarnetSettings:
     """What options have set so far.
 
     unit, multiplier    m of a unit of length, and what `.MULTIPLIER` makes of it
@@ -79,7 +79,7 @@ class Settings:
         return 1e-3 * GON if self.gons else ARCSECOND
 
 
-def lines_of(text: str) -> list[Line]:
+def lines_of(text: str) -> list[StarnetLine]:
     """Lines with words in them; our own comment comes as the option .CATSEYE.
 
     A last word `&` continues a line where the next one begins with no letter or option, so has no code; else it stands
@@ -88,32 +88,34 @@ def lines_of(text: str) -> list[Line]:
     >>> [line.words for line in lines_of("M 2-1-3 45-00-00 10.0 90-00-00 & &\\n  & 1.5/1.6  # heights\\n")]
     [['M', '2-1-3', '45-00-00', '10.0', '90-00-00', '&', '&', '1.5/1.6']]
     """
-    found: list[Line] = []
+    found: list[StarnetLine] = []
     for number, raw in enumerate(text.splitlines(), start=1):
         body, _, comment = raw.partition("#")
         place = f"line {number}"
         if note := COMMENT.fullmatch(comment):
-            found.append(Line(place, raw.strip(), [".CATSEYE", note[1].strip()]))
+            found.append(StarnetLine(place, raw.strip(), [".CATSEYE", note[1].strip()]))
         words = body.partition("'")[0].split()
         if not words:
             continue
         starts = words[0][0].isalpha() or OPTION.match(words[0])
         if found and found[-1].words[-1] == "&" and not starts:
             last = found.pop()
-            found.append(Line(last.place, f"{last.text} {body.strip()}", [*last.words[:-1], *words]))
+            found.append(StarnetLine(last.place, f"{last.text} {body.strip()}", [*last.words[:-1], *words]))
         else:
-            found.append(Line(place, body.strip(), words))
+            found.append(StarnetLine(place, body.strip(), words))
     return found
 
 
-def number_of(line: Line, word: str, refuse: Refuse) -> float:
+def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:
     """A word as a number."""
     if not NUMBER.fullmatch(word):
         raise refuse(line, f"{line.code}: {shown(word)} (expected a number)")
     return float(word)
 
 
-def angle_of(line: Line, word: str, settings: Settings, refuse: Refuse, *, bearing: bool = False) -> float:
+def angle_of(
+    line: StarnetLine, word: str, settings: StarnetSettings, refuse: Refuse, *, bearing: bool = False
+) -> float:
     """A word as an angle in rad: gon, decimal degrees, or ddd-mm-ss.s; bearings also N34-23-45.7E.
 
     line       where it stands
@@ -143,7 +145,7 @@ def angle_of(line: Line, word: str, settings: Settings, refuse: Refuse, *, beari
     return -size if parts[1] == "-" else size
 
 
-def set_option(settings: Settings, line: Line, refuse: Refuse) -> None:
+def set_option(settings: StarnetSettings, line: StarnetLine, refuse: Refuse) -> None:
     """What a line that begins with a point says, from there on; an unknown one is refused by name."""
     word, values = line.code[1:], [value.upper() for value in line.words[1:]]
     if word == "CATSEYE":
@@ -179,7 +181,7 @@ def set_option(settings: Settings, line: Line, refuse: Refuse) -> None:
         settings.refraction = value
 
 
-def _set_units(settings: Settings, line: Line, values: list[str], refuse: Refuse) -> None:
+def _set_units(settings: StarnetSettings, line: StarnetLine, values: list[str], refuse: Refuse) -> None:
     if not values:  # back to what the file starts with
         settings.unit, settings.gons, settings.decimal = 1.0, False, False
     for value in values:
@@ -191,7 +193,7 @@ def _set_units(settings: Settings, line: Line, values: list[str], refuse: Refuse
             raise refuse(line, f".UNITS {shown(value)} (expected {' '.join(UNITS)}, DMS, GONS or DD)")
 
 
-def _set_order(settings: Settings, line: Line, values: list[str], refuse: Refuse) -> None:
+def _set_order(settings: StarnetSettings, line: StarnetLine, values: list[str], refuse: Refuse) -> None:
     for value in values:
         if value in ("NE", "EN"):
             settings.north_first = value == "NE"
@@ -201,7 +203,7 @@ def _set_order(settings: Settings, line: Line, values: list[str], refuse: Refuse
             raise refuse(line, f".ORDER {shown(value)} (expected NE, EN, ATFROMTO or FROMATTO)")
 
 
-def _set_defaults(settings: Settings, line: Line, refuse: Refuse) -> None:
+def _set_defaults(settings: StarnetSettings, line: StarnetLine, refuse: Refuse) -> None:
     for part in filter(None, (part.strip() for part in line.words[1].split(","))):
         key, _, value = (word.strip() for word in part.partition("="))
         if key not in DEFAULT_KEYS or not NUMBER.fullmatch(value) or float(value) <= 0.0:

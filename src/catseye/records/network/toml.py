@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from catseye.estimation.network.model import Network
-from catseye.records.files.columns import Columns, columns_of
+from catseye.estimation.network.model import ObservationNetwork
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder, toml_of
 from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.files.toml_fields import ANGLE, DIMENSIONS, LENGTH, RATIO, Fields
@@ -57,7 +57,7 @@ TOP = (
 )
 
 
-def read_network_toml(path: Path) -> Network:
+def read_network_toml(path: Path) -> ObservationNetwork:
     """The network of a file of ours; InputError, with the table's number, where it cannot be used.
 
     path   the file; tables that it names stand beside it
@@ -77,7 +77,7 @@ class _Reader:
         self.rangers: dict[str, dict[str, int]] = {}
         self.sets: dict[tuple[str, str], int] = {}
 
-    def network(self) -> Network:
+    def network(self) -> ObservationNetwork:
         for key in TOP:
             self.document.has(key)
         self.draft.description = self.document.text("description", "")
@@ -283,7 +283,7 @@ class _AnyColumn(tuple[str, ...]):
         return name != ""
 
 
-def _rows_of(table: Columns, common: dict[str, Any]) -> list[Fields]:
+def _rows_of(table: TextColumns, common: dict[str, Any]) -> list[Fields]:
     """Rows of a CSV as tables: cells that are numbers are, names and texts stay text; blank cells are not there."""
     columns: list[list[Any]] = []
     for name, cells in table.cells.items():

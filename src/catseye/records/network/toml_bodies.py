@@ -20,11 +20,11 @@ import numpy as np
 
 from catseye.estimation.observations.kinds import (
     FramePoints,
+    ObservedTilts,
     PointsOnLine,
     PointsOnPlane,
     PointsOnSphere,
     RigidBodies,
-    Tilts,
 )
 from catseye.geometry.frames.rotation import from_vector
 from catseye.records.files.refusal import shown
@@ -140,7 +140,7 @@ class Bodies:
         self.draft.also(
             [],
             fields.place,
-            lambda _, first: Tilts(
+            lambda _, first: ObservedTilts(
                 f"tilt {frame}",
                 np.array([value]),
                 np.array([u**2]),

@@ -11,7 +11,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
-from catseye.records.night.shot import Shot, Shots, read_buffers, refuse_shots, shot_columns
+from catseye.records.night.shot import ShotColumns, ShotRow, read_buffers, refuse_shots, shot_columns
 from catseye.records.night.weather import Weather, WeatherSample, weather_columns
 from catseye.records.site.folder import (
     REFERENCE,
@@ -36,7 +36,7 @@ class Campaign(SiteFolder):
     """
 
     weather: Weather
-    shots: Shots
+    shots: ShotColumns
     frames: np.ndarray
     path_temperatures: PathTemperatureTable | None = None
 
@@ -47,7 +47,7 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_directory(folder.directory, "campaign")
     records = read_records(folder)
     samples = folder.table("weather.csv", WeatherSample)
-    shots = folder.table("shots.csv", Shot)
+    shots = folder.table("shots.csv", ShotRow)
     buffers = read_buffers(folder)
     sounded = os.path.lexists(folder.directory / PATH_TEMPERATURES)
     lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
@@ -68,7 +68,7 @@ def read_campaign(directory: Path | str) -> Campaign:
     return campaign
 
 
-def refuse_strangers(campaign: Campaign, shots: Iterable[Shot]) -> None:
+def refuse_strangers(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
     known, rangers = set(campaign.target_names), set(campaign.rangers)
     for row, shot in enumerate(shots, start=1):
         refuse_stranger("shots.csv", row, shot, known, rangers)
@@ -90,7 +90,7 @@ def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> Non
             raise refusal("weather.csv", f"station = {shown(station)} of site.toml has no row (expected at least one)")
 
 
-def refuse_times(campaign: Campaign, shots: Iterable[Shot]) -> None:
+def refuse_times(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
     """Every shot was fired during the campaign, and the weather was known."""
     start = campaign.site.campaign.start_mjd_utc
     first, last = float(campaign.weather.mjd_utc.min()), float(campaign.weather.mjd_utc.max())

@@ -20,7 +20,7 @@ LONGEST_HEADER = 65_536  # bytes; numpy itself writes 118 here
 SAMPLE_BYTES = 2
 
 
-class Shot(Record):
+class ShotRow(Record):
     """A row of shots.csv: one measured range; `frame` is its buffer's row in frames.npy, counted from 0."""
 
     shot: Annotated[int, Within(0, 2**53)]
@@ -32,14 +32,14 @@ class Shot(Record):
     frame: Annotated[int, Within(0, 2**53)]
 
     @model_validator(mode="after")
-    def _fits_a_buffer(self) -> "Shot":
+    def _fits_a_buffer(self) -> "ShotRow":
         if self.cycles * self.samples_per_cycle > MOST_SAMPLES:
             raise broken_rule(too_many_samples(self.cycles, self.samples_per_cycle, MOST_SAMPLES))
         return self
 
 
 @dataclass(frozen=True, eq=False)
-class Shots:
+class ShotColumns:
     """All shots in the order of the file, as read-only columns."""
 
     shot: np.ndarray
@@ -54,8 +54,8 @@ class Shots:
         return len(self.ranger)
 
 
-def shot_columns(shots: Sequence[Shot]) -> Shots:
-    return Shots(
+def shot_columns(shots: Sequence[ShotRow]) -> ShotColumns:
+    return ShotColumns(
         shot=column([shot.shot for shot in shots], np.int64),
         mjd_utc=column([shot.mjd_utc for shot in shots], np.float64),
         ranger=tuple(shot.ranger for shot in shots),
@@ -118,7 +118,7 @@ def checked_header(header: str, file: str) -> tuple[tuple[int, int], bool]:
     return (sizes[0], sizes[1]), order[1] == "True"
 
 
-def refuse_shots(file: str, shots: Sequence[Shot], buffers: np.memmap) -> None:
+def refuse_shots(file: str, shots: Sequence[ShotRow], buffers: np.memmap) -> None:
     """Shots come in order of time, each once, each with a buffer of its own that holds its samples."""
     if not shots:
         raise refusal(file, "row 1 is missing, 0 shots (expected at least one)")

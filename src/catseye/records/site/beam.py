@@ -67,7 +67,7 @@ class Laser(Record):
         return self
 
 
-class Element(Record):
+class BeamElement(Record):
     """[[outward]], [[inward]]: one thing that the light meets, in order.
 
     kind                 space, lens, thick_lens, mirror, plate, aperture, splitter, isolator
@@ -102,7 +102,7 @@ class Element(Record):
     leak: Leak | None = None
 
     @model_validator(mode="after")
-    def _has_the_keys_of_its_kind(self) -> "Element":
+    def _has_the_keys_of_its_kind(self) -> "BeamElement":
         needed, welcome = KEYS[self.kind]
         given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in needed:
@@ -116,7 +116,7 @@ class Element(Record):
         return self
 
 
-class Reflector(Record):
+class ReflectorRecord(Record):
     """[reflector]: a retroreflector, centred in the beam.
 
     radius_mm     of its clear aperture
@@ -176,7 +176,7 @@ class BeamTrain(Certificate):
     distance_m: Annotated[float, Within(0.01, 1e6)]
     distances_m: Annotated[tuple[Annotated[float, Within(0.01, 1e6)], ...], Field(strict=False, max_length=200)] = ()
     laser: Laser
-    outward: Annotated[tuple[Element, ...], Field(strict=False)]
-    reflector: Reflector
-    inward: Annotated[tuple[Element, ...], Field(strict=False)]
+    outward: Annotated[tuple[BeamElement, ...], Field(strict=False)]
+    reflector: ReflectorRecord
+    inward: Annotated[tuple[BeamElement, ...], Field(strict=False)]
     detector: Detector

@@ -16,10 +16,10 @@ from catseye.records.files.record import Record
 from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.files.toml_text import record_toml
 from catseye.records.site.mirror import Mirror
-from catseye.records.site.monument import Monument
-from catseye.records.site.site import Site
-from catseye.records.site.target import Benchmark, FeedArm, Target, Targets
-from catseye.records.site.triplet import Triplet
+from catseye.records.site.monument import MonumentRecord
+from catseye.records.site.site import SiteRecord
+from catseye.records.site.target import BenchmarkRow, FeedArm, TargetRow, Targets
+from catseye.records.site.triplet import TripletRecord
 
 T = TypeVar("T")
 
@@ -31,13 +31,13 @@ class SiteFolder:
     """Everything that a site's directory holds; `hashes` are the SHA-256 of its files by relative path."""
 
     directory: Path
-    site: Site
-    monuments: dict[str, Monument]
+    site: SiteRecord
+    monuments: dict[str, MonumentRecord]
     mirrors: dict[str, Mirror]
     feedarm: FeedArm
-    targets: dict[str, Target]
-    triplets: dict[str, Triplet]
-    benchmarks: tuple[Benchmark, ...]
+    targets: dict[str, TargetRow]
+    triplets: dict[str, TripletRecord]
+    benchmarks: tuple[BenchmarkRow, ...]
     hashes: dict[str, str]
 
     @property
@@ -62,13 +62,13 @@ class SiteFolder:
 class SiteRecords:
     """What a site's files hold, file by file, not yet held against each other."""
 
-    site: Site
-    monuments: dict[str, Monument]
+    site: SiteRecord
+    monuments: dict[str, MonumentRecord]
     mirrors: dict[str, Mirror]
     feedarm: FeedArm
-    targets: tuple[Target, ...]
-    triplets: dict[str, Triplet]
-    benchmarks: list[Benchmark]
+    targets: tuple[TargetRow, ...]
+    triplets: dict[str, TripletRecord]
+    benchmarks: list[BenchmarkRow]
 
     def named(self, folder: Folder) -> dict[str, Any]:
         """The fields of a `SiteFolder`, records by name; `hashes` are those of the files read by now."""
@@ -103,13 +103,13 @@ def read_site(directory: Path | str) -> SiteFolder:
 def read_records(folder: Folder) -> SiteRecords:
     """A site's files, each read and each good by itself."""
     return SiteRecords(
-        site=folder.record("site.toml", Site),
-        monuments={file: folder.record(file, Monument) for file in folder.records_in("monuments")},
+        site=folder.record("site.toml", SiteRecord),
+        monuments={file: folder.record(file, MonumentRecord) for file in folder.records_in("monuments")},
         mirrors={file: folder.record(file, Mirror) for file in folder.records_in("mirrors")},
         feedarm=folder.record("feedarm.toml", FeedArm),
         targets=folder.record("targets.toml", Targets).target,
-        triplets={file: folder.record(file, Triplet) for file in folder.records_in("triplets")},
-        benchmarks=folder.table("benchmarks.csv", Benchmark),
+        triplets={file: folder.record(file, TripletRecord) for file in folder.records_in("triplets")},
+        benchmarks=folder.table("benchmarks.csv", BenchmarkRow),
     )
 
 
@@ -138,7 +138,7 @@ def by_stem(key: str, records: dict[str, tuple[str, T]]) -> dict[str, T]:
     return dict(records.values())
 
 
-def mounts(monuments: dict[str, Monument], feedarm: FeedArm) -> dict[str, tuple[str, str]]:
+def mounts(monuments: dict[str, MonumentRecord], feedarm: FeedArm) -> dict[str, tuple[str, str]]:
     """By ranger: its mirror's name, and the file and place that say so."""
     ground = {name: (monument.zp, f"monuments/{name}.toml: ") for name, monument in monuments.items()}
     arm = {ranger.name: (ranger.zp, f"feedarm.toml: ranger[{ranger.name!r}].") for ranger in feedarm.ranger}
@@ -178,7 +178,7 @@ def refuse_benchmarks(site: SiteFolder) -> None:
         refuse_stranger("benchmarks.csv", row, benchmark, known, rangers)
 
 
-class Line(Protocol):
+class SiteLine(Protocol):
     """A row that joins a ranger to a target."""
 
     @property
@@ -187,7 +187,7 @@ class Line(Protocol):
     def target(self) -> str: ...
 
 
-def refuse_stranger(file: str, row: int, line: Line, known: set[str], rangers: set[str]) -> None:
+def refuse_stranger(file: str, row: int, line: SiteLine, known: set[str], rangers: set[str]) -> None:
     """A row's ranger and target are known, and two."""
     if line.ranger not in rangers:
         raise in_row(file, row, f"ranger = {shown(line.ranger)} is not in monuments/ or feedarm.toml")
@@ -210,7 +210,7 @@ def site_files(site: SiteFolder) -> dict[str, str]:
         "feedarm.toml": record_toml(site.feedarm),
         "targets.toml": record_toml(Targets(target=tuple(site.targets.values()))),
         **{f"triplets/{name}.toml": record_toml(record) for name, record in site.triplets.items()},
-        "benchmarks.csv": _table_csv(site.benchmarks, Benchmark),
+        "benchmarks.csv": _table_csv(site.benchmarks, BenchmarkRow),
     }
 
 

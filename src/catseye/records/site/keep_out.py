@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.geometry.clearance.keep_out import Box
+from catseye.geometry.clearance.keep_out import BoxZone
 from catseye.records.files.record import Certificate, Name, Record, Vector, Version, Within, broken_rule
 
 SMALLEST_MM, LARGEST_MM = 50.0, 1e6  # of a box: a sandwich in mm, a mountain in mm; neither can be metres
@@ -60,10 +60,10 @@ class KeepOutBox(Record):
                 raise broken_rule(f"{self.name}: its middle is at {axis} = {c:g} mm (expected within {FARTHEST_MM:g})")
         return self
 
-    def box(self, length: float = np.inf) -> Box:
+    def box(self, length: float = np.inf) -> BoxZone:
         """In metres and radians, for a beam of a length, m."""
         centre, size = (np.array(v) * MILLIMETRE for v in self._centre_and_size_mm())
-        return Box(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
+        return BoxZone(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
 
     def _centre_and_size_mm(self) -> tuple[list[float], list[float]]:
         if self.centre_mm is not None and self.size_mm is not None:
@@ -100,6 +100,6 @@ class KeepOut(Certificate):
                 raise broken_rule(f"box {name!r} is given twice (expected each name once)")
         return self
 
-    def boxes(self) -> tuple[Box, ...]:
+    def boxes(self) -> tuple[BoxZone, ...]:
         """All boxes, for beams of this length."""
         return tuple(box.box(np.inf if self.beam_length_m is None else self.beam_length_m) for box in self.box)

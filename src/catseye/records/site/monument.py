@@ -90,7 +90,7 @@ class MonumentGeometry(Certificate):
         return self
 
 
-class Monument(MonumentGeometry):
+class MonumentRecord(MonumentGeometry):
     """A ground monument, all that ranging needs; its keys are explained in `MonumentGeometry`."""
 
     zp: Name

@@ -25,7 +25,7 @@ MOST_SAMPLES = 65_536  # of one buffer
 PositiveMillimetres = Annotated[float, Within(500, 1e6)]
 
 
-class Posture(Record):
+class PostureRecord(Record):
     """[campaign]: when, and how the telescope stood."""
 
     name: str = Field(min_length=1)
@@ -63,7 +63,7 @@ class Frames(Record):
     reflector: ReflectorFrame
 
 
-class Paraboloid(Record):
+class ParaboloidRecord(Record):
     """[paraboloid]: the design surface; its aperture in the reflector frame's x and y."""
 
     focal_length_mm: PositiveMillimetres
@@ -109,20 +109,20 @@ class WeatherStation(Record):
     elevation_m: Elevation
 
 
-class Site(Certificate):
+class SiteRecord(Certificate):
     """The whole of site.toml."""
 
     format: Annotated[int | str, Version("site")] = 1
-    campaign: Posture
+    campaign: PostureRecord
     site: Location
     frames: Frames
-    paraboloid: Paraboloid
+    paraboloid: ParaboloidRecord
     ranging: Ranging
     adc: Adc
     weather_station: Annotated[tuple[WeatherStation, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
-    def _names_each_station_once(self) -> "Site":
+    def _names_each_station_once(self) -> "SiteRecord":
         names = [station.name for station in self.weather_station]
         for name in names:
             if names.count(name) > 1:

@@ -50,8 +50,8 @@ class BoxRecord(SolidRecord):
     size_mm: Annotated[tuple[Size, Size, Size], Field(strict=False)]
     turn_deg: Annotated[float, Within(-360, 360)] = 0.0
 
-    def solid(self) -> solids.Box:
-        return solids.Box(_metres(self.centre_mm), _metres(self.size_mm), self.turn_deg * DEGREE)
+    def solid(self) -> solids.SolidBox:
+        return solids.SolidBox(_metres(self.centre_mm), _metres(self.size_mm), self.turn_deg * DEGREE)
 
 
 class SphereRecord(SolidRecord):
@@ -60,8 +60,8 @@ class SphereRecord(SolidRecord):
     centre_mm: Vector
     radius_mm: Radius
 
-    def solid(self) -> solids.Sphere:
-        return solids.Sphere(_metres(self.centre_mm), self.radius_mm * MILLIMETRE)
+    def solid(self) -> solids.SolidSphere:
+        return solids.SolidSphere(_metres(self.centre_mm), self.radius_mm * MILLIMETRE)
 
 
 class CylinderRecord(SolidRecord):
@@ -76,9 +76,9 @@ class CylinderRecord(SolidRecord):
         _refuse_no_length(self.name, self.from_mm, self.to_mm)
         return self
 
-    def solid(self) -> solids.Cone:
+    def solid(self) -> solids.SolidCone:
         radius = self.radius_mm * MILLIMETRE
-        return solids.Cone(_metres(self.from_mm), _metres(self.to_mm), radius, radius)
+        return solids.SolidCone(_metres(self.from_mm), _metres(self.to_mm), radius, radius)
 
 
 class ConeRecord(SolidRecord):
@@ -97,9 +97,9 @@ class ConeRecord(SolidRecord):
             raise broken_rule(f"{self.name}: its larger radius is {wider:g} mm (expected 10 to 500000)")
         return self
 
-    def solid(self) -> solids.Cone:
+    def solid(self) -> solids.SolidCone:
         radii = (self.from_radius_mm * MILLIMETRE, self.to_radius_mm * MILLIMETRE)
-        return solids.Cone(_metres(self.from_mm), _metres(self.to_mm), *radii)
+        return solids.SolidCone(_metres(self.from_mm), _metres(self.to_mm), *radii)
 
 
 class DishRecord(SolidRecord):

@@ -15,7 +15,7 @@ SQUARE = 2e-3  # cosine: directions are written with three digits or more
 PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate; farther off is lost
 
 
-class Target(Record):
+class TargetRow(Record):
     """One retroreflector; the keys from normal on belong to a prism, and only to a prism.
 
     position_mm     approximate, in the named frame
@@ -38,7 +38,7 @@ class Target(Record):
     pc_mm: GlassConstant | None = None
 
     @model_validator(mode="after")
-    def _has_the_keys_of_its_type(self) -> "Target":
+    def _has_the_keys_of_its_type(self) -> "TargetRow":
         for key in ("material", "normal", "height_mm", "u_height_mm", "hrp_mm", "pc_mm"):
             value = getattr(self, key)
             if self.type == "prism" and value is None:
@@ -54,7 +54,7 @@ class Targets(Record):
     """The whole of targets.toml."""
 
     format: Annotated[int | str, Version("targets")] = 1
-    target: Annotated[tuple[Target, ...], Field(strict=False)]
+    target: Annotated[tuple[TargetRow, ...], Field(strict=False)]
 
 
 class FeedArmRanger(Record):
@@ -100,7 +100,7 @@ class FeedArm(Record):
     aim_point: AimPoint
 
 
-class Benchmark(Record):
+class BenchmarkRow(Record):
     """A row of benchmarks.csv: a certified distance from a ranger's scan point to a target."""
 
     target: Name

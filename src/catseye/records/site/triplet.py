@@ -60,7 +60,7 @@ class TripletBall(Record):
         return self
 
 
-class Triplet(Certificate):
+class TripletRecord(Certificate):
     """A triplet unit.
 
     nominal_position_mm     approximate centre of the ball, in the named frame
@@ -97,7 +97,7 @@ class Triplet(Certificate):
         return self.left_prism.target, self.right_prism.target, self.ball.target
 
     @model_validator(mode="after")
-    def _has_its_axis_in_the_plate(self) -> "Triplet":
+    def _has_its_axis_in_the_plate(self) -> "TripletRecord":
         cosine = sum(n * a for n, a in zip(self.normal, self.axis, strict=True))
         if abs(cosine) > MOST_COSINE:
             raise broken_rule(

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere.index.air import Air, air
-from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.index.air import AirState, air
+from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.path import WIND, bent_ray_excess, pair, straight_line_speed
 from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, model_named, sound, temperatures_c
@@ -23,9 +23,9 @@ NO_TIME = "no travel time"
 OUTSIDE = "speed of no air within the model's limits"
 NO_WIND = f"wind above {WIND.upper:g} m/s: the two times do not belong together"
 
-LENGTH = Limit("length of the path", "m", 0.1, 10_000.0, "the notion of a path", places=1)
-DELAY = Limit("delay", "s", -1.0, 1.0, "the notion of a delay")
-GRADIENT = Limit("gradient of the speed", "1/s", -10.0, 10.0, "the notion of a smoothly bent ray")
+LENGTH = ValidInterval("length of the path", "m", 0.1, 10_000.0, "the notion of a path", places=1)
+DELAY = ValidInterval("delay", "s", -1.0, 1.0, "the notion of a delay")
+GRADIENT = ValidInterval("gradient of the speed", "1/s", -10.0, 10.0, "the notion of a smoothly bent ray")
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ def path_temperatures(
 
 
 def _group_covariance(
-    light: Air, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], u: dict[str, Any]
+    light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], u: dict[str, Any]
 ) -> np.ndarray:
     """Of the group refractivity: through the temperature, and what weather does at a given temperature as well."""
     slopes = light.sensitivity

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 
 from catseye.atmosphere.index.air import air
-from catseye.atmosphere.limit import Limit, check_spreads
+from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.shapes.tomography import LineMeans, Lines, Prior, Tomogram, tomogram
+from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Tomogram, tomogram
 from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
 
 PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
 CLOSE_ENOUGH_C = 1e-6
 NOTHING = "no travel time of {} is that of sound in air; check the delay and the places"
 WINDIEST = 60.0  # m/s that a wind and a temperature other than expected may make together
-LINE = Limit("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
+LINE = ValidInterval("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
 COMMON = ("delay", "pressure", "humidity", "carbon dioxide", "dispersion", "formula")  # after places of stations
 UNLIKELY = 1e-3  # chance of so large a chi-square, below which the priors are said not to fit
 
@@ -148,8 +148,8 @@ def sound_field(
     u_pressure_hpa: float,
     humidity_percent: float,
     u_humidity_percent: float,
-    temperature: Prior,
-    wind: Prior | None,
+    temperature: FieldPrior,
+    wind: FieldPrior | None,
     co2_ppm: float = 450.0,
     u_co2_ppm: float = 20.0,
     frequency_hz: float = 0.0,

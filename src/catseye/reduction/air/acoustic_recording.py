@@ -24,7 +24,7 @@ MICROSECOND = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class ChannelTrace:
     """What the first shot of a channel looks like, for a figure.
 
     time, samples       s from the file's first sample, and codes or volts about the arrival
@@ -42,7 +42,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
-class Shots:
+class SoundShots:
     """k shots: when, how long the sound took, and what became of each channel.
 
     mjd                of the emission, UTC
@@ -63,7 +63,7 @@ class Shots:
     texts: tuple[str, ...]
     weather: tuple[np.ndarray, np.ndarray, np.ndarray]
     file: tuple[str, ...]
-    traces: tuple[Trace, ...] = ()
+    traces: tuple[ChannelTrace, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class AcousticPath:
 
     sheet: AcousticSheet
     sheet_file: str
-    shots: Shots
+    shots: SoundShots
     found: PathTemperatures
     model: str
     air_model: str
@@ -148,7 +148,7 @@ def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> Ac
     return AcousticPath(sheet, beside.name, shots, found, model, air_model, hashes)
 
 
-def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Shots:
+def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
     """Travel times of the shots in a recording."""
     sampling_hz = recording.sampling_hz or sheet.sampling_hz
     start = sheet.start_of(recording.file)
@@ -194,7 +194,7 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Shots
             row.append(f"{channel}: {text}")
     if "ab" not in times:
         raise refusal(recording.file, "has no channel 'ab' (one direction is measured from ranger to target)")
-    return Shots(
+    return SoundShots(
         mjd, times["ab"], times.get("ba"), np.array(u_times), np.array(snrs), tuple("; ".join(t) for t in texts),
         weather, (recording.file,) * len(mjd), tuple(listener.traces),
     )  # fmt: skip
@@ -213,7 +213,7 @@ class _Listener:
 
     def __init__(self, recording: Recording, sheet: AcousticSheet, sampling_hz: float, template: np.ndarray) -> None:
         self.recording, self.sheet, self.sampling_hz, self.template = recording, sheet, sampling_hz, template
-        self.traces: list[Trace] = []
+        self.traces: list[ChannelTrace] = []
 
     def window(self, flight: np.ndarray, temperature_c: np.ndarray) -> float:
         if self.sheet.window_ms is not None:
@@ -246,7 +246,7 @@ class _Listener:
         delay = np.where(good, found.delay + at, np.nan)
         lag, height = plan.correlation(np.nan_to_num(rows[0].astype(float)), float(expected[0] - at[0]))
         self.traces.append(
-            Trace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
+            ChannelTrace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
                   height, float(delay[0]))
         )  # fmt: skip
         return _Arrivals(delay, np.where(good, found.u_delay, np.nan), found.snr, list(map(found.text, range(len(at)))))
@@ -259,7 +259,7 @@ class _Listener:
         return samples[max(0, int(begin * self.sampling_hz)) : max(0, int(until * self.sampling_hz))]
 
 
-def _timed(times: TravelTimes, sheet: AcousticSheet) -> Shots:
+def _timed(times: TravelTimes, sheet: AcousticSheet) -> SoundShots:
     """The rows of a table of travel times: the sheet's weather where the table has none."""
     names = ("temperature_c", "pressure_hpa", "humidity_percent")
     from_sheet = sheet.weather_at(times.mjd)
@@ -271,7 +271,7 @@ def _timed(times: TravelTimes, sheet: AcousticSheet) -> Shots:
         raise InputError(
             f"{times.file}: its times have no standard uncertainty (expected u_time_us, a column or in the sheet)"
         )
-    return Shots(
+    return SoundShots(
         times.mjd,
         times.time_ab - offset,
         None if times.time_ba is None else times.time_ba + offset,
@@ -283,7 +283,7 @@ def _timed(times: TravelTimes, sheet: AcousticSheet) -> Shots:
     )
 
 
-def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
+def _joined(parts: Sequence[SoundShots], sheet_file: str) -> SoundShots:
     """All files of a path, in order of time."""
     one_way = {part.time_ba is None for part in parts}
     if len(one_way) > 1:
@@ -295,7 +295,7 @@ def _joined(parts: Sequence[Shots], sheet_file: str) -> Shots:
 
     temperature, pressure, humidity = (column([part.weather[i] for part in parts]) for i in range(3))
     texts, files = ([item for part in parts for item in getattr(part, name)] for name in ("texts", "file"))
-    return Shots(
+    return SoundShots(
         column([part.mjd for part in parts]),
         column([part.time_ab for part in parts]),
         None if one_way == {True} else column([part.time_ba for part in parts if part.time_ba is not None]),
@@ -322,7 +322,7 @@ def frequency_hz(sheet: AcousticSheet) -> float:
     return DelayPlan(samples, sampling_hz=sampling_hz, window=1e-3).bandwidth / TWO_PI
 
 
-def _temperatures(shots: Shots, sheet: AcousticSheet, model: str, air_model: str) -> PathTemperatures:
+def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model: str) -> PathTemperatures:
     one_way = shots.time_ba is None
     u_offset = sheet.u_clock_offset_us * MICROSECOND
     u_delay = sheet.u_delay_us * MICROSECOND

@@ -20,7 +20,7 @@ from catseye.reduction.epoch.air import AirField
 from catseye.signal.cycles.whole import CycleStatus, decision, fraction, unwrapped_length
 
 if TYPE_CHECKING:
-    from catseye.records.site.target import Benchmark
+    from catseye.records.site.target import BenchmarkRow
     from catseye.reduction.epoch.epoch import Reduction
 
 MODULATION_HZ = 1500e6
@@ -229,7 +229,7 @@ def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, .
     return tuple(series)
 
 
-def _series(reduction: "Reduction", benchmark: "Benchmark", rows: np.ndarray) -> BenchmarkSeries:
+def _series(reduction: "Reduction", benchmark: "BenchmarkRow", rows: np.ndarray) -> BenchmarkSeries:
     campaign, coordinates = reduction.campaign, reduction.coordinates
     ranges, shots = coordinates.ranges, coordinates.ranges.shot[rows]
     sheet, electronics = campaign.mirror_of(benchmark.ranger), reduction.electronics[benchmark.ranger]

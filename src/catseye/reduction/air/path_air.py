@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.path.air_profile import AirProfile, PathIndex, WeatherReadings
-from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, Prior
+from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, ProfilePrior
 from catseye.atmosphere.path.suspect_readings import suspect_readings
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.records.night.weather import Weather
-from catseye.records.site.site import Site
+from catseye.records.site.site import SiteRecord
 
 SCREEN = 2.0  # m, height of a station's sensors above the ground, as weather services stand them
 FIELDS = (("temperature", "C"), ("pressure", "hPa"), ("humidity", "%"))
@@ -58,7 +58,7 @@ class SiteAir:
 
 
 def site_air(
-    site: Site,
+    site: SiteRecord,
     weather: Weather,
     *,
     ground: float | None = None,
@@ -66,9 +66,9 @@ def site_air(
     block: float | None = None,
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
-    temperature: Prior = TEMPERATURE,
-    pressure: Prior = PRESSURE,
-    humidity: Prior = HUMIDITY,
+    temperature: ProfilePrior = TEMPERATURE,
+    pressure: ProfilePrior = PRESSURE,
+    humidity: ProfilePrior = HUMIDITY,
 ) -> SiteAir:
     """The air of a site from its record and its table of weather.
 
@@ -100,7 +100,7 @@ def site_air(
     return SiteAir(profile, names, start, block, site.ranging.wavelength_um, model, co2_ppm, notes)
 
 
-def site_readings(site: Site, weather: Weather, without: Sequence[str] = ()) -> WeatherReadings:
+def site_readings(site: SiteRecord, weather: Weather, without: Sequence[str] = ()) -> WeatherReadings:
     """Readings of a site's stations with heights in the ground frame, seconds from the table's first row.
 
     site, weather, without   as `site_air`'s, which says what is refused

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 from catseye.atmosphere.index.air import MODELS, air
 from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
-from catseye.records.files.columns import Columns, columns_of
+from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Certificate, Version, Within
 from catseye.records.files.refusal import explained, refusal, shown
@@ -195,7 +195,7 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     return found
 
 
-def _limited(table: Columns, name: str, limit) -> np.ndarray:
+def _limited(table: TextColumns, name: str, limit) -> np.ndarray:
     """A column of numbers within the model's limits; a blank cell is nan."""
     values = table.numbers(name, blank=float("nan"))
     good = ~((values < limit.lower) | (values > limit.upper))

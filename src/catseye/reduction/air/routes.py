@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.atmosphere.index import hygrometer
-from catseye.atmosphere.index.air import MODELS, Air, air, air_of_vapour, group_partials
-from catseye.atmosphere.limit import Limit
+from catseye.atmosphere.index.air import MODELS, AirState, air, air_of_vapour, group_partials
+from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import barometer, humidity
 from catseye.atmosphere.weather.condensation import Condensation, condensation
 
@@ -25,7 +25,7 @@ HYGROMETERS: tuple[Hygrometer, ...] = (
     "ice_bulb_c",
     "vapour_pressure_hpa",
 )
-ABOVE = Limit("height above the barometer", "m", -1000.0, 1000.0, "air of one temperature")
+ABOVE = ValidInterval("height above the barometer", "m", -1000.0, 1000.0, "air of one temperature")
 U_STANDARD_GRAVITY = 0.02  # m/s²: gravity at stations from 9.78 to 9.83 stands for 9.80665
 U_LAPSE = 0.0065  # °C/m, of air taken to be of one temperature: as much as the standard air's falls
 
@@ -94,7 +94,7 @@ def air_by(
     model="ciddor_hill1999",
     co2_ppm=450.0,
     modulation_hz=1500e6,
-) -> tuple[Air, Any]:
+) -> tuple[AirState, Any]:
     """The air and the standard uncertainty of its group index, formula and instruments.
 
     temperature_c     of the air, °C
@@ -137,7 +137,7 @@ def air_by(
 
 
 def surface_of(
-    state: Air, moisture: Moisture, surface_c, *, u_surface_c=0.0, u_temperature_c=0.0, u_pressure_hpa=0.0
+    state: AirState, moisture: Moisture, surface_c, *, u_surface_c=0.0, u_temperature_c=0.0, u_pressure_hpa=0.0
 ) -> Condensation:
     """Whether a surface in this air will dew or frost over.
 
@@ -172,7 +172,7 @@ def surface_of(
     )
 
 
-def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrometer.Reading:
+def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrometer.VapourReading:
     """Vapour pressure from an instrument, by the saturation formula that goes with the model where it has one.
 
     Over ice and in a psychrometer the formula is the notes', Buck's.
@@ -186,7 +186,7 @@ def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrome
         return hygrometer.of_mirror(moisture.value, pressure_hpa, deposit="frost")
     if moisture.kind == "vapour_pressure_hpa":
         e = np.asarray(moisture.value, float)
-        return hygrometer.Reading(e, np.zeros_like(e), np.zeros_like(e), np.ones_like(e), np.zeros_like(e))
+        return hygrometer.VapourReading(e, np.zeros_like(e), np.zeros_like(e), np.ones_like(e), np.zeros_like(e))
     over_ice = moisture.kind == "ice_bulb_c"
     return hygrometer.of_wet_bulb(temperature_c, moisture.value, pressure_hpa, over_ice=over_ice)
 

@@ -12,15 +12,15 @@ from threadpoolctl import threadpool_limits
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.baseline.adjustment import CEILING, Solution
+from catseye.estimation.baseline.adjustment import CEILING, BaselineSolution
 from catseye.estimation.baseline.iso17123 import FullTest
-from catseye.estimation.baseline.model import Known
+from catseye.estimation.baseline.model import KnownPlaces
 from catseye.records.files.refusal import shown
-from catseye.records.laboratory.baseline import Baseline, Heights, Observations, numbers_of
+from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights, numbers_of
 from catseye.reduction.baseline.job import BaselineJob, Progress
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
-from catseye.reduction.baseline.statistical_tests import FOLLOWS, Suspect, decisions_of
-from catseye.reduction.calibrations.calibration import Decision
+from catseye.reduction.baseline.statistical_tests import FOLLOWS, SuspectShot, decisions_of
+from catseye.reduction.calibrations.calibration import TestOutcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +46,19 @@ class BaselineCalibration:
     notes          what a person should know
     """
 
-    observations: Observations
+    observations: BaselineShots
     settings: BaselineSettings
     names: tuple[str, ...]
     heights: np.ndarray | None
     reference_height: float | None
     lengths: Lengths
     keep: np.ndarray
-    solution: Solution
+    solution: BaselineSolution
     test: FullTest | str
     all_shots: FullTest | None
     against: Baseline | None
-    decisions: tuple[Decision, ...]
-    suspects: tuple[Suspect, ...]
+    decisions: tuple[TestOutcome, ...]
+    suspects: tuple[SuspectShot, ...]
     rejected: tuple[str, ...]
     cyclic: tuple[str, ...]
     weather: tuple[float, float]
@@ -71,7 +71,7 @@ class BaselineCalibration:
 
 
 def calibrate_baseline(
-    seen: Observations,
+    seen: BaselineShots,
     heights: Heights | None = None,
     against: Baseline | None = None,
     *,
@@ -147,7 +147,7 @@ def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Pr
     )
 
 
-def _refuse_gross(solution: Solution, job: BaselineJob, keep: np.ndarray) -> None:
+def _refuse_gross(solution: BaselineSolution, job: BaselineJob, keep: np.ndarray) -> None:
     """A scatter at the ceiling of what is estimated is no noise; the row is the worst before anything was adjusted."""
     noise = solution.noise
     if np.isfinite(solution.u_noise).any() and np.any(np.array([noise.shot, noise.set, noise.air]) > 0.999 * CEILING):
@@ -160,7 +160,7 @@ def _refuse_gross(solution: Solution, job: BaselineJob, keep: np.ndarray) -> Non
         )
 
 
-def _ordered(seen: Observations, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
+def _ordered(seen: BaselineShots, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
     if against is not None:
         numbers_of(against, seen.names, seen.file)
         return against.pillars
@@ -172,7 +172,7 @@ def _ordered(seen: Observations, heights: Heights | None, against: Baseline | No
     return tuple(name for name in heights.height if name in seen.names)
 
 
-def _renumbered(seen: Observations, names: tuple[str, ...]) -> Observations:
+def _renumbered(seen: BaselineShots, names: tuple[str, ...]) -> BaselineShots:
     from copy import copy
 
     number = np.array([names.index(n) for n in seen.names])
@@ -209,14 +209,14 @@ def _heights(seen, heights: Heights | None, against: Baseline | None, settings: 
     return height, u, first if reference is None else reference
 
 
-def _known(against: Baseline) -> Known:
+def _known(against: Baseline) -> KnownPlaces:
     n = len(against.pillars)
     number = {name: i for i, name in enumerate(against.pillars)}
     rows = [number[entry[2:]] + (n if entry[0] == "y" else 0) for entry in against.known]
-    return Known(np.array(against.x_m), np.array(against.y_m), np.array(rows), against.covariance)
+    return KnownPlaces(np.array(against.x_m), np.array(against.y_m), np.array(rows), against.covariance)
 
 
-def _notes(seen, solution: Solution, settings: BaselineSettings, against: Baseline | None) -> list[str]:
+def _notes(seen, solution: BaselineSolution, settings: BaselineSettings, against: Baseline | None) -> list[str]:
     notes = []
     if against is None:
         notes.append(

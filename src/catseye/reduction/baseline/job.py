@@ -7,9 +7,15 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
-from catseye.estimation.baseline.adjustment import SEPARABLE, Solution, adjust_baseline, places_in_line, separation
+from catseye.estimation.baseline.adjustment import (
+    SEPARABLE,
+    BaselineSolution,
+    adjust_baseline,
+    places_in_line,
+    separation,
+)
 from catseye.estimation.baseline.iso17123 import FullTest, full_test
-from catseye.estimation.baseline.model import Claim, Extra, Known, Sights
+from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, KnownPlaces
 from catseye.reduction.baseline.lengths import BaselineSettings
 from catseye.reduction.baseline.statistical_tests import suspects_of
 
@@ -19,11 +25,11 @@ Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in
 class BaselineJob:
     """The adjustments of one calibration, which differ in what they leave out or add."""
 
-    def __init__(self, seen, lengths, settings: BaselineSettings, known: Known | None, notes: list[str]):
+    def __init__(self, seen, lengths, settings: BaselineSettings, known: KnownPlaces | None, notes: list[str]):
         self.seen, self.lengths, self.settings, self.known, self.notes = seen, lengths, settings, known, notes
         count = len(seen.names)
         u_direction = np.hypot(seen.u_rounding, settings.u_direction_arcsec * ARCSECOND)
-        self.sights = Sights(
+        self.sights = BaselineSights(
             seen.start,
             seen.end,
             seen.set,
@@ -44,7 +50,7 @@ class BaselineJob:
         else:
             self.x, self.y = known.x, known.y
 
-    def solved(self, keep, *, extra: Extra | None = None, noise: Claim | None = None) -> Solution:
+    def solved(self, keep, *, extra: Extra | None = None, noise: Claim | None = None) -> BaselineSolution:
         part = None if extra is None else Extra(extra.names, extra.columns[keep])
         try:
             return adjust_baseline(
@@ -73,7 +79,7 @@ class BaselineJob:
         """Standard deviation that the maker claims, linear in the distance, m."""
         return self.settings.specified_mm * MILLIMETRE + self.settings.specified_ppm * PPM * distance
 
-    def agreement(self, solution: Solution, cyclic: tuple[str, ...], keep) -> Solution:
+    def agreement(self, solution: BaselineSolution, cyclic: tuple[str, ...], keep) -> BaselineSolution:
         """Sets against the known pillars, a set's variance being what the maker claims; without directions."""
         used = solution.used
         shot = max(solution.noise.shot, 1e-16)
@@ -128,7 +134,7 @@ class BaselineJob:
         columns = [self.lengths.stretch * f((k + 1) * phase) for k in range(len(names) // 2) for f in (np.cos, np.sin)]
         return Extra(names, np.stack(columns, axis=1))
 
-    def with_cyclic(self, keep, solution: Solution) -> tuple[Solution, tuple[str, ...]]:
+    def with_cyclic(self, keep, solution: BaselineSolution) -> tuple[BaselineSolution, tuple[str, ...]]:
         if self.settings.unit_length is None:
             return solution, ()
         names = tuple(f"cyclic {f} {k + 1}" for k in range(self.settings.orders) for f in ("cosine", "sine"))
@@ -152,7 +158,7 @@ class BaselineJob:
             return solution, ()
         return self.solved(keep, extra=terms), names
 
-    def full_tests(self, solution: Solution) -> tuple[FullTest | str, FullTest | None, FullTest | None]:
+    def full_tests(self, solution: BaselineSolution) -> tuple[FullTest | str, FullTest | None, FullTest | None]:
         """The standard's procedure along the line, what a pillar off it adds taken away first: of the sets' means with
         equal weights, with the maker's as weights, and of all shots."""
         used, y = solution.used, solution.y
@@ -176,7 +182,7 @@ class BaselineJob:
         except EstimationError as problem:
             return str(problem), None, None
 
-    def weather(self, keep, solution: Solution, cyclic: tuple[str, ...]) -> tuple[float, float]:
+    def weather(self, keep, solution: BaselineSolution, cyclic: tuple[str, ...]) -> tuple[float, float]:
         """Which share of the correction's changes the light followed: 1 - b, where b of them is left in the distances.
 
         The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.

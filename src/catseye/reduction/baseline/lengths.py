@@ -14,7 +14,7 @@ from catseye.atmosphere.sound.velocity import (
 )
 from catseye.errors import ValidityError
 from catseye.records.files.refusal import refusal
-from catseye.records.laboratory.baseline import Observations
+from catseye.records.laboratory.baseline import BaselineShots
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, 
 
 
 def reduce_lengths(
-    seen: Observations, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
+    seen: BaselineShots, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
 ) -> Lengths:
     """Horizontal distances at one height, with what each common effect does to them.
 

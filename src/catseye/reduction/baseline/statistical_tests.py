@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.estimation.baseline.adjustment import Solution
+from catseye.estimation.baseline.adjustment import BaselineSolution
 from catseye.estimation.baseline.iso17123 import FullTest, is_nothing, same_precision, within_claim
-from catseye.reduction.calibrations.calibration import Decision
+from catseye.reduction.calibrations.calibration import TestOutcome
 
 if TYPE_CHECKING:
     from catseye.records.laboratory.baseline import Baseline
@@ -19,7 +19,7 @@ ALIKE = 0.99  # correlation of standardised residuals from which on an error of 
 
 
 @dataclass(frozen=True)
-class Suspect:
+class SuspectShot:
     """A shot, or a set of shots, that its test rejects.
 
     kind   "shot" or "set"
@@ -36,7 +36,7 @@ class Suspect:
     twins: tuple[int, ...] = ()
 
 
-def suspects_of(solution: Solution, rows: np.ndarray, level: float) -> tuple[Suspect, ...]:
+def suspects_of(solution: BaselineSolution, rows: np.ndarray, level: float) -> tuple[SuspectShot, ...]:
     """Shots against their set, sets against the baseline, least probable first.
 
     solution   an adjustment
@@ -57,13 +57,15 @@ def suspects_of(solution: Solution, rows: np.ndarray, level: float) -> tuple[Sus
         if p < level:
             pair = np.flatnonzero((used.set == used.set[i]) & (np.arange(len(used)) != i))
             twins = rows[pair] if len(pair) == 1 else rows[:0]
-            found.append(Suspect("shot", (int(rows[i]),), float(solution.w_shot[i]), float(p), tuple(twins.tolist())))
+            found.append(
+                SuspectShot("shot", (int(rows[i]),), float(solution.w_shot[i]), float(p), tuple(twins.tolist()))
+            )
     of_sets = _p_tau(solution.w_set, solution.freedom_sets if estimated else np.inf)
     wrong = tests * of_sets < level
     for i in np.flatnonzero(wrong):
         twin = wrong & (np.abs(solution.alike[i]) > ALIKE) & (np.arange(len(wrong)) != i)
         mine, others = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
-        found.append(Suspect("set", mine, float(solution.w_set[i]), float(tests * of_sets[i]), others))
+        found.append(SuspectShot("set", mine, float(solution.w_set[i]), float(tests * of_sets[i]), others))
     return tuple(sorted(found, key=lambda s: (s.p, -abs(s.w))))
 
 
@@ -80,16 +82,16 @@ def _p_tau(w: np.ndarray, freedom: float) -> np.ndarray:
 
 
 def decisions_of(
-    solution: Solution,
+    solution: BaselineSolution,
     test: FullTest | str,
     settings: "BaselineSettings",
     *,
     claimed: FullTest | None,
-    agreement: Solution | None,
+    agreement: BaselineSolution | None,
     weather: tuple[float, float],
     against: "Baseline | None",
-    suspects: tuple[Suspect, ...],
-) -> tuple[Decision, ...]:
+    suspects: tuple[SuspectShot, ...],
+) -> tuple[TestOutcome, ...]:
     """Every test with its outcome.
 
     solution    the adjustment
@@ -107,7 +109,7 @@ def decisions_of(
         _setups(solution, level),
         _weather(weather, solution.freedom_sets, level),
         *(_instrument(solution, agreement, level) if agreement is not None else ()),
-        Decision(
+        TestOutcome(
             "outliers",
             float(len(suspects)),
             0.0,
@@ -117,14 +119,16 @@ def decisions_of(
     )
 
 
-def _standard(test: FullTest | str, claimed: FullTest | None, settings, against: "Baseline | None") -> list[Decision]:
+def _standard(
+    test: FullTest | str, claimed: FullTest | None, settings, against: "Baseline | None"
+) -> list[TestOutcome]:
     """The standard's three questions; sets, each one distance, are the sample."""
     if isinstance(test, str) or claimed is None:
-        return [Decision(f"ISO 17123-4 {q}", float("nan"), float("nan"), None, str(test)) for q in "ac"]
+        return [TestOutcome(f"ISO 17123-4 {q}", float("nan"), float("nan"), None, str(test)) for q in "ac"]
     claim = within_claim(claimed.s**2, claimed.degrees_of_freedom, settings.level)
     words = f"{settings.specified_mm:g} mm + {settings.specified_ppm:g} ppm"
     text = f"sets scatter {'as' if claim.passed else 'more than'} specified ({words})"
-    made = [Decision("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
+    made = [TestOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
     if against is not None and against.s_mm is not None and against.degrees_of_freedom:
         same = same_precision(
             test.s / MILLIMETRE, test.degrees_of_freedom, against.s_mm, against.degrees_of_freedom, settings.level
@@ -133,21 +137,21 @@ def _standard(test: FullTest | str, claimed: FullTest | None, settings, against:
             f"s {test.s / MILLIMETRE:.3f} mm here, {against.s_mm:.3f} mm at the known baseline; "
             f"the ratio of squares must be {same.lower:.3g} at least, too"
         )
-        made.append(Decision("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
+        made.append(TestOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
     zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, settings.level)
     text = f"zero {test.zero / MILLIMETRE:+.3f} ± {test.u_zero / MILLIMETRE:.3f} mm is "
     text += "not significant" if zero.passed else "significant: correct for it"
-    return [*made, Decision("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
+    return [*made, TestOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
 
 
-def _setups(solution: Solution, level: float) -> Decision:
+def _setups(solution: BaselineSolution, level: float) -> TestOutcome:
     """Do sets disagree by more than their shots do? F of the means' squares over the shots'."""
     from scipy.stats import f
 
     name = "sets agree as their shots do"
     between, within = solution.freedom_sets, solution.freedom_shots
     if within < 1 or between < 1:
-        return Decision(name, float("nan"), float("nan"), None, "no repeated shots: the test is not possible")
+        return TestOutcome(name, float("nan"), float("nan"), None, "no repeated shots: the test is not possible")
     squares = float(np.sum(solution.used.within**2)) / within
     means = float(np.sum(solution.used.shots * solution.residual**2)) / between
     ratio = means / squares if squares > 0.0 else float("inf")
@@ -157,38 +161,38 @@ def _setups(solution: Solution, level: float) -> Decision:
         if ratio <= limit
         else "repeats hide most of it: pointing, centring and the air change from set to set"
     )
-    return Decision(name, ratio, limit, ratio <= limit, text)
+    return TestOutcome(name, ratio, limit, ratio <= limit, text)
 
 
-def _weather(weather: tuple[float, float], freedom: int, level: float) -> Decision:
+def _weather(weather: tuple[float, float], freedom: int, level: float) -> TestOutcome:
     name = FOLLOWS
     share, u = weather
     if not np.isfinite(share):
-        return Decision(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
+        return TestOutcome(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
     one = is_nothing(share - 1.0, u, max(freedom - 1, 1), level)
     text = f"lengths followed {share:.2f} ± {u:.2f} of the changes of index that the sensors say (1 expected)"
     if not one.passed and abs(share) < abs(share - 1.0):
         text += ": as if corrected in the field already, or thermometers not in the air of the path"
-    return Decision(name, one.statistic, one.limit, one.passed, text)
+    return TestOutcome(name, one.statistic, one.limit, one.passed, text)
 
 
-def _instrument(solution: Solution, agreement: Solution, level: float) -> tuple[Decision, ...]:
+def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: float) -> tuple[TestOutcome, ...]:
     """Zero and scale against known pillars, and whether the sets agree with those as well as the maker claims."""
     made = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)
         test = is_nothing(value, u, solution.freedom_of(key), level)
         text = f"{key} {value / scale:+.3f} ± {u / scale:.3f} {unit} against the known pillars"
-        made.append(Decision(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
+        made.append(TestOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
     freedom = agreement.freedom_sets
     if freedom > 0:
         fit = within_claim(agreement.sets_squares / freedom, freedom, level)
         text = f"sets {'agree' if fit.passed else 'do not agree'} with the known pillars as well as is claimed for both"
-        made.append(Decision("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
+        made.append(TestOutcome("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
     return tuple(made)
 
 
-def _outliers(suspects: tuple[Suspect, ...]) -> str:
+def _outliers(suspects: tuple[SuspectShot, ...]) -> str:
     worst = suspects[0]
     rows = ", ".join(str(r + 1) for r in worst.rows)
     return f"{len(suspects)} suspect; worst: {worst.kind} of row {rows}, w = {worst.w:+.1f}, p = {worst.p:.2g}"

@@ -15,14 +15,14 @@ from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
 from catseye.optics.retroreflector.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
-from catseye.reduction.budget.scene import Scene, walk_of
+from catseye.reduction.budget.scene import ShotScene, walk_of
 from catseye.reduction.epoch.head import mounted, only_prime
 from catseye.reduction.site.stations import AXES
 
 NODES = 3  # of the quadrature along the path: exact to degree 5 in height
 
 
-class Columns:
+class DrawnInputs:
     """Drawn inputs by key; a key that is no input answers its default."""
 
     def __init__(self, items: tuple[Item, ...], x: np.ndarray) -> None:
@@ -42,11 +42,11 @@ class Columns:
         return [self.x[:, k] for key, k in self.at.items() if key.startswith(f"cyclic {kind} ")]
 
 
-def measurement(scene: Scene, items: tuple[Item, ...]) -> Model:
+def measurement(scene: ShotScene, items: tuple[Item, ...]) -> Model:
     """The range (n,), m, of inputs (n, k) in the items' order and units."""
 
     def model(x: np.ndarray) -> np.ndarray:
-        v = Columns(items, x)
+        v = DrawnInputs(items, x)
         target, phase, level = _phase(scene, v)
         coupled = v("coupling") * np.log(np.abs(target) / level)
         half = 0.5 * SPEED_OF_LIGHT / v("frequency")
@@ -60,7 +60,7 @@ def measurement(scene: Scene, items: tuple[Item, ...]) -> Model:
     return model
 
 
-def drawing(scene: Scene, items: tuple[Item, ...]) -> Draw:
+def drawing(scene: ShotScene, items: tuple[Item, ...]) -> Draw:
     """A function of a generator and a number that draws so many inputs, the electronics' walk as a path."""
     inputs = [item.given for item in items]
     correlation = correlation_of(scene, items)
@@ -74,7 +74,7 @@ def drawing(scene: Scene, items: tuple[Item, ...]) -> Draw:
     return draw
 
 
-def _walked(scene: Scene, generator: np.random.Generator, n: int) -> np.ndarray:
+def _walked(scene: ShotScene, generator: np.random.Generator, n: int) -> np.ndarray:
     """How far (n,), rad, the electronics were off what interpolation between noiseless references says."""
     rows = felt(scene)
     references = scene.references
@@ -86,7 +86,7 @@ def _walked(scene: Scene, generator: np.random.Generator, n: int) -> np.ndarray:
     return path[:, -1] - path[:, :-1] @ references.weight[rows]
 
 
-def _phase(scene: Scene, v: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _phase(scene: ShotScene, v: DrawnInputs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The target's phasor (V), its phase after the electronics' (rad, not wrapped), the reference amplitude (V)."""
     leakage = v("leakage real") + 1j * v("leakage imaginary") - scene.leakage
     amplitude, direction = abs(scene.phasor), scene.phasor / abs(scene.phasor)
@@ -101,7 +101,7 @@ def _phase(scene: Scene, v: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return target, scene.phase + np.angle(target / scene.phasor) - electronics, level
 
 
-def _index(scene: Scene, v: Columns) -> np.ndarray:
+def _index(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     """Group index (n,) of the path in the drawn air."""
     field = scene.field
     read = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
@@ -139,7 +139,7 @@ def _index(scene: Scene, v: Columns) -> np.ndarray:
     return 1.0 + mean_refractivity + beyond + (v("formula") + v("fluctuation")) * PPM
 
 
-def _glass(scene: Scene, v: Columns) -> np.ndarray:
+def _glass(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     """Correction for the glass (n,), m, its reference point held where the records put it."""
     place = scene.place
     n0 = scene.campaign.site.ranging.bk7_to_air_group_index_ratio
@@ -166,7 +166,7 @@ def _glass(scene: Scene, v: Columns) -> np.ndarray:
     return -height * in_glass + depth * cosine + typed
 
 
-def _axes(scene: Scene, v: Columns) -> np.ndarray:
+def _axes(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     """Correction (n,), m, for axes and beam that do not meet: less the target's change, plus the cube's."""
     if "axes axis offset" not in v.at:
         return np.zeros(len(v.x))

@@ -11,20 +11,20 @@ from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.budget.chain import drawing, measurement
 from catseye.reduction.budget.inputs import Item, correlation_of, items_of
-from catseye.reduction.budget.scene import Assumptions, Scene, scene_of
-from catseye.reduction.epoch.coordinates import Coordinates
+from catseye.reduction.budget.scene import Assumptions, ShotScene, scene_of
+from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
 from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import Settings
-from catseye.reduction.site.places import Place, places_of
-from catseye.signal.cycles.whole import Decision, decision, unwrapped_length
+from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.site.places import RangedPoint, places_of
+from catseye.signal.cycles.whole import CycleDecision, decision, unwrapped_length
 
 CHECKED = 0.05  # redundancy below which the other shots do not say where a target is
 UNDECIDED = "not adjusted"  # status of a usable shot where the campaign cannot be adjusted
 
 
 @dataclass(frozen=True)
-class Adjusted:
+class AdjustedShot:
     """What the adjustment of the whole campaign says of the shot; lengths in metres.
 
     range_, u_range         as this shot gives it with the estimated corrections; u without systematic parameters
@@ -73,13 +73,13 @@ class Explanation:
     reason: str
     phasor: complex
     u_across: float
-    scene: Scene | None = None
+    scene: ShotScene | None = None
     items: tuple[Item, ...] = ()
     budget: Budget | None = None
-    cycles: Decision | None = None
+    cycles: CycleDecision | None = None
     coarse: str = ""
     scattered: Scattered | None = None
-    adjusted: Adjusted | None = None
+    adjusted: AdjustedShot | None = None
     references: tuple[tuple[int, float, float], ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -88,7 +88,7 @@ def explain_shot(
     campaign: Campaign,
     shot: int,
     *,
-    settings: Settings | None = None,
+    settings: ReductionSettings | None = None,
     assumptions: Assumptions | None = None,
     draws: int = 0,
     seed: int = 1,
@@ -113,7 +113,7 @@ def explain_shot(
 
     Source: [PARKER04] eqs. 5.12-5.19; [JCGM100] clause 5 and annex G; [JCGM101] clause 7.
     """
-    settings = settings or Settings()
+    settings = settings or ReductionSettings()
     found = np.flatnonzero(campaign.shots.shot == shot)
     if not len(found):
         low, high = int(campaign.shots.shot.min()), int(campaign.shots.shot.max())
@@ -150,7 +150,7 @@ def explain_shot(
     return _budgeted(known, scene, draws, seed, progress)
 
 
-def budget_of(scene: Scene, items: tuple[Item, ...]) -> Budget:
+def budget_of(scene: ShotScene, items: tuple[Item, ...]) -> Budget:
     """The first-order budget of a scene's range."""
     return propagate(
         [item.given for item in items],
@@ -160,7 +160,7 @@ def budget_of(scene: Scene, items: tuple[Item, ...]) -> Budget:
     )
 
 
-def scatter_of(scene: Scene, items: tuple[Item, ...], draws: int, seed: int) -> Scattered:
+def scatter_of(scene: ShotScene, items: tuple[Item, ...], draws: int, seed: int) -> Scattered:
     """The Monte Carlo of a scene's range."""
     generator = np.random.default_rng(seed)
     found = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
@@ -168,7 +168,7 @@ def scatter_of(scene: Scene, items: tuple[Item, ...], draws: int, seed: int) -> 
     return replace(found, u=float("nan")) if spreadless else found  # such a t has no variance, only an interval
 
 
-def _budgeted(known: Explanation, scene: Scene, draws: int, seed: int, progress: Progress | None) -> Explanation:
+def _budgeted(known: Explanation, scene: ShotScene, draws: int, seed: int, progress: Progress | None) -> Explanation:
     items = items_of(scene)
     budget = budget_of(scene, items)
     if progress is not None and draws:
@@ -212,7 +212,9 @@ def _status(
     return reason.partition(":")[0] or usual, reason
 
 
-def _places(campaign: Campaign, row: int, reduction: Reduction | None) -> tuple[tuple[np.ndarray, np.ndarray], Place]:
+def _places(
+    campaign: Campaign, row: int, reduction: Reduction | None
+) -> tuple[tuple[np.ndarray, np.ndarray], RangedPoint]:
     names = campaign.shots.ranger[row], campaign.shots.target[row]
     if reduction and set(names) <= set(reduction.coordinates.points):
         found = reduction.coordinates
@@ -222,7 +224,7 @@ def _places(campaign: Campaign, row: int, reduction: Reduction | None) -> tuple[
     return (places[names[0]].start, places[names[1]].start), places[names[1]]
 
 
-def _adjusted(coordinates: Coordinates, row: int) -> Adjusted | None:
+def _adjusted(coordinates: AdjustedCoordinates, row: int) -> AdjustedShot | None:
     ranges = coordinates.ranges
     mine = np.flatnonzero(ranges.shot == row)
     if not len(mine):
@@ -233,7 +235,7 @@ def _adjusted(coordinates: Coordinates, row: int) -> Adjusted | None:
     distance = float(np.linalg.norm(b - a))
     direction = (b - a) / distance
     both = np.concatenate([-direction, direction])
-    return Adjusted(
+    return AdjustedShot(
         range_=float(ranges.range_[k]),
         u_range=float(ranges.u_range[k]),
         residual=float(ranges.residual[k]),
@@ -245,7 +247,7 @@ def _adjusted(coordinates: Coordinates, row: int) -> Adjusted | None:
     )
 
 
-def _cycles(scene: Scene, adjusted: Adjusted | None, items: tuple[Item, ...]) -> tuple[Decision, str]:
+def _cycles(scene: ShotScene, adjusted: AdjustedShot | None, items: tuple[Item, ...]) -> tuple[CycleDecision, str]:
     """What decides N: the distance that all other shots give where they do, the records' places otherwise.
 
     Leaving a shot out turns its residual r into r / redundancy and its u into u / root redundancy.
@@ -269,7 +271,7 @@ def _cycles(scene: Scene, adjusted: Adjusted | None, items: tuple[Item, ...]) ->
     return found, source
 
 
-def _u_typed(scene: Scene) -> float:
+def _u_typed(scene: ShotScene) -> float:
     """Standard uncertainty, m, of the distance between the places of the records."""
     total = 0.0
     places = places_of(scene.campaign)

@@ -25,7 +25,7 @@ from catseye.atmosphere.weather.humidity import saturation, vapour_pressure_hpa
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.quality.propagation import STUDENT, Input
 from catseye.optics.retroreflector.prism import obliquity_slope
-from catseye.reduction.budget.scene import FELT, Scene, head_columns
+from catseye.reduction.budget.scene import FELT, ShotScene, head_columns
 from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
 from catseye.signal.detection.buffers import inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES
@@ -55,12 +55,12 @@ class Item:
     source: str
 
 
-def items_of(scene: Scene) -> tuple[Item, ...]:
+def items_of(scene: ShotScene) -> tuple[Item, ...]:
     """Every input of a range, in the order of the light: samples, electronics, head, air, glass."""
     return (*_samples(scene), *_electronics(scene), *_head(scene), *_frequency(scene), *_air(scene), *_glass(scene))
 
 
-def correlation_of(scene: Scene, items: tuple[Item, ...]) -> np.ndarray:
+def correlation_of(scene: ShotScene, items: tuple[Item, ...]) -> np.ndarray:
     """Of all inputs: the thermometers', as assumed; whatever acts on target and references alike is one input."""
     r = np.eye(len(items))
     thermometers = [k for k, item in enumerate(items) if item.key.startswith("thermometer ")]
@@ -71,7 +71,7 @@ def correlation_of(scene: Scene, items: tuple[Item, ...]) -> np.ndarray:
     return r
 
 
-def _phase_slope(scene: Scene) -> tuple[float, float]:
+def _phase_slope(scene: ShotScene) -> tuple[float, float]:
     """S and s, m a radian: by the electronics' phase with and without the cyclic deviation."""
     s = scene.half / (TWO_PI * scene.index)
     mirror = scene.mirror
@@ -79,7 +79,7 @@ def _phase_slope(scene: Scene) -> tuple[float, float]:
     return s + float(cyclic_slope(scene.phase, cosine, sine)), s
 
 
-def _noise(scene: Scene, row: int, phasor: complex) -> tuple[str, float]:
+def _noise(scene: ShotScene, row: int, phasor: complex) -> tuple[str, float]:
     """Distribution and degrees of freedom of the noise across a buffer's phasor, as `measure_phases` finds it.
 
     From 16 cycles on it is that of one quadrature, of fewer degrees where the noise is coloured; of both below that;
@@ -96,7 +96,7 @@ def _noise(scene: Scene, row: int, phasor: complex) -> tuple[str, float]:
     return STUDENT, float(degrees[0, 1])
 
 
-def _samples(scene: Scene) -> list[Item]:
+def _samples(scene: ShotScene) -> list[Item]:
     campaign, row = scene.campaign, scene.row
     shots, adc = campaign.shots, campaign.site.adc
     slope, s = _phase_slope(scene)
@@ -131,7 +131,7 @@ def _samples(scene: Scene) -> list[Item]:
     ]
 
 
-def _electronics(scene: Scene) -> list[Item]:
+def _electronics(scene: ShotScene) -> list[Item]:
     references, (slope, _) = scene.references, _phase_slope(scene)
     shots = scene.campaign.shots
     items = []
@@ -155,7 +155,7 @@ def _electronics(scene: Scene) -> list[Item]:
     return [*items, Item("walk", given, "rad", slope, source)]
 
 
-def _gap(scene: Scene) -> str:
+def _gap(scene: ShotScene) -> str:
     after = scene.references.seconds - scene.seconds
     before, later = after[after <= 0], after[after > 0]
     if not len(before) or not len(later):
@@ -165,7 +165,7 @@ def _gap(scene: Scene) -> str:
     return f"references {later.min() - before.max():.0f} s apart"
 
 
-def _head(scene: Scene) -> list[Item]:
+def _head(scene: ShotScene) -> list[Item]:
     mirror, references = scene.mirror, scene.references
     file = SHEET.format(mirror.zp)
     slope, s = _phase_slope(scene)
@@ -184,7 +184,7 @@ def _head(scene: Scene) -> list[Item]:
     return [*items, Item("d0", given, "mm", MILLIMETRE, f"{file}u_d0_mm"), *_effects(scene, file)]
 
 
-def _effects(scene: Scene, file: str) -> list[Item]:
+def _effects(scene: ShotScene, file: str) -> list[Item]:
     """Axes, coupling and cyclic deviation, where the sheet knows of them."""
     mirror = scene.mirror
     unknowns = head_unknowns(scene.campaign, scene.ranger)
@@ -218,13 +218,13 @@ def _effects(scene: Scene, file: str) -> list[Item]:
     return items
 
 
-def _frequency(scene: Scene) -> list[Item]:
+def _frequency(scene: ShotScene) -> list[Item]:
     f = scene.campaign.site.ranging.modulation_hz
     given = Input("modulation frequency", f, scene.assumptions.u_frequency * f)
     return [Item("frequency", given, "Hz", -scene.length / f, ASSUMED + "a rubidium oscillator left alone")]
 
 
-def _air(scene: Scene) -> list[Item]:
+def _air(scene: ShotScene) -> list[Item]:
     field, assumed = scene.field, scene.assumptions
     by_index = -scene.length / scene.index
     pressure, humidity = mean_readings(scene)
@@ -278,13 +278,13 @@ def _air(scene: Scene) -> list[Item]:
     ]
 
 
-def mean_readings(scene: Scene) -> tuple[float, float]:
+def mean_readings(scene: ShotScene) -> tuple[float, float]:
     """Pressure, hPa, at the stations' mean height, and relative humidity, %, smoothed to the shot's instant."""
     state = scene.field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0]
     return float(state[:, 1].mean()), float(state[:, 2].mean())
 
 
-def _weather_slopes(scene: Scene) -> tuple[float, float]:
+def _weather_slopes(scene: ShotScene) -> tuple[float, float]:
     """Of the path's mean group index by pressure (a hPa) and humidity (a %), temperature by the stations' line."""
     field = scene.field
     temperatures = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
@@ -319,7 +319,7 @@ def _weather_slopes(scene: Scene) -> tuple[float, float]:
     return float(by_pressure), float(by_humidity)
 
 
-def _glass(scene: Scene) -> list[Item]:
+def _glass(scene: ShotScene) -> list[Item]:
     place, campaign = scene.place, scene.campaign
     n = campaign.site.ranging.bk7_to_air_group_index_ratio
     u_n = scene.assumptions.half_width_index_ratio / np.sqrt(3.0)
@@ -354,12 +354,12 @@ def _glass(scene: Scene) -> list[Item]:
     ]
 
 
-def ball_of(scene: Scene) -> tuple[str, float, float, float]:
+def ball_of(scene: ShotScene) -> tuple[str, float, float, float]:
     """File, radii and their standard uncertainty, mm, of the ball that a shot is on."""
     triplet = next(t for t in scene.campaign.triplets.values() if t.ball.target == scene.target)
     return f"triplets/{triplet.triplet}.toml: ", triplet.ball.r1_mm, triplet.ball.r2_mm, triplet.ball.u_r_mm
 
 
-def felt(scene: Scene) -> np.ndarray:
+def felt(scene: ShotScene) -> np.ndarray:
     """References that the shot feels at all, indices into the scene's."""
     return np.flatnonzero(np.abs(scene.references.weight) >= FELT)

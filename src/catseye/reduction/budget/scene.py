@@ -11,8 +11,8 @@ from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.air import AirField, PathAir
 from catseye.reduction.epoch.head import head_corrections, head_unknowns
 from catseye.reduction.epoch.ranges import Phases
-from catseye.reduction.epoch.settings import Settings
-from catseye.reduction.site.places import Place
+from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.site.places import RangedPoint
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 from catseye.signal.drift.reference import drift_at
 
@@ -71,7 +71,7 @@ class References:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class ShotScene:
     """One shot's measurement.
 
     row                  of the campaign's shots
@@ -91,13 +91,13 @@ class Scene:
     """
 
     campaign: Campaign
-    settings: Settings
+    settings: ReductionSettings
     assumptions: Assumptions
     row: int
     seconds: float
     ranger: str
     target: str
-    place: Place
+    place: RangedPoint
     a: np.ndarray
     b: np.ndarray
     phasor: complex
@@ -154,10 +154,10 @@ def scene_of(
     row: int,
     *,
     ends: tuple[np.ndarray, np.ndarray],
-    place: Place,
-    settings: Settings,
+    place: RangedPoint,
+    settings: ReductionSettings,
     assumptions: Assumptions | None = None,
-) -> Scene:
+) -> ShotScene:
     """The scene of a shot on a target that has a phase and a reference.
 
     wrong   reference shots that were left out, by row, as `follow_electronics` gives them
@@ -192,7 +192,7 @@ def scene_of(
     head = _head(campaign, ranger, b - a, phase, abs(phases.phasor[row]), references.amplitude, index)
     coarse = index * (distance - place.constant - obliquity - mirror.d0_mm * MILLIMETRE - head)
     cycles, margin = whole_cycles(coarse, phase, half)
-    return Scene(
+    return ShotScene(
         campaign=campaign,
         settings=settings,
         assumptions=assumptions or Assumptions(),

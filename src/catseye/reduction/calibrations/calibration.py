@@ -29,7 +29,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Decision:
+class TestOutcome:
     """A statistical test or a comparison with a limit, with its outcome.
 
     name       "outliers: largest |w|"
@@ -75,7 +75,7 @@ class Calibration:
     covariance: np.ndarray
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
-    decisions: tuple[Decision, ...] = ()
+    decisions: tuple[TestOutcome, ...] = ()
     variance_factor: float = float("nan")
     degrees_of_freedom: int = 0
     notes: tuple[str, ...] = ()

@@ -11,7 +11,15 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.reduction.calibrations.calibration import Quantity
-from catseye.reduction.calibrations.fit import REJECTED, SUSPECT, USED, Effect, Fit, Scatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    REJECTED,
+    SUSPECT,
+    USED,
+    CalibrationFit,
+    Effect,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import quantities
 
 ROUNDS = 40
@@ -19,7 +27,7 @@ SETTLED = 1e-4  # of a standard uncertainty: what a further round would move
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ModelParameter:
     """A parameter of a model.
 
     name     what it is, for messages
@@ -44,10 +52,10 @@ class CurvedFit:
     fit           the last linear one: residuals, tests; `predicted` is what the values predict
     """
 
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ModelParameter, ...]
     values: np.ndarray
     covariance: np.ndarray
-    fit: Fit
+    fit: CalibrationFit
 
     def index(self, name: str) -> int:
         """Where a parameter stands; ValueError for another name."""
@@ -77,8 +85,8 @@ class CurvedFit:
 def fit_curved(
     observed: np.ndarray,
     predict: Callable[[np.ndarray], np.ndarray],
-    parameters: Sequence[Parameter],
-    scatter: Scatter,
+    parameters: Sequence[ModelParameter],
+    scatter: ObservedScatter,
     *,
     active: np.ndarray | None = None,
     together: np.ndarray | None = None,
@@ -136,7 +144,7 @@ def fit_curved(
 
 
 def _slopes(
-    predict: Callable[[np.ndarray], np.ndarray], values: np.ndarray, parameters: Sequence[Parameter]
+    predict: Callable[[np.ndarray], np.ndarray], values: np.ndarray, parameters: Sequence[ModelParameter]
 ) -> np.ndarray:
     """(m, p) derivatives."""
     columns = []
@@ -147,7 +155,9 @@ def _slopes(
     return np.column_stack(columns)
 
 
-def _covariance(slopes: np.ndarray, scatter: Scatter, fit: Fit, parameters: Sequence[Parameter]) -> np.ndarray:
+def _covariance(
+    slopes: np.ndarray, scatter: ObservedScatter, fit: CalibrationFit, parameters: Sequence[ModelParameter]
+) -> np.ndarray:
     """(p, p) of all parameters together, which `fit_readings` gives for the sought ones alone."""
     total = scatter.claimed + sum(
         (fit.components[name] ** 2 * matrix for name, matrix in scatter.unknown.items()), np.zeros_like(scatter.claimed)
@@ -163,7 +173,7 @@ def _covariance(slopes: np.ndarray, scatter: Scatter, fit: Fit, parameters: Sequ
     return answer
 
 
-def row_ends(fit: Fit, reasons: Sequence[str], each: int) -> list[tuple[float, str]]:
+def row_ends(fit: CalibrationFit, reasons: Sequence[str], each: int) -> list[tuple[float, str]]:
     """Of each row of a table that gave `each` observed values, one after the other: statistic and state of the worst.
 
     reasons   why a row was left out beforehand, "" where it was not

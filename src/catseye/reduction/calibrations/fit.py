@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import Solution, adjust
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
-from catseye.reduction.calibrations.calibration import Decision
+from catseye.reduction.calibrations.calibration import TestOutcome
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 SCATTER_LIMIT = 0.05  # level of the test of the variance factor, two-sided
@@ -37,7 +37,7 @@ class Effect:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class ObservedScatter:
     """How the observed values scatter: what is claimed, and matrices whose factors the readings decide.
 
     claimed      (m, m) covariance, known beforehand
@@ -51,7 +51,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class CalibrationFit:
     """The outcome over m observed values and p sought parameters.
 
     x, covariance       (p,), (p, p) of the sought parameters, systematic effects included
@@ -90,7 +90,7 @@ class Fit:
         """(m,) bool: takes part although the test rejects it."""
         return self.active & self.checked & (np.abs(self.statistic) > self.critical)
 
-    def decisions(self, level: float = SCATTER_LIMIT) -> tuple[Decision, ...]:
+    def decisions(self, level: float = SCATTER_LIMIT) -> tuple[TestOutcome, ...]:
         """Tests of the scatter and of the single readings."""
         told = []
         if self.test == "w" and self.degrees_of_freedom > 0.5:
@@ -98,7 +98,7 @@ class Fit:
             low, high = test.lower, test.upper
             limit = high if self.variance_factor >= 1.0 else low
             told.append(
-                Decision(
+                TestOutcome(
                     "scatter: variance factor",
                     self.variance_factor,
                     limit,
@@ -108,7 +108,7 @@ class Fit:
             )
         elif self.test == "tau":
             told.append(
-                Decision(
+                TestOutcome(
                     "scatter: variance factor",
                     float("nan"),
                     float("nan"),
@@ -117,15 +117,19 @@ class Fit:
                 )
             )
         else:
-            told.append(Decision("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings"))
+            told.append(
+                TestOutcome("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings")
+            )
         tested = self.active & self.checked
         if tested.any():
             worst = float(np.max(np.abs(self.statistic[tested])))
             count = int(np.count_nonzero(self.suspects))
             text = "no reading stands out" if not count else f"{count} of the values used stand out: look at them"
-            told.append(Decision(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
+            told.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
         else:
-            told.append(Decision("outliers", float("nan"), float("nan"), None, "no reading is checked by the others"))
+            told.append(
+                TestOutcome("outliers", float("nan"), float("nan"), None, "no reading is checked by the others")
+            )
         return tuple(told)
 
     def state(self, reasons: Sequence[str]) -> tuple[str, ...]:
@@ -140,7 +144,7 @@ class Fit:
 def fit_readings(
     observed: np.ndarray,
     design: np.ndarray,
-    scatter: Scatter,
+    scatter: ObservedScatter,
     *,
     names: Sequence[str],
     effects: Sequence[Effect] = (),
@@ -148,7 +152,7 @@ def fit_readings(
     together: np.ndarray | None = None,
     reject: bool = False,
     level: float = 0.05,
-) -> Fit:
+) -> CalibrationFit:
     """The parameters of a linear model that fit readings best.
 
     observed   (m,)
@@ -187,13 +191,13 @@ def fit_readings(
 def _fitted(
     observed: np.ndarray,
     design: np.ndarray,
-    scatter: Scatter,
+    scatter: ObservedScatter,
     *,
     names: Sequence[str],
     effects: Sequence[Effect],
     on: np.ndarray,
     level: float,
-) -> Fit:
+) -> CalibrationFit:
     acting = [e for e in effects if e.u > 0.0]
     p, q = design.shape[1], len(acting)
     wide = np.column_stack([design, *(e.column for e in acting)])
@@ -229,7 +233,7 @@ def _fitted(
 
 
 def _outcome(
-    solution: Solution,
+    solution: LeastSquaresSolution,
     readings: Linear,
     acting: Sequence[str],
     components: dict[str, float],
@@ -237,7 +241,7 @@ def _outcome(
     on: np.ndarray,
     level: float,
     effective: np.ndarray,
-) -> Fit:
+) -> CalibrationFit:
     found, p = solution.fits[0], len(effective)
     full = solution.covariance
     block = np.ix_(on, on)
@@ -251,7 +255,7 @@ def _outcome(
     estimated = bool(components) and degrees > 1.5
     critical = tau_critical(single, degrees) if estimated else w_critical(single)
     statistic = found.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
-    return Fit(
+    return CalibrationFit(
         x=solution.x[:p],
         covariance=full[:p, :p],
         scattered=scattered,

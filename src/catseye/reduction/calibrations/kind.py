@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from catseye.records.files.readings import Layout, Readings
+from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.reduction.calibrations.calibration import Calibration, Quantity
-from catseye.reduction.calibrations.fit import Fit
+from catseye.reduction.calibrations.fit import CalibrationFit
 
 PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "report")
 
 
 @dataclass(frozen=True)
-class Kind:
+class CalibrationKind:
     """One kind of calibration.
 
     about     what it finds, one line for the command line
@@ -24,11 +24,11 @@ class Kind:
     """
 
     about: str
-    layout: Layout
-    recipe: Callable[[Readings, bool], Calibration]
+    layout: SheetLayout
+    recipe: Callable[[SheetReadings, bool], Calibration]
 
 
-def provenance(readings: Readings) -> dict[str, Any]:
+def provenance(readings: SheetReadings) -> dict[str, Any]:
     """Who measured what with which files, then every other key of the sheet as it was given."""
     sheet = readings.sheet
     said = {key: getattr(sheet, key) for key in PROVENANCE}
@@ -45,7 +45,7 @@ def quantities(
     values: np.ndarray,
     covariance: np.ndarray,
     *,
-    fit: Fit | None = None,
+    fit: CalibrationFit | None = None,
     turn: np.ndarray | None = None,
 ) -> tuple[Quantity, ...]:
     """Quantities from (key, unit, meaning), values and covariance in the units.
@@ -80,7 +80,7 @@ def student(degrees: ArrayLike, deviations: float) -> np.ndarray:
     return np.where(most < 1e9, stdtrit(most, ndtr(deviations)), deviations)
 
 
-def residuals_by_number(fit: Fit, scale: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def residuals_by_number(fit: CalibrationFit, scale: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Curves of the residuals in order of the readings, in units of `scale`: for readings that share no other axis."""
     count, on = np.arange(1, len(fit.residual) + 1), fit.active
     residual = fit.residual / scale
@@ -91,7 +91,7 @@ def residuals_by_number(fit: Fit, scale: float) -> dict[str, tuple[np.ndarray, n
     }
 
 
-def scatter_notes(fit: Fit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
+def scatter_notes(fit: CalibrationFit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
     """How the readings scatter and from how many degrees of freedom, in a unit of `scale` SI units.
 
     sought   how many of the first parameters are of interest; all if None

@@ -5,7 +5,7 @@ from pathlib import Path
 from catseye.errors import InputError
 from catseye.records.files.readings import read_readings
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.kind import Kind
+from catseye.reduction.calibrations.kind import CalibrationKind
 from catseye.reduction.calibrations.length import gauge_blocks, height_gauge, invar_wire
 from catseye.reduction.calibrations.mirror import (
     alignment,
@@ -32,7 +32,7 @@ from catseye.reduction.calibrations.ranging import (
     retroreflector,
 )
 
-KINDS: dict[str, Kind] = {
+KINDS: dict[str, CalibrationKind] = {
     "reference-distance": reference_distance.RECIPE,
     "leakage": leakage.RECIPE,
     "leakage-lit": leakage_lit.RECIPE,

@@ -15,7 +15,7 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.campaign import Campaign
 from catseye.records.night.path_temperature import PathTemperatureTable
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 
 Profile = Callable[[np.ndarray], np.ndarray]
 
@@ -128,7 +128,7 @@ class AirField:
     sounded: np.ndarray | None = None
 
     @classmethod
-    def of(cls, campaign: Campaign, settings: Settings) -> "AirField":
+    def of(cls, campaign: Campaign, settings: ReductionSettings) -> "AirField":
         """The air of a campaign; heights in the ground frame."""
         weather, site = campaign.weather, campaign.site
         stations = site.weather_station

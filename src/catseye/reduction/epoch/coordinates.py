@@ -7,15 +7,15 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Fit, Solution, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit, LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.robust import CHECKED, adjust_robustly
-from catseye.estimation.observations.kinds import Linear, Observations
+from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.ranges import Electronics, Phases, Progress
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (
     AIR,
@@ -25,10 +25,10 @@ from catseye.reduction.epoch.unknowns import (
     SOUND,
     THERMOMETERS,
     ZEROS,
-    Network,
+    CampaignNetwork,
     build_network,
 )
-from catseye.reduction.site.places import Place
+from catseye.reduction.site.places import RangedPoint
 
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
 TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
@@ -90,7 +90,7 @@ class RangeShots:
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
+class AdjustedCoordinates:
     """The adjusted network.
 
     points       names in order; places their records where they can be ranged to (fixed points are no places)
@@ -112,7 +112,7 @@ class Coordinates:
     """
 
     points: tuple[str, ...]
-    places: dict[str, Place]
+    places: dict[str, RangedPoint]
     x: np.ndarray
     covariance: np.ndarray
     start: np.ndarray
@@ -126,7 +126,7 @@ class Coordinates:
     variance_factor: float
     degrees_of_freedom: float
     status: str
-    fits: tuple[Fit, ...]
+    fits: tuple[GroupFit, ...]
     notes: tuple[str, ...]
     unresolved: dict[int, str]
     sound: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -144,10 +144,10 @@ class Coordinates:
 def adjust_coordinates(
     campaign: Campaign,
     phases: Phases,
-    electronics: dict[str, Electronics],
-    settings: Settings,
+    electronics: dict[str, ElectronicsPhase],
+    settings: ReductionSettings,
     progress: Progress | None = None,
-) -> Coordinates:
+) -> AdjustedCoordinates:
     """Coordinates of everything that was ranged to or from, with full covariance.
 
     Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
@@ -168,13 +168,13 @@ def adjust_coordinates(
 
 
 def settle_network(
-    network: Network,
+    network: CampaignNetwork,
     starts: Mapping[str, np.ndarray],
     progress: Progress | None = None,
     *,
     keep: float = 0.0,
     predicted: bool = False,
-) -> tuple[Solution, list[tuple[ShotGroup, ShotParts]]]:
+) -> tuple[LeastSquaresSolution, list[tuple[ShotGroup, ShotParts]]]:
     """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
 
     network   with priors for whatever its shots do not hold
@@ -199,7 +199,7 @@ def settle_network(
         if progress is not None:
             progress("adjustment", turn, PASSES)
         shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
-        groups: list[Observations] = [group for group, _ in shots] + network.priors
+        groups: list[ObservationGroup] = [group for group, _ in shots] + network.priors
         removable = [
             np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS, SOUND))
             for i, g in enumerate(groups)
@@ -242,7 +242,7 @@ def settle_network(
     return solution, shots
 
 
-def _unsuspicious(solution: Solution, removable: Sequence[np.ndarray], critical: float) -> bool:
+def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray], critical: float) -> bool:
     """Whether every observation that may be wrong passes its test by half a sigma, and all together theirs."""
     if not solution.solved or solution.status != CONVERGED:
         return False
@@ -252,8 +252,11 @@ def _unsuspicious(solution: Solution, removable: Sequence[np.ndarray], critical:
 
 
 def coordinates_of(
-    network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]], resolved: Resolved
-) -> Coordinates:
+    network: CampaignNetwork,
+    solution: LeastSquaresSolution,
+    shots: list[tuple[ShotGroup, ShotParts]],
+    resolved: Resolved,
+) -> AdjustedCoordinates:
     """What an adjusted network says of points, ranges, heads and air.
 
     network, solution, shots   as `settle_network` took and gave them
@@ -278,7 +281,7 @@ def coordinates_of(
     air = {n: value for n, value in every.items() if n not in sound}
     leakage_at = {n: layout.columns(f"leakage {n}", 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
-    return Coordinates(
+    return AdjustedCoordinates(
         points=tuple(names),
         places=network.places,
         x=solution.x[columns].reshape(-1, 3),
@@ -312,7 +315,9 @@ def coordinates_of(
     )
 
 
-def _ranges(network: Network, solution: Solution, shots: list[tuple[ShotGroup, ShotParts]]) -> RangeShots:
+def _ranges(
+    network: CampaignNetwork, solution: LeastSquaresSolution, shots: list[tuple[ShotGroup, ShotParts]]
+) -> RangeShots:
     x, layout, parts = solution.x, network.layout, [p for _, p in shots]
     fits = solution.fits[: len(parts)]
     zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []
@@ -403,7 +408,7 @@ def _losses(ranges: RangeShots) -> list[str]:
 
 
 def _notes(
-    network: Network, solution: Solution, air: dict[str, tuple[float, float]], count: dict[str, int]
+    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]], count: dict[str, int]
 ) -> list[str]:
     """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
     notes = []
@@ -454,7 +459,7 @@ def _notes(
 
 
 def _sound_notes(
-    network: Network, solution: Solution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
+    network: CampaignNetwork, solution: LeastSquaresSolution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
 ) -> list[str]:
     """What each sounded line did to the index of its shots, and whether the ranges believe it."""
     w = next((f.standardised for f in solution.fits if f.name == SOUND), np.zeros(0))

@@ -6,11 +6,11 @@ import numpy as np
 
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located, locate
-from catseye.estimation.least_squares.adjustment import Solution
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, other_ends, shot_group
-from catseye.reduction.epoch.unknowns import Network
+from catseye.reduction.epoch.unknowns import CampaignNetwork
 
 RANGES = 8  # shots a search takes part with at most: more say little new, and bring wrong ones
 WRONG = 0.01  # share of shots with light from elsewhere in their return: in night-01 seven of seven hundred
@@ -20,20 +20,20 @@ SETTLED = 1e-3  # m, by which it may be off: dPc changes by a thousandth of that
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class CycleScene:
     """The whole network, its parameters and covariance from the safe shots, and every shot as a row.
 
     groups, parts   one of each ranger
     solution        of the safe shots and the records
     """
 
-    network: Network
+    network: CampaignNetwork
     groups: list[ShotGroup]
     parts: list[ShotParts]
-    solution: Solution
+    solution: LeastSquaresSolution
 
 
-def search(scene: Scene, name: str, shots: set[int]) -> Located:
+def search(scene: CycleScene, name: str, shots: set[int]) -> Located:
     """Where a point is by its shots, each other end being known; repeated with other shots if the first do not fit.
 
     scene   the network, adjusted without these shots
@@ -53,7 +53,7 @@ def search(scene: Scene, name: str, shots: set[int]) -> Located:
     return next((a for a in answers if a.status is AmbiguityStatus.FOUND), answers[0])
 
 
-def _settled(scene: Scene, name: str, rows: list[tuple[int, int]], chosen: np.ndarray, found: Located) -> Located:
+def _settled(scene: CycleScene, name: str, rows: list[tuple[int, int]], chosen: np.ndarray, found: Located) -> Located:
     """The search again with dPc, air and head as they are where the point was found, until it is found there."""
     for _ in range(TURNS):
         if not np.isfinite(found.x).all():
@@ -101,7 +101,7 @@ class _Problem:
         )
 
 
-def _problem(scene: Scene, name: str, rows: list[tuple[int, int]], x: np.ndarray | None = None) -> _Problem:
+def _problem(scene: CycleScene, name: str, rows: list[tuple[int, int]], x: np.ndarray | None = None) -> _Problem:
     """The search for one point; x are the parameters at which dPc and air were taken, the solution's if None."""
     network, solution = scene.network, scene.solution
     own = network.layout.columns(name)
@@ -131,7 +131,7 @@ def _problem(scene: Scene, name: str, rows: list[tuple[int, int]], x: np.ndarray
     )
 
 
-def spread(scene: Scene, name: str) -> np.ndarray:
+def spread(scene: CycleScene, name: str) -> np.ndarray:
     """Covariance (3, 3) m^2 of a point before its waiting shots."""
     own = scene.network.layout.columns(name)
     covariance = scene.solution.covariance[np.ix_(own, own)]
@@ -139,7 +139,7 @@ def spread(scene: Scene, name: str) -> np.ndarray:
     return 3.0 * covariance if in_unit else covariance  # one typed position stands for three points: no averaging
 
 
-def _by_direction(scene: Scene, group: int, row: int) -> float:
+def _by_direction(scene: CycleScene, group: int, row: int) -> float:
     """Derivative of a shot's dPc by its angle of incidence, m/rad; 0 for what is no prism."""
     part = scene.parts[group]
     place = scene.network.places[part.target[row]]

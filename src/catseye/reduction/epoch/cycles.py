@@ -13,17 +13,17 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit, Solution, adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.robust import adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
-from catseye.estimation.observations.kinds import Observations
+from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.records.night.campaign import Campaign
-from catseye.reduction.epoch.cycle_search import Scene, search, spread
-from catseye.reduction.epoch.ranges import Electronics, Phases, Progress
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, shot_group
-from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, Network, build_network
-from catseye.reduction.site.motion import Motion
+from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, CampaignNetwork, build_network
+from catseye.reduction.site.motion import CarriedMotion
 
 KEPT = 5.0  # standard uncertainties of misfit that the margin must be worth
 ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
@@ -48,11 +48,11 @@ class Resolved:
 def resolve_cycles(
     campaign: Campaign,
     phases: Phases,
-    electronics: dict[str, Electronics],
-    settings: Settings,
+    electronics: dict[str, ElectronicsPhase],
+    settings: ReductionSettings,
     progress: Progress | None = None,
     *,
-    motion: Motion | None = None,
+    motion: CarriedMotion | None = None,
 ) -> Resolved:
     """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
 
@@ -107,7 +107,7 @@ def resolve_cycles(
     return Resolved(starts, rejected, tuple(notes))
 
 
-def doubtful_points(network: Network) -> set[str]:
+def doubtful_points(network: CampaignNetwork) -> set[str]:
     """Typed points whose uncertainty does not keep five standard uncertainties within a quarter wavelength.
 
     So are those that contradict a certified distance, whatever they claim.
@@ -124,7 +124,7 @@ def doubtful_points(network: Network) -> set[str]:
     return wide
 
 
-def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[str, Electronics]:
+def without_shots(electronics: dict[str, ElectronicsPhase], out: set[int]) -> dict[str, ElectronicsPhase]:
     """The electronics at the shots that are left; a ranger without any stays, empty."""
     left = {}
     for name, e in electronics.items():
@@ -140,7 +140,7 @@ def without_shots(electronics: dict[str, Electronics], out: set[int]) -> dict[st
 
 
 def line_errors(
-    group: ShotGroup, targets: tuple[str, ...], fit: Fit, solution: Solution
+    group: ShotGroup, targets: tuple[str, ...], fit: GroupFit, solution: LeastSquaresSolution
 ) -> tuple[np.ndarray, np.ndarray]:
     """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
 
@@ -162,13 +162,13 @@ def line_errors(
     return error, u
 
 
-def _too_wide(network: Network, covariance: np.ndarray) -> bool:
+def _too_wide(network: CampaignNetwork, covariance: np.ndarray) -> bool:
     """Whether a point is known too badly, in its worst direction, for the nearest integer."""
     quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
     return bool(KEPT * np.sqrt(np.linalg.eigvalsh(covariance)[-1]) > ROUNDED * quarter)
 
 
-def _adjusted(network: Network, x: np.ndarray, waiting: set[int]) -> Scene:
+def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> CycleScene:
     """The network adjusted without the shots that wait, wrong ones left out; all parameters with covariance."""
     electronics = without_shots(network.electronics, waiting)
     used: set[int] = set()
@@ -177,7 +177,7 @@ def _adjusted(network: Network, x: np.ndarray, waiting: set[int]) -> Scene:
         column = {name: i for i, name in enumerate(network.layout.names)}
         at = np.array([column[name] for name in part.layout.names])
         pairs = [shot_group(part, name, x[at]) for name in part.rangers]
-        groups: list[Observations] = [group for group, _ in pairs] + part.priors
+        groups: list[ObservationGroup] = [group for group, _ in pairs] + part.priors
         removable = [
             np.full(len(g.observed), i < len(pairs) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
         ]
@@ -209,10 +209,10 @@ def _adjusted(network: Network, x: np.ndarray, waiting: set[int]) -> Scene:
         names=network.layout.names,
     ).require_converged()
     pairs = [shot_group(network, name, whole.x) for name in network.rangers]
-    return Scene(network, [g for g, _ in pairs], [p for _, p in pairs], whole)
+    return CycleScene(network, [g for g, _ in pairs], [p for _, p in pairs], whole)
 
 
-def _safe(scene: Scene, waiting: set[int]) -> set[int]:
+def _safe(scene: CycleScene, waiting: set[int]) -> set[int]:
     """Waiting shots whose range is predicted so well by all the others that the nearest integer is safe."""
     half = 0.5 * SPEED_OF_LIGHT / scene.network.campaign.site.ranging.modulation_hz
     safe = set()
@@ -224,12 +224,12 @@ def _safe(scene: Scene, waiting: set[int]) -> set[int]:
     return safe & waiting
 
 
-def _u_mm(network: Network, settings: Settings, name: str) -> float:
+def _u_mm(network: CampaignNetwork, settings: ReductionSettings, name: str) -> float:
     """Standard uncertainty of each coordinate as typed."""
     return network.places[name].u_typed(settings.u_position) / MILLIMETRE
 
 
-def _found_notes(network: Network, settings: Settings, found: dict[str, Located]) -> list[str]:
+def _found_notes(network: CampaignNetwork, settings: ReductionSettings, found: dict[str, Located]) -> list[str]:
     if len(found) > MANY:
         least = min(found, key=lambda name: found[name].discrimination)
         return [
@@ -249,7 +249,9 @@ def _next(found: Located) -> str:
     return f"next candidate at least {np.sqrt(found.discrimination):.0f} sigma worse"
 
 
-def _lost_notes(network: Network, settings: Settings, lost: list[str], last: dict[str, Located]) -> list[str]:
+def _lost_notes(
+    network: CampaignNetwork, settings: ReductionSettings, lost: list[str], last: dict[str, Located]
+) -> list[str]:
     if len(lost) > MANY:
         return [
             f"{len(lost)} points have shots whose whole cycles are unknown, see rejected: {', '.join(lost[:MANY])} ..."
@@ -257,7 +259,7 @@ def _lost_notes(network: Network, settings: Settings, lost: list[str], last: dic
     return [_reason(network, settings, [name], last) for name in lost]
 
 
-def _reason(network: Network, settings: Settings, names: list[str], last: dict[str, Located]) -> str:
+def _reason(network: CampaignNetwork, settings: ReductionSettings, names: list[str], last: dict[str, Located]) -> str:
     """Why the whole cycles of a shot are unknown, by the points that it hangs on."""
     name = names[0]
     u = _u_mm(network, settings, name)

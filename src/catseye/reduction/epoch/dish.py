@@ -7,7 +7,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.shapes.paraboloid import fit_paraboloid
 from catseye.records.night.campaign import Campaign
-from catseye.reduction.epoch.unknowns import Network
+from catseye.reduction.epoch.unknowns import CampaignNetwork
 from catseye.reduction.site.places import nominal_frame
 
 FEWEST = 12  # prisms that must agree before they speak of others
@@ -23,7 +23,7 @@ def dish_prisms(campaign: Campaign) -> list[str]:
     return sorted(n for n, t in campaign.targets.items() if t.type == "prism" and t.frame == "reflector")
 
 
-def dish_advice(network: Network, x: np.ndarray, covariance: np.ndarray) -> list[Linear]:
+def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray) -> list[Linear]:
     """For each dish prism the plane of the dish at its typed place, as an observation that may judge but not shape.
 
     x            (n,) parameters of an adjustment

@@ -5,11 +5,18 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from catseye.records.night.campaign import REFERENCE, Campaign
-from catseye.reduction.epoch.coordinates import Coordinates, adjust_coordinates
+from catseye.reduction.epoch.coordinates import AdjustedCoordinates, adjust_coordinates
 from catseye.reduction.epoch.dew import dew_risk
-from catseye.reduction.epoch.ranges import Electronics, Phases, Progress, follow_electronics, measure_phases, walk_notes
-from catseye.reduction.epoch.settings import Settings
-from catseye.reduction.epoch.surface import Surface, fit_surface
+from catseye.reduction.epoch.ranges import (
+    ElectronicsPhase,
+    Phases,
+    Progress,
+    follow_electronics,
+    measure_phases,
+    walk_notes,
+)
+from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.surface import DishFit, fit_surface
 from catseye.reduction.site.places import sheet_notes
 
 
@@ -23,17 +30,19 @@ class Reduction:
     """
 
     campaign: Campaign
-    settings: Settings
+    settings: ReductionSettings
     phases: Phases
-    electronics: dict[str, Electronics]
-    coordinates: Coordinates
-    surface: Surface | None
+    electronics: dict[str, ElectronicsPhase]
+    coordinates: AdjustedCoordinates
+    surface: DishFit | None
     status: tuple[str, ...]
     rejected: dict[int, str]
     notes: tuple[str, ...]
 
 
-def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress: Progress | None = None) -> Reduction:
+def reduce_epoch(
+    campaign: Campaign, settings: ReductionSettings | None = None, progress: Progress | None = None
+) -> Reduction:
     """Coordinates, pose and surface of one campaign during which nothing moved.
 
     campaign   as `read_campaign` gives it
@@ -42,7 +51,7 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
 
     Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
     """
-    settings = settings or Settings()
+    settings = settings or ReductionSettings()
     phases = measure_phases(campaign, settings, progress)
     with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
         electronics, wrong = follow_electronics(campaign, phases)
@@ -78,7 +87,7 @@ def reduce_epoch(campaign: Campaign, settings: Settings | None = None, progress:
     )
 
 
-def _misfit(coordinates: Coordinates, row: int, settings: Settings) -> str:
+def _misfit(coordinates: AdjustedCoordinates, row: int, settings: ReductionSettings) -> str:
     ranges = coordinates.ranges
     error, w = ranges.residual[row], ranges.standardised[row]
     if abs(w) <= settings.critical:

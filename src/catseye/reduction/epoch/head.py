@@ -20,7 +20,7 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
 from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
-from catseye.geometry.mirror.pointing import Station
+from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.files.refusal import refusal
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.mirror import Mirror
@@ -165,7 +165,7 @@ def _axes(campaign: Campaign, name: str, sight: np.ndarray) -> tuple[np.ndarray,
     return change_0 - change, slopes_0 - slopes
 
 
-def mounted(campaign: Campaign, name: str) -> Station:
+def mounted(campaign: Campaign, name: str) -> MirrorStation:
     """The ranger's mirror as it stands; InputError on the feed arm where feedarm.toml does not say how it is turned."""
     station, mirror = station_in(campaign, name), campaign.mirror_of(name)
     if station is not None:

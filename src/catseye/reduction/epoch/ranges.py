@@ -10,7 +10,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
@@ -67,7 +67,7 @@ class Phases:
 
 
 @dataclass(frozen=True, eq=False)
-class Electronics:
+class ElectronicsPhase:
     """The drifting phase of one ranger's electronics at its usable target shots.
 
     shots        (m,) indices into the campaign's shots
@@ -83,7 +83,7 @@ class Electronics:
     reference: np.ndarray
 
 
-def measure_phases(campaign: Campaign, settings: Settings, progress: Progress | None = None) -> Phases:
+def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Progress | None = None) -> Phases:
     """Phase and amplitude of every shot, leakage removed, with the reason where a shot shows no light.
 
     A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
@@ -166,7 +166,7 @@ def judged_phases(
     cycles: np.ndarray,
     samples_per_cycle: np.ndarray,
     mirrors: Sequence[Mirror],
-    settings: Settings,
+    settings: ReductionSettings,
     usual_of: Callable[[np.ndarray], np.ndarray],
 ) -> Phases:
     """Phasors free of leakage, their uncertainties, and why a shot cannot be used.
@@ -213,7 +213,7 @@ def why_not(
     largest: float,
     sampling: tuple[int, int],
     mirror: Mirror,
-    settings: Settings,
+    settings: ReductionSettings,
     usual: float,
 ) -> str:
     """Why a buffer's phase cannot be used, "" where it can.
@@ -251,7 +251,7 @@ def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
     return usual
 
 
-def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, Electronics], dict[int, str]]:
+def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, str]]:
     """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
 
     References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
@@ -266,7 +266,7 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
     usable = np.array([not r for r in phases.reason])
     variance = np.where(usable, phases.u_phase, 0.0) ** 2
     rejected: dict[int, str] = {}
-    electronics: dict[str, Electronics] = {}
+    electronics: dict[str, ElectronicsPhase] = {}
     for name in campaign.rangers:
         mine = ranger == name
         lit = np.flatnonzero(mine & usable & (target != REFERENCE))
@@ -288,7 +288,7 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
             seconds[references], unwrapped, variance[references], seconds[lit], random_walk=walk
         )
         level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
-        electronics[name] = Electronics(lit, phase, covariance, level * np.exp(1j * phase))
+        electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
     return electronics, rejected
 
 

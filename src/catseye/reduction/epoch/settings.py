@@ -6,7 +6,7 @@ from catseye.constants import DEGREE
 
 
 @dataclass(frozen=True)
-class Settings:
+class ReductionSettings:
     """Assumptions of a reduction; the defaults are those of the campaign layout's README.
 
     air_model               name in `catseye.atmosphere.index.air.MODELS`; version 1 of the layout prescribes

@@ -9,8 +9,8 @@ from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
-from catseye.reduction.epoch.ranges import Electronics
-from catseye.reduction.epoch.unknowns import AIR, Network, path_of
+from catseye.reduction.epoch.ranges import ElectronicsPhase
+from catseye.reduction.epoch.unknowns import AIR, CampaignNetwork, path_of
 from catseye.reduction.site.places import unit
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
@@ -33,7 +33,7 @@ class ShotParts:
     """
 
     name: str
-    electronics: Electronics
+    electronics: ElectronicsPhase
     target: tuple[str, ...]
     phase: np.ndarray
     cycles: np.ndarray
@@ -46,7 +46,7 @@ class ShotParts:
     head: HeadCorrections
 
 
-def shot_group(network: Network, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
+def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
     """One ranger's shots as distances in optical metres, with everything that depends on where things are.
 
     Where the network moves, x are the points at its epoch, and each shot finds them where the telescope carried them.
@@ -178,7 +178,7 @@ def other_ends(group: ShotGroup, row: int, own: int, x: np.ndarray) -> np.ndarra
 
 
 def _obliquity(
-    network: Network, targets: Sequence[str], towards: np.ndarray, x: np.ndarray
+    network: CampaignNetwork, targets: Sequence[str], towards: np.ndarray, x: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Incidence and dPc at the estimated normals, and the derivatives of dPc by each normal's two tilts.
 

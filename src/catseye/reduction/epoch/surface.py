@@ -9,7 +9,7 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.records.night.campaign import Campaign
-from catseye.reduction.epoch.coordinates import Coordinates
+from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.dish import dish_prisms
 from catseye.reduction.site.places import nominal_frame
 
@@ -18,7 +18,7 @@ UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class DishFit:
     """The dish prisms' fit.
 
     names          of the prisms, in order
@@ -60,7 +60,7 @@ class Surface:
         }
 
 
-def fit_surface(campaign: Campaign, coordinates: Coordinates) -> tuple[Surface | None, str]:
+def fit_surface(campaign: Campaign, coordinates: AdjustedCoordinates) -> tuple[DishFit | None, str]:
     """The dish from its prisms (single prisms of the reflector frame), and why there is none, "" where there is.
 
     A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.
@@ -77,4 +77,4 @@ def fit_surface(campaign: Campaign, coordinates: Coordinates) -> tuple[Surface |
         fit = fit_paraboloid(coordinates.x[rows], coordinates.block(names), nominal, focal_length)
     except EstimationError as problem:
         return None, f"no paraboloid: {problem}"
-    return Surface(names, fit, focal_length, nominal.translation), ""
+    return DishFit(names, fit, focal_length, nominal.translation), ""

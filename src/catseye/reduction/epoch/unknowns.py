@@ -8,15 +8,15 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.observations.kinds import Distances, Linear, Observations
+from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
 from catseye.records.night.campaign import REFERENCE, Campaign
-from catseye.records.site.triplet import Triplet
+from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.ranges import Electronics, Phases
-from catseye.reduction.epoch.settings import Settings
-from catseye.reduction.site.motion import Motion
-from catseye.reduction.site.places import Place, places_of, unit
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
+from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.site.motion import CarriedMotion
+from catseye.reduction.site.places import RangedPoint, places_of, unit
 
 FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's scan point ZY101
 AIR = "the air"  # no point can have this name: it has a blank
@@ -34,7 +34,7 @@ def path_of(ranger: str, target: str) -> str:
 
 
 @dataclass
-class Layout:
+class UnknownsLayout:
     """Where each parameter stands in the vector of the adjustment."""
 
     names: list[str] = field(default_factory=list)
@@ -55,18 +55,18 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class CampaignNetwork:
     """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what."""
 
     campaign: Campaign
-    settings: Settings
+    settings: ReductionSettings
     phases: Phases
-    electronics: dict[str, Electronics]
-    places: dict[str, Place]
-    layout: Layout
+    electronics: dict[str, ElectronicsPhase]
+    places: dict[str, RangedPoint]
+    layout: UnknownsLayout
     field: AirField
-    priors: list[Observations]
-    motion: Motion | None = None
+    priors: list[ObservationGroup]
+    motion: CarriedMotion | None = None
 
     @property
     def rangers(self) -> list[str]:
@@ -75,7 +75,7 @@ class Network:
             name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
         ]
 
-    def seen_from(self, ranger: str) -> "Network":
+    def seen_from(self, ranger: str) -> "CampaignNetwork":
         """The network whose air knows the lines of one ranger's usable shots, in their order."""
         if not self.field.lines:
             return self
@@ -87,12 +87,12 @@ class Network:
 def build_network(
     campaign: Campaign,
     phases: Phases,
-    electronics: dict[str, Electronics],
-    settings: Settings,
+    electronics: dict[str, ElectronicsPhase],
+    settings: ReductionSettings,
     *,
-    motion: Motion | None = None,
+    motion: CarriedMotion | None = None,
     also: Collection[str] = (),
-) -> Network:
+) -> CampaignNetwork:
     """The unknowns and priors of a campaign.
 
     motion   where the telescope moves between the shots; its points are then those of the motion's epoch
@@ -109,7 +109,7 @@ def build_network(
     shooting = {name for name, e in electronics.items() if len(e.shots)} | (set(also) & set(campaign.rangers))
     seen = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
 
-    layout = Layout()
+    layout = UnknownsLayout()
     for name, place in sorted(seen.items()):
         layout.add(name, "xyz", place.start)
     for name, monument in campaign.monuments.items():
@@ -137,7 +137,7 @@ def build_network(
     if lines:
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
-    return Network(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+    return CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
 
 
 def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:
@@ -153,8 +153,8 @@ def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: Arra
 
 
 def _priors(
-    campaign: Campaign, settings: Settings, seen: dict[str, Place], layout: Layout, air: AirField
-) -> list[Observations]:
+    campaign: Campaign, settings: ReductionSettings, seen: dict[str, RangedPoint], layout: UnknownsLayout, air: AirField
+) -> list[ObservationGroup]:
     count = len(air.stations)
     at = layout.columns(AIR, len(air.names))
     priors = [
@@ -183,16 +183,16 @@ def _priors(
     return priors
 
 
-def _sound(air: AirField, columns: np.ndarray) -> list[Observations]:
+def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
     """How much too warm the sound of each line may read: a parameter a line, as its length errs in all rows alike."""
     if not air.lines:
         return []
     return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
 
 
-def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[Observations]:
+def _survey(campaign: Campaign, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
     """Fixed points as surveyed (a zero u holds a coordinate, it defines the datum), mirrors above them as measured."""
-    priors: list[Observations] = []
+    priors: list[ObservationGroup] = []
     columns, observed, sigma = [], [], []
     for name, monument in campaign.monuments.items():
         for i, axis in enumerate("xyz"):
@@ -218,7 +218,7 @@ def _survey(campaign: Campaign, seen: dict[str, Place], layout: Layout) -> list[
     return priors
 
 
-def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
+def _heads(campaign: Campaign, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
     rangers = [n for n in campaign.rangers if f"zero {n}" in layout.at]
     mirrors = [campaign.mirror_of(n) for n in rangers]
@@ -233,7 +233,7 @@ def _heads(campaign: Campaign, layout: Layout) -> list[Observations]:
     ]
 
 
-def _head(campaign: Campaign, name: str, layout: Layout) -> Linear:
+def _head(campaign: Campaign, name: str, layout: UnknownsLayout) -> Linear:
     """How far the effects of one ranger's head may be off its sheet."""
     zp = campaign.mirror_of(name).zp
     columns: list[int] = []
@@ -244,7 +244,7 @@ def _head(campaign: Campaign, name: str, layout: Layout) -> Linear:
     return _independent(HEADS, columns, np.zeros(len(columns)), u)
 
 
-def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[Observations]:
+def _directions(campaign: Campaign, settings: ReductionSettings, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
     normals = [name for name in layout.at if name.startswith("normal ")]
     if not normals:
@@ -255,7 +255,7 @@ def _directions(campaign: Campaign, settings: Settings, layout: Layout) -> list[
     return [_independent("normals", columns, np.zeros(len(columns)), u)]
 
 
-def _glass(seen: dict[str, Place], layout: Layout) -> list[Observations]:
+def _glass(seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
     """The rests of the glass constants, each common to every shot on its target."""
     names = [name for name in sorted(seen) if f"glass {name}" in layout.at]
     if not names:
@@ -270,7 +270,7 @@ def _positive(u: float, where: str) -> float:
     return u
 
 
-def _length(name: str, length: float, u: float, layout: Layout, origin: str, target: str) -> Distances:
+def _length(name: str, length: float, u: float, layout: UnknownsLayout, origin: str, target: str) -> Distances:
     one = np.ones(1)
     return Distances(
         name,
@@ -285,7 +285,9 @@ def _length(name: str, length: float, u: float, layout: Layout, origin: str, tar
     )
 
 
-def _triplet(triplet: Triplet, seen: dict[str, Place], layout: Layout, settings: Settings) -> list[Observations]:
+def _triplet(
+    triplet: TripletRecord, seen: dict[str, RangedPoint], layout: UnknownsLayout, settings: ReductionSettings
+) -> list[ObservationGroup]:
     """What a data sheet says of a unit: ball above the prisms' mid-point, prisms apart by d12 along the axis.
 
     The axis is good to some tenths of a degree, 3 mm across the unit: it only helps where a prism was not ranged.

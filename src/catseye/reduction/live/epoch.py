@@ -11,21 +11,21 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.observations.kinds import Linear, Observations
+from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.geometry.frames.frame import Transform
 from catseye.records.night.campaign import Campaign
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
-from catseye.records.night.shot import Shots
+from catseye.records.night.shot import ShotColumns
 from catseye.records.night.weather import Weather
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.epoch.coordinates import Coordinates, coordinates_of, settle_network
+from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of, settle_network
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.ranges import follow_electronics
-from catseye.reduction.epoch.settings import Settings
-from catseye.reduction.epoch.unknowns import Network, build_network
+from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import Taken, phases_of
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
-from catseye.reduction.site.motion import Motion, ground_from
+from catseye.reduction.site.motion import CarriedMotion, ground_from
 
 SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of what a round claims
 
@@ -41,7 +41,7 @@ class Epoch:
     """
 
     rows: tuple[Taken, ...]
-    coordinates: Coordinates
+    coordinates: AdjustedCoordinates
     carried: Carried
     reasons: dict[int, str]
 
@@ -81,7 +81,7 @@ def campaign_of(
             np.array([w.pressure_hpa for w in said]),
             np.array([w.humidity_percent for w in said]),
         ),
-        shots=Shots(
+        shots=ShotColumns(
             np.array([r.shot.number for r in rows], dtype=np.int64),
             np.array([r.mjd for r in rows]),
             tuple(r.shot.ranger for r in rows),
@@ -97,8 +97,8 @@ def campaign_of(
 def solve_epoch(
     campaign: Campaign,
     rows: Sequence[Taken],
-    motion: Motion,
-    settings: Settings,
+    motion: CarriedMotion,
+    settings: ReductionSettings,
     *,
     carried: Carried | None,
     lasting: Sequence[str],
@@ -147,12 +147,12 @@ def solve_epoch(
     return Epoch(tuple(rows), found, seen if carried is None else with_unseen(carried, seen), reasons)
 
 
-def frames_at(network: Network, motion: Motion) -> dict[str, Transform]:
+def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:
     """Ground from the frame of each moving point of a network, at the epoch."""
     return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.at}
 
 
-def frames_of_points(motion: Motion, names: Sequence[str]) -> dict[str, Transform]:
+def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, Transform]:
     """Ground from the frame of each of some points that move, at the motion's epoch."""
     azimuth, elevation = motion.track.at(motion.epoch)
     kinds = {f: ground_from(motion.site, f, azimuth, elevation).single for f in ("alidade", "reflector")}
@@ -175,7 +175,7 @@ def _lasts(name: str, lasting: Sequence[str]) -> bool:
     return kind == "glass" and rest in lasting
 
 
-def _with_carried(network: Network, carried: Carried, frames: Mapping[str, Transform]) -> Network:
+def _with_carried(network: CampaignNetwork, carried: Carried, frames: Mapping[str, Transform]) -> CampaignNetwork:
     """The network that begins at the carried state and has it instead of the priors that it took in already."""
     x, covariance = to_ground(carried, frames)
     at = {name: i for i, name in enumerate(network.layout.names)}
@@ -189,7 +189,7 @@ def _with_carried(network: Network, carried: Carried, frames: Mapping[str, Trans
     return replace(network, layout=replace(network.layout, start=start.tolist()), priors=[prior, *left])
 
 
-def _without_known(group: Observations, known: set[int]) -> Observations | None:
+def _without_known(group: ObservationGroup, known: set[int]) -> ObservationGroup | None:
     """A prior without what the carried state has taken in already: rows all of whose parameters are known."""
     columns = np.asarray(group.columns)
     if columns.ndim == 2:  # a row its own: distances between carried points

@@ -19,16 +19,23 @@ from catseye.errors import CatseyeError
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.live.epoch import Epoch, campaign_of, frames_of_points, solve_epoch
 from catseye.reduction.live.jitter import Jitter
 from catseye.reduction.live.pose import LivePose, live_pose
 from catseye.reduction.live.repeats import joined_repeats
-from catseye.reduction.live.shots import Line, RangerNow, ShotAnswer, Taken, answer, taken
+from catseye.reduction.live.shots import RangerNow, ShotAnswer, SolvedLine, Taken, answer, taken
 from catseye.reduction.live.state import USUAL, Carried, Loosening, carried_on, with_reference, with_velocities
 from catseye.reduction.live.weather import StationWatch
 from catseye.reduction.site.bodies import bodies_of, lasting_names
-from catseye.reduction.site.motion import LONGEST_GAP, Motion, PostureTrack, carried_point, frames_of, ground_from
+from catseye.reduction.site.motion import (
+    LONGEST_GAP,
+    CarriedMotion,
+    PostureTrack,
+    carried_point,
+    frames_of,
+    ground_from,
+)
 from catseye.reduction.site.places import places_of
 
 Array = NDArray[np.float64]
@@ -50,7 +57,7 @@ class LiveSettings:
     bending_mm_per_degree   of a body's points for each degree that the telescope moves during an epoch
     """
 
-    reduction: Settings = field(default_factory=Settings)
+    reduction: ReductionSettings = field(default_factory=ReductionSettings)
     filter: Literal["random_walk", "constant_velocity"] = "random_walk"
     loosening: Loosening = USUAL
     u_flexure_mm: float = 10.0
@@ -119,7 +126,7 @@ class EpochJob:
 
     rows: list[Taken]
     weather: list[LiveWeather]
-    motion: Motion
+    motion: CarriedMotion
     places: dict[str, Array]
     index: float
     azimuth: float
@@ -127,7 +134,7 @@ class EpochJob:
     carried: Carried | None
     lasting: tuple[str, ...]
     ticks: int
-    rules: Settings
+    rules: ReductionSettings
 
     def solve(self) -> Epoch | str:
         """The epoch, or why there is none."""
@@ -175,7 +182,7 @@ class Live:
         self.last_ticks = 0
         self.failed = ""  # why the last solve gave nothing
         self._pending: list[Taken] = []
-        self._lines: dict[tuple[str, str], Line] = {}
+        self._lines: dict[tuple[str, str], SolvedLine] = {}
         self._own: dict[str, Array] = _own_places(self.site, self.frames)
         self._constants = {name: place.constant for name, place in places_of(self.site).items()}
         self._index = FIRST_INDEX
@@ -279,7 +286,9 @@ class Live:
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
         times = [r.mjd for r in rows if r.shot.target != REFERENCE]
         told = self.track.between(min([mjd, *times]), max([mjd, *times]))
-        motion = Motion(self.site, told, self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path)
+        motion = CarriedMotion(
+            self.site, told, self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path
+        )
         known = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._own.keys()
         places = {name: self._own[name] for name in sorted(known)}
         carried = self._carried_to(ticks, elevation)
@@ -307,7 +316,7 @@ class Live:
 
     # Inside ----------------------------------------------------------------------------------------------------------
 
-    def _take_in(self, epoch: Epoch, motion: Motion, azimuth: float, elevation: float) -> EpochAnswer:
+    def _take_in(self, epoch: Epoch, motion: CarriedMotion, azimuth: float, elevation: float) -> EpochAnswer:
         found = epoch.coordinates
         self.number += 1
         self.jitter.learn(found.ranges, self.bodies)
@@ -320,7 +329,7 @@ class Live:
         for k, (ranger, target) in enumerate(zip(ranges.ranger, ranges.target, strict=True)):
             added = -(ranges.glass[k] + ranges.obliquity[k] + ranges.zero[k] + ranges.head[k])
             d0 = self.site.mirror_of(ranger).d0_mm * MILLIMETRE
-            self._lines[ranger, target] = Line(1.0 + float(ranges.refractivity[k]), float(added) - d0)
+            self._lines[ranger, target] = SolvedLine(1.0 + float(ranges.refractivity[k]), float(added) - d0)
         if self.number == self.settings.reference_after:
             self.set_reference()
         pose = None
@@ -425,12 +434,12 @@ class Live:
         )
         return math.dist(a, b)
 
-    def _line(self, ranger: str, target: str) -> Line:
+    def _line(self, ranger: str, target: str) -> SolvedLine:
         known = self._lines.get((ranger, target))
         if known is not None:
             return known
         d0 = self.site.mirror_of(ranger).d0_mm * MILLIMETRE
-        return Line(self._index, -self._constants.get(target, 0.0) - d0)
+        return SolvedLine(self._index, -self._constants.get(target, 0.0) - d0)
 
 
 def _own_places(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, Array]:

@@ -20,7 +20,7 @@ from catseye.records.site.folder import REFERENCE
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.site import Adc
 from catseye.reduction.epoch.ranges import Detected, Phases, why_not
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.detection.buffers import shortest_run
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
 
@@ -75,7 +75,7 @@ class Taken:
 
 
 @dataclass
-class Line:
+class SolvedLine:
     """What a line's last epoch made of its range: optical path = index (distance + added), m."""
 
     index: float
@@ -92,7 +92,9 @@ class RangerNow:
     )
 
 
-def taken(shot: LiveShot, mirror: Mirror, adc: Adc, settings: Settings, *, usual: float, run: float = 0.0) -> Taken:
+def taken(
+    shot: LiveShot, mirror: Mirror, adc: Adc, settings: ReductionSettings, *, usual: float, run: float = 0.0
+) -> Taken:
     """The phase of one shot, judged as `catseye reduce` judges it.
 
     usual   V, amplitude that such shots have; for the text alone
@@ -200,7 +202,7 @@ def answer(
     now: RangerNow,
     *,
     predicted: Callable[[], float] | None,
-    line: Callable[[], Line],
+    line: Callable[[], SolvedLine],
     d0: float,
     modulation_hz: float,
     walk: float,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
-from catseye.records.site.beam import BeamTrain, Element, Laser
+from catseye.records.site.beam import BeamElement, BeamTrain, Laser
 from catseye.signal.systematics.feedback import fringe_contrast
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ MICROMETRE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class BeamPlace:
     """The beam where it meets an element.
 
     leg         "outward", "reflector", "inward", "detector"
@@ -85,7 +85,7 @@ class BeamPath:
     """
 
     train: BeamTrain
-    places: tuple[Place, ...]
+    places: tuple[BeamPlace, ...]
     status: str
     returned: tuple[Returned, ...]
     smallest_waist: tuple[float, float]
@@ -125,7 +125,7 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
         raise InputError(f"{train.name}: {problem}") from problem
 
 
-def range_effects(train: BeamTrain, back: tuple[Place, ...]) -> dict[str, float]:
+def range_effects(train: BeamTrain, back: tuple[BeamPlace, ...]) -> dict[str, float]:
     """Metres that a range reads too long by mirror coatings, receiving lenses and the place of the image.
 
     train   the record
@@ -160,7 +160,7 @@ def _diode(train: BeamTrain) -> detector.Photodiode | None:
     return detector.Photodiode(plate.radius_mm * MILLIMETRE, plate.sheet_resistance_ohm, plate.capacitance_pf * 1e-12)
 
 
-def _image_effects(train: BeamTrain, image: Place) -> dict[str, float]:
+def _image_effects(train: BeamTrain, image: BeamPlace) -> dict[str, float]:
     """What the photodiode adds by the place of the image."""
     diode, plate = _diode(train), train.detector
     if diode is None:
@@ -210,7 +210,7 @@ def _decibel(share: float) -> float:
     return -10.0 * math.log10(share) if share > 0.0 else math.inf
 
 
-def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[Place, ...], float]:
+def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[BeamPlace, ...], float]:
     """The beam (2,) behind the last outward element, the places, and the power."""
     q, power, way, kept = _laser_beam(train), train.laser.power_mw * 1e-3, 0.0, 1.0
     light, places = _light(train), []
@@ -224,14 +224,14 @@ def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[Place, ...
         passed = min(kept, float(gaussian_beam.share_within_ellipse(edge, *w))) if math.isfinite(edge) else kept
         clipped, kept = 1.0 - passed / kept, passed
         power *= (1.0 - clipped) * _transmission(train, element)
-        places.append(Place("outward", _called(element), way, w, abcd.wavefront_curvature(q), edge, clipped, power))
+        places.append(BeamPlace("outward", _called(element), way, w, abcd.wavefront_curvature(q), edge, clipped, power))
         q, way = abcd.onward(q, _matrices(train, element)), way + _length(element)
     return q, tuple(places), power
 
 
 def _returned(
     train: BeamTrain, leaving: NDArray[np.complex128], power: float, distance: float, way: float
-) -> tuple[Returned, tuple[Place, ...]]:
+) -> tuple[Returned, tuple[BeamPlace, ...]]:
     """What comes back from a distance, and the places from the reflector to the detector."""
     light, space = _light(train), abcd.free_space(distance)
     q, face = abcd.onward(leaving, space), train.reflector.radius_mm * MILLIMETRE
@@ -240,14 +240,14 @@ def _returned(
     whole = 1.0 - hit < UNCLIPPED
     power *= hit * train.reflector.reflectance
     places = [
-        Place(
+        BeamPlace(
             "reflector", train.reflector.name or "reflector", way, w, abcd.wavefront_curvature(q), face, 1 - hit, power
         )
     ]
     system, way, kept = np.broadcast_to(space, (2, 2, 2)), way + distance, 1.0
     stop, past_stop, status = None, np.broadcast_to(np.eye(2), (2, 2, 2)), "ok"
     last = train.detector
-    steps = [*train.inward, Element(kind="aperture", name="detector", aperture_radius_mm=last.radius_mm)]
+    steps = [*train.inward, BeamElement(kind="aperture", name="detector", aperture_radius_mm=last.radius_mm)]
     for number, element in enumerate(steps):
         edge, step = _aperture(element), _matrices(train, element)
         ending = number == len(steps) - 1
@@ -278,7 +278,7 @@ def _returned(
                 (abcd.radius(now, light), abcd.wavefront_curvature(now)) if whole else (np.full(2, np.nan),) * 2
             )
             leg = "detector" if ending else "inward"
-            places.append(Place(leg, _called(element), way, size, bend, edge, clipped, power))
+            places.append(BeamPlace(leg, _called(element), way, size, bend, edge, clipped, power))
         power *= element.transmission if element.kind == "space" else 1.0
         system, past_stop, way = step @ system, step @ past_stop, way + _length(element)
     return Returned(distance, w, hit, float(kept), float(power), status), tuple(places)
@@ -295,7 +295,7 @@ def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, A
     Source: `abcd.onward`.
     """
     q, way = _laser_beam(train), 0.0
-    there = Element(kind="space", length_mm=train.distance_m / MILLIMETRE)
+    there = BeamElement(kind="space", length_mm=train.distance_m / MILLIMETRE)
     legs = {"outward": train.outward, "range": (there,), "back": (there,), "inward": train.inward}
     found = {}
     for leg, elements in legs.items():
@@ -335,7 +335,7 @@ def _waist(laser: Laser, axis: str, light: float) -> float:
     return light / (math.pi * math.tan(HALF_MAXIMUM * getattr(laser, f"divergence_{axis}_deg") * DEGREE))
 
 
-def _matrices(train: BeamTrain, element: Element) -> Array:
+def _matrices(train: BeamTrain, element: BeamElement) -> Array:
     """Matrices (2, 2, 2) of an element in the planes of x and y."""
     if element.kind == "space":
         return np.broadcast_to(abcd.free_space(_length(element)), (2, 2, 2))
@@ -357,7 +357,7 @@ def _matrices(train: BeamTrain, element: Element) -> Array:
     return np.broadcast_to(np.eye(2), (2, 2, 2))
 
 
-def _transmission(train: BeamTrain, element: Element) -> float:
+def _transmission(train: BeamTrain, element: BeamElement) -> float:
     """Of an element, the reflectance of its coating and an isolator's own angles in it."""
     if element.kind == "mirror" and element.coating is not None:
         return element.transmission * _reflected(train, element)[0]
@@ -366,7 +366,7 @@ def _transmission(train: BeamTrain, element: Element) -> float:
     return element.transmission
 
 
-def _isolator(element: Element) -> isolator.Isolator:
+def _isolator(element: BeamElement) -> isolator.Isolator:
     """An isolator whose first polarizer lies along the laser's field."""
     usual = isolator.Isolator()
     return isolator.Isolator(
@@ -376,7 +376,7 @@ def _isolator(element: Element) -> isolator.Isolator:
     )
 
 
-def _reflected(train: BeamTrain, element: Element) -> tuple[float, float]:
+def _reflected(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
     """Reflectance of a coated mirror, and the group path, m, that it adds, for the polarization that it meets."""
     angle = (element.incidence_deg or 0.0) * DEGREE
     made = coating.named(element.coating or "", train.wavelength_um, angle)
@@ -388,7 +388,7 @@ def _reflected(train: BeamTrain, element: Element) -> tuple[float, float]:
     return power, path / power
 
 
-def _polarization(train: BeamTrain, element: Element) -> Mapping[coating.Polarization, float]:
+def _polarization(train: BeamTrain, element: BeamElement) -> Mapping[coating.Polarization, float]:
     """Shares of s and p on a mirror: each isolator on the way leaves the field turned by half a right angle.
 
     A retroreflector is taken to keep the polarization.
@@ -399,20 +399,20 @@ def _polarization(train: BeamTrain, element: Element) -> Mapping[coating.Polariz
     return {"p": kept if along else 1.0 - kept, "s": 1.0 - kept if along else kept}
 
 
-def _indices(train: BeamTrain, element: Element) -> tuple[float, float]:
+def _indices(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
     """Phase and group index of an element's glass over air."""
     name = element.glass or ""
     return float(glass.phase_index(train.wavelength_um, name)), float(glass.group_index(train.wavelength_um, name))
 
 
-def _length(element: Element) -> float:
+def _length(element: BeamElement) -> float:
     """Way, m, that an element adds to the path: its thickness, not its optical path."""
     return (element.length_mm or element.thickness_mm or 0.0) * MILLIMETRE
 
 
-def _aperture(element: Element) -> float:
+def _aperture(element: BeamElement) -> float:
     return math.inf if element.aperture_radius_mm is None else element.aperture_radius_mm * MILLIMETRE
 
 
-def _called(element: Element) -> str:
+def _called(element: BeamElement) -> str:
     return element.name or element.kind.replace("_", " ")

@@ -57,7 +57,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Reflector:
+class LinkReflector:
     """A retroreflector as the beam meets it.
 
     aperture     m, radius of the clear face; the GBT's prisms have 25.4 mm

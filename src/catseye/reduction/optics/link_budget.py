@@ -9,7 +9,7 @@ from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import radius, returned_share, share_within
 from catseye.optics.receiver import noise_density, signal_current, u_phase
 from catseye.optics.retroreflector.prism import clear_share
-from catseye.reduction.optics.link import Link, Reflector
+from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.signal.systematics.leakage import worst_range_error
 
 
@@ -42,7 +42,7 @@ class LinkBudget:
 
 def link_budget(
     link: Link,
-    reflector: Reflector,
+    reflector: LinkReflector,
     distance: float,
     *,
     incidence: float = 0.0,
@@ -106,7 +106,7 @@ def link_budget(
     )
 
 
-def _refuse_nonsense(link: Link, reflector: Reflector, offset: float, background: float) -> None:
+def _refuse_nonsense(link: Link, reflector: LinkReflector, offset: float, background: float) -> None:
     """Factors of light lie above 0 and up to 1, what is divided by is above 0, noise and what is lost 0 or more."""
     shares = {"depth": link.depth, "transmission": link.transmission, "reflectance": reflector.reflectance}
     for name, share in shares.items():

@@ -12,7 +12,7 @@ FEWEST = 2  # readings of a session that a control limit can be drawn for
 
 
 @dataclass(frozen=True)
-class Standing:
+class CornerStanding:
     """How corners lie about their neighbours' mean.
 
     corners            panel corners with a relative height
@@ -35,15 +35,15 @@ class Standing:
     median_u: float
 
 
-def standing(found: PanelHeights, chosen: np.ndarray | None = None) -> Standing:
+def standing(found: PanelHeights, chosen: np.ndarray | None = None) -> CornerStanding:
     """The standing of corners (p, 4) bool, all that are known if None."""
     known = found.known if chosen is None else found.known & chosen
     h, u, p = found.relative[known], found.u_relative[known], found.conforms[known]
     if not len(h):
-        return Standing(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
+        return CornerStanding(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
     square = float(np.mean(h**2))
     surely, not_so = int(np.sum(p >= SURE)), int(np.sum(p <= 1.0 - SURE))
-    return Standing(
+    return CornerStanding(
         corners=len(h),
         rms=square**0.5,
         rms_true=max(square - float(np.mean(u**2)), 0.0) ** 0.5,

@@ -15,7 +15,7 @@ from scipy.special import ndtr
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Solution, adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSquaresSolution, adjust
 from catseye.estimation.quality.reliability import checked, single_level, w_critical
 from catseye.geometry.antenna.panel_surface import axes
 from catseye.records.panels.instrument import PanelInstrument
@@ -74,7 +74,7 @@ class PanelHeights:
     sheet: PanelInstrument
     readings: PanelReadings
     model: PanelModel
-    solution: Solution
+    solution: LeastSquaresSolution
     times: np.ndarray
     departure: np.ndarray
     u_departure: np.ndarray
@@ -148,7 +148,7 @@ def _left_out(doubt: Doubt) -> Doubt:
     return Doubt(**{**doubt.__dict__, "out": True})
 
 
-def _solved(model: PanelModel, active: list[np.ndarray]) -> Solution:
+def _solved(model: PanelModel, active: list[np.ndarray]) -> LeastSquaresSolution:
     solution = adjust(np.zeros(model.columns.size), model.groups, active=active, iterations=5)
     if not solution.solved:
         raise EstimationError(f"panel corners: {solution.status}")
@@ -166,7 +166,7 @@ def _survey_of(survey: PanelSurvey, number: np.ndarray) -> PanelSurvey:
 
 
 def _doubts(
-    model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, solution: Solution
+    model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, solution: LeastSquaresSolution
 ) -> list[tuple[tuple[int, int], Doubt, list[tuple[int, int]]]]:
     """Readings that the tests reject: (group, row), what is said of each, and its rivals' (group, row)."""
     fits = solution.fits[: len(model.blocks)]
@@ -224,7 +224,7 @@ def _doubt(
     )
 
 
-def times_read(model: PanelModel, solution: Solution) -> np.ndarray:
+def times_read(model: PanelModel, solution: LeastSquaresSolution) -> np.ndarray:
     """(p, 4) readings used that touched the panel at that corner of its own."""
     times = np.zeros(model.target.shape, dtype=int)
     for fit, block in zip(solution.fits, model.blocks, strict=False):
@@ -253,7 +253,7 @@ def _heights(
     sheet: PanelInstrument,
     readings: PanelReadings,
     model: PanelModel,
-    solution: Solution,
+    solution: LeastSquaresSolution,
     doubts: tuple[Doubt, ...],
     surveyed: bool,
 ) -> PanelHeights:
@@ -327,7 +327,7 @@ def conformity(value: np.ndarray, u: np.ndarray, goal: float) -> np.ndarray:
 
 
 def panel_fits(
-    layout: PanelLayout, solution: Solution, departure: np.ndarray, u_target: np.ndarray
+    layout: PanelLayout, solution: LeastSquaresSolution, departure: np.ndarray, u_target: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Piston and slopes (p, 3) of the plane through each panel's four corners, and their u; m and rad."""
     place = corner_places(layout)

@@ -21,7 +21,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.observations.kind import Kind
+from catseye.estimation.observations.kind import ObservationKind
 from catseye.geometry.antenna.panel_surface import axes, cosine_of_slope, panels_under, warps
 from catseye.geometry.antenna.panel_tool import turned
 from catseye.records.files.refusal import refusal
@@ -35,7 +35,7 @@ GAUGES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class OwnColumns(Kind):
+class OwnColumns(ObservationKind):
     """observed = sum of coefficients times parameters, a few of each row's own; -1 stands for none.
 
     coefficient   (m, w)
@@ -56,7 +56,7 @@ class OwnColumns(Kind):
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class PanelColumns:
     """Where parameters stand: corner heights (p, 4), shafts (c,), zeros (s, 4), levels (s, 2)."""
 
     panels: int
@@ -172,7 +172,7 @@ class PanelModel:
     """
 
     layout: PanelLayout
-    columns: Columns
+    columns: PanelColumns
     tips: Tips
     groups: tuple[OwnColumns, ...]
     blocks: tuple[np.ndarray, ...]
@@ -213,7 +213,7 @@ def panel_model(
     maps       by panel
     """
     told = tips(readings, layout, sheet)
-    columns = Columns(len(layout.panels), len(layout.corners), len(readings.sessions))
+    columns = PanelColumns(len(layout.panels), len(layout.corners), len(readings.sessions))
     places = corner_places(layout)
     shape, between = _mapped(layout, told, places, maps or {})
     mapped = np.array([name in (maps or {}) for name in layout.panels])
@@ -311,7 +311,7 @@ def flat_means(readings: PanelReadings, sheet: PanelInstrument) -> tuple[np.ndar
     return mean, many
 
 
-def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: Columns) -> list[OwnColumns]:
+def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: PanelColumns) -> list[OwnColumns]:
     """Means on the flat observe the gauges' zeros; the flat's own unevenness is the same in all sessions."""
     mean, many = flat_means(readings, sheet)
     session, gauge = np.nonzero(many)
@@ -324,7 +324,7 @@ def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: Columns) -> 
     return [OwnColumns("flat", mean[session, gauge], c, at, np.ones((len(at), 1)))]
 
 
-def _priors(sheet: PanelInstrument, columns: Columns, target: np.ndarray) -> OwnColumns:
+def _priors(sheet: PanelInstrument, columns: PanelColumns, target: np.ndarray) -> OwnColumns:
     """What is known before: heights near their targets, zeros and levels near zero."""
     many = np.arange(columns.size)
     first, last = 4 * columns.panels, columns.size - 6 * columns.sessions
@@ -349,7 +349,9 @@ def _warps(
     return OwnColumns("warps", np.sum(null * target, axis=1), u**2, at, null)
 
 
-def _shafts(layout: PanelLayout, sheet: PanelInstrument, columns: Columns, survey: PanelSurvey | None) -> OwnColumns:
+def _shafts(
+    layout: PanelLayout, sheet: PanelInstrument, columns: PanelColumns, survey: PanelSurvey | None
+) -> OwnColumns:
     """Where shafts stand: as the lasers found their prisms; those that they did not, as roughly as a panel is set."""
     corners = np.arange(len(layout.corners))
     height, u = np.zeros(len(corners)), np.full(len(corners), sheet.panel.u_set_um * MICROMETRE)

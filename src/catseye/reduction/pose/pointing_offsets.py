@@ -18,7 +18,13 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import FrameError, InputError
 from catseye.estimation.shapes.pose import Pose, pivot_change, relative_pose
 from catseye.estimation.shapes.rigid_body import turned_covariance
-from catseye.geometry.antenna.beam_deviation import Aperture, Gregorian, aperture, prime_focus_tilt, subreflector_tilt
+from catseye.geometry.antenna.beam_deviation import (
+    ApertureNodes,
+    Gregorian,
+    aperture,
+    prime_focus_tilt,
+    subreflector_tilt,
+)
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.pose.pose import GroupPose, at_posture, frame_transform
@@ -117,7 +123,7 @@ def pointing_offset(
     )
 
 
-def site_aperture(site: SiteFolder) -> Aperture:
+def site_aperture(site: SiteFolder) -> ApertureNodes:
     """The site's paraboloid and aperture."""
     p = site.site.paraboloid
     centre = np.array(p.aperture_centre_mm) * MILLIMETRE

@@ -23,9 +23,9 @@ from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.epoch.settings import Settings
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.bodies import bodies_of
-from catseye.reduction.site.places import Place, nominal_frame, places_of
+from catseye.reduction.site.places import RangedPoint, nominal_frame, places_of
 
 GROUPS = ("dish", "feed-arm", "alidade", "subreflector")
 FRAMES = ("ground", "alidade", "reflector")
@@ -176,10 +176,10 @@ def _into(to_from: Transform, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray,
 
 
 def _design(
-    names: Sequence[str], known: dict[str, Place], site: SiteFolder, to_from: Transform
+    names: Sequence[str], known: dict[str, RangedPoint], site: SiteFolder, to_from: Transform
 ) -> tuple[np.ndarray, np.ndarray]:
     """Design places (n, 3) and covariance (3n, 3n), independent from point to point, in the frame `to_from.to`."""
-    settings = Settings()
+    settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
     on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
     inside = nominal_frame(site)

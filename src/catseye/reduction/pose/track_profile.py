@@ -20,7 +20,7 @@ from catseye.errors import EstimationError, FrameError
 from catseye.estimation.least_squares.singular import best_linear_estimate
 from catseye.geometry.antenna.pointing_series import axis_terms
 from catseye.geometry.frames.rotation import from_vector, rz
-from catseye.records.laboratory.tilts import Tilts
+from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.pose import GroupPose
 
 MOST_HARMONICS = 36
@@ -96,7 +96,7 @@ def track_profile(
     azimuth: np.ndarray,
     turn: np.ndarray,
     covariance: np.ndarray,
-    tilts: Tilts | None = None,
+    tilts: TiltReadings | None = None,
     *,
     harmonics: int = 2,
     names: Sequence[str] | None = None,

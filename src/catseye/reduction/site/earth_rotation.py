@@ -59,7 +59,7 @@ class SunSeen:
 
 
 @dataclass(frozen=True)
-class Place:
+class FramePlace:
     """Where a ground frame is, and its air if refraction is to be counted.
 
     latitude, longitude    rad, geodetic, east positive
@@ -99,16 +99,16 @@ def rotation_at(mjd: ArrayLike) -> Rotation:
     return Rotation(np.where(known, ut1_minus_tai - leaps, 0.0), code)
 
 
-def sun_at(mjd: ArrayLike, place: Place | Location) -> SunSeen:
+def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunSeen:
     """Where the Sun stands over a site, in its ground frame: `sun_direction` with UT1 - UTC by the tables.
 
     mjd      (...), UTC, 41317 to 88069
-    place    a Place, or [site] of a site record: the origin of the ground frame, for all rangers of it
+    place    a FramePlace, or [site] of a site record: the origin of the ground frame, for all rangers of it
 
     A Place with a pressure gives the Sun as it is seen through the air. Many times that lie close together are
     interpolated between knots 5 minutes apart, within 0.002". Raises ValidityError as `sun_direction` does.
 
-    >>> green_bank = Place(38.433 * DEGREE, -79.840 * DEGREE, 807.0)
+    >>> green_bank = FramePlace(38.433 * DEGREE, -79.840 * DEGREE, 807.0)
     >>> sun_at(52892.72, green_bank).direction.round(3).tolist()
     [-0.002, -0.552, 0.834]
     """
@@ -122,7 +122,7 @@ def sun_at(mjd: ArrayLike, place: Place | Location) -> SunSeen:
     return SunSeen(direction, rotation.status)
 
 
-def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: float = 10.0) -> Place:
+def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: float = 10.0) -> FramePlace:
     """The place of a site record's table [site]; the elevation of z = 0 is taken as height, for parallax enough.
 
     pressure_hpa    0 is no air; None takes that of the standard atmosphere at its height
@@ -130,7 +130,7 @@ def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: f
     longitude = math.remainder(site.longitude_deg, 360.0) * DEGREE
     height = site.elevation_of_z0_m
     air = standard_pressure_hpa(height) if pressure_hpa is None else pressure_hpa
-    return Place(site.latitude_deg * DEGREE, longitude, height, air, temperature_c)
+    return FramePlace(site.latitude_deg * DEGREE, longitude, height, air, temperature_c)
 
 
 def standard_pressure_hpa(height: float) -> float:
@@ -144,13 +144,13 @@ def standard_pressure_hpa(height: float) -> float:
     return 1013.25 * (1.0 - 0.0065 * height / 288.15) ** 5.2559
 
 
-def _each(mjd: NDArray[np.float64], place: Place) -> NDArray[np.float64]:
+def _each(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
     """`sun_direction` at each time: a tenth of a millisecond."""
     turn = rotation_at(mjd).ut1_minus_utc
     return sun_direction(mjd, place.latitude, place.longitude, place.height, ut1_minus_utc=turn)
 
 
-def _many(mjd: NDArray[np.float64], place: Place) -> NDArray[np.float64]:
+def _many(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
     """The same through four knots about each time; directly where that takes fewer looks.
 
     The cubic's error is (w h)^4 0.5625/24 = 5e-9 rad for h = 300 s.

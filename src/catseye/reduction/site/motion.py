@@ -207,7 +207,7 @@ def frames_of(site: SiteFolder) -> dict[str, str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class CarriedMotion:
     """How the telescope carries points from an epoch to other instants.
 
     site        its constants

@@ -15,7 +15,7 @@ MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty ex
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class RangedPoint:
     """A point of the network that can be ranged to.
 
     name       of the point
@@ -57,7 +57,7 @@ def nominal_frame(campaign: SiteFolder) -> Transform:
     )
 
 
-def places_of(campaign: SiteFolder) -> dict[str, Place]:
+def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
     """Everything that can be ranged to, by name, at its approximate position in the ground frame.
 
     Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
@@ -70,10 +70,10 @@ def places_of(campaign: SiteFolder) -> dict[str, Place]:
         "alidade": ground_from_alidade(np.radians(campaign.site.campaign.azimuth_deg)),
         "ground": Transform("ground", "ground", np.eye(3), np.zeros(3)),
     }
-    places: dict[str, Place] = {}
+    places: dict[str, RangedPoint] = {}
     for name, monument in campaign.monuments.items():
         mirror = campaign.mirror_of(name)
-        places[name] = Place(
+        places[name] = RangedPoint(
             name,
             "ranger",
             scan_point(
@@ -85,12 +85,12 @@ def places_of(campaign: SiteFolder) -> dict[str, Place]:
         )
     for ranger in campaign.feedarm.ranger:
         where = to_ground["reflector"].points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE)
-        places[ranger.name] = Place(ranger.name, "ranger", where, u_start=_metres(ranger.u_position_mm))
+        places[ranger.name] = RangedPoint(ranger.name, "ranger", where, u_start=_metres(ranger.u_position_mm))
     for target in campaign.targets.values():
         frame = to_ground[target.frame]
         where = frame.points(np.array(target.position_mm) * MILLIMETRE)
         if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
-            places[target.name] = Place(
+            places[target.name] = RangedPoint(
                 target.name,
                 "prism",
                 where,
@@ -102,7 +102,7 @@ def places_of(campaign: SiteFolder) -> dict[str, Place]:
                 u_start=_metres(target.u_position_mm),
             )
         else:
-            places[target.name] = Place(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
+            places[target.name] = RangedPoint(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
     for triplet in campaign.triplets.values():
         frame = to_ground[triplet.frame]
         ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
@@ -110,7 +110,7 @@ def places_of(campaign: SiteFolder) -> dict[str, Place]:
         middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
         half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
         for side, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
-            places[side.target] = Place(
+            places[side.target] = RangedPoint(
                 side.target,
                 "prism",
                 where,
@@ -121,7 +121,7 @@ def places_of(campaign: SiteFolder) -> dict[str, Place]:
                 triplet.triplet,
                 u_start=_metres(triplet.u_position_mm),
             )
-        places[triplet.ball.target] = Place(
+        places[triplet.ball.target] = RangedPoint(
             triplet.ball.target,
             "ball",
             ball,

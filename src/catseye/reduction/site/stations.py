@@ -20,7 +20,7 @@ from catseye.geometry.mirror.imperfect import (
     imperfect_counts,
     imperfect_face_counts,
 )
-from catseye.geometry.mirror.pointing import Aim, Station, aim, counts_covariance
+from catseye.geometry.mirror.pointing import Aim, MirrorStation, aim, counts_covariance
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
@@ -34,12 +34,12 @@ AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
 
 
-def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> Station:
+def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> MirrorStation:
     """The mirror on that monument.
 
     Source: [PARKER04] Figures 2.2 and 2.4, transformations 1 to 6.
     """
-    return Station(
+    return MirrorStation(
         np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE,
         np.array([monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad]),
         offset_of(mirror),
@@ -48,7 +48,7 @@ def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> Station:
     )
 
 
-def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_reflector: Transform) -> Station:
+def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_reflector: Transform) -> MirrorStation:
     """The mirror of a ranger on the feed arm, as the telescope stands.
 
     ground_from_reflector    of that posture
@@ -66,7 +66,7 @@ def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_
     y = np.array(ranger.mount_y) - z * (z @ np.array(ranger.mount_y))
     y /= np.linalg.norm(y)
     mount_from_reflector = np.stack([np.cross(y, z), y, z])
-    return Station.from_matrix(
+    return MirrorStation.from_matrix(
         ground_from_reflector.points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE),
         mount_from_reflector @ ground_from_reflector.rotation.T,
         offset=offset_of(mirror),
@@ -75,7 +75,7 @@ def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_
     )
 
 
-def station_in(campaign: SiteFolder, name: str) -> Station | None:
+def station_in(campaign: SiteFolder, name: str) -> MirrorStation | None:
     """A campaign's ranger, the telescope in its nominal posture; None where no record says how its mount is turned."""
     mirror = campaign.mirror_of(name)
     if name in campaign.monuments:
@@ -104,7 +104,7 @@ def _imperfections(mirror: MirrorGeometry) -> Imperfections:
     )
 
 
-def imperfections_variance(station: Station, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
+def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
     """(n, 2), counts^2, of the direct pointing's counts for points (n, 3), m, by what the record says it does not know
     of offsets, tilts and encoder errors; zero where it says nothing.
 

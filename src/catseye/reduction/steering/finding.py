@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import Station, ray, ray_jacobian
+from catseye.geometry.mirror.pointing import MirrorStation, ray, ray_jacobian
 from catseye.geometry.mirror.search_pattern import LEAST_REACH, Pattern, count_size, offsets_of_counts, raster, spiral
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import reach
-from catseye.reduction.steering.spot_fit import Head, Spot, fit_spot
+from catseye.reduction.steering.spot_fit import SearchHead, Spot, fit_spot
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN where there is no reading
@@ -39,7 +39,7 @@ COLUMNS = (
 
 def find(
     predicted: ArrayLike,
-    head: Head,
+    head: SearchHead,
     measure: Measure,
     *,
     search_radius: float,
@@ -98,7 +98,7 @@ def find(
 
 def _centred(
     hit: Array,
-    head: Head,
+    head: SearchHead,
     look: Measure,
     looked: Mapping[tuple[float, ...], float],
 ) -> Spot:
@@ -125,7 +125,7 @@ def _centred(
 
 
 def found_point(
-    station: Station, spot: Spot, distance: float, u_distance: float, *, of_station: ArrayLike | None = None
+    station: MirrorStation, spot: Spot, distance: float, u_distance: float, *, of_station: ArrayLike | None = None
 ) -> tuple[Array, Array]:
     """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
 
@@ -210,7 +210,7 @@ def _refuse_commas(results: Sequence[SearchResult]) -> None:
 
 
 def _nothing(
-    pattern: Pattern, forbidden: int, seen: list[float], predicted: ArrayLike, head: Head, radius: float
+    pattern: Pattern, forbidden: int, seen: list[float], predicted: ArrayLike, head: SearchHead, radius: float
 ) -> str:
     """The status of a search that saw no light."""
     na, ne = np.asarray(predicted, dtype=float)

@@ -24,8 +24,8 @@ from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.errors import ValidityError
 from catseye.geometry.clearance.keep_out import (
     TOUCH,
-    Box,
-    Cone,
+    BoxZone,
+    ConeZone,
     Entries,
     EntryStatus,
     Zone,
@@ -34,13 +34,13 @@ from catseye.geometry.clearance.keep_out import (
     servo_margin,
 )
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, within
-from catseye.geometry.mirror.pointing import Station, ray
-from catseye.geometry.mirror.slew import Pace, Slew, straight, trapezoid
+from catseye.geometry.mirror.pointing import MirrorStation, ray
+from catseye.geometry.mirror.slew import MirrorSlew, Pace, straight, trapezoid
 from catseye.geometry.sky.sun import SUN_RATE
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
-from catseye.reduction.site.earth_rotation import Place, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, sun_at
 
 LOOK_AHEAD = 1.0  # days
 SCAN = 60.0 / SECONDS_PER_DAY  # days, in which the Sun moves by a quarter of a degree
@@ -56,7 +56,7 @@ SETTLED = 1e-3  # s, of the time when a beam becomes free
 
 
 @dataclass(frozen=True)
-class Verdict:
+class GuardAnswer:
     """The answer to a request.
 
     allowed     whether the mirror may
@@ -91,11 +91,11 @@ class Guard:
     """
 
     name: str
-    station: Station
+    station: MirrorStation
     pace: Pace
     azimuth_limits: tuple[float, float]
-    place: Place | None
-    boxes: tuple[Box, ...] = ()
+    place: FramePlace | None
+    boxes: tuple[BoxZone, ...] = ()
     half_angle: float = 5.0 * DEGREE
     margin_counts: tuple[float, float] = (20.0, 20.0)
     horizon: float = -2.0 * DEGREE
@@ -136,7 +136,9 @@ class Guard:
         zones: list[Zone] = [self._cone(days, np.zeros(days.shape)), *self.boxes]
         return clearances(zones, self.station.scan_point, direction, exact_below)
 
-    def entries(self, mjd: ArrayLike, slews: Slew, *, widened: float = 0.0, compiled: bool | None = None) -> Entries:
+    def entries(
+        self, mjd: ArrayLike, slews: MirrorSlew, *, widened: float = 0.0, compiled: bool | None = None
+    ) -> Entries:
         """What becomes of moves (n,), each beginning at its mjd, (n,) or one; zone 0 is the Sun, then the boxes.
 
         widened    rad, added to the Sun's cone
@@ -147,25 +149,25 @@ class Guard:
         sun = replace(sun, half_angle=sun.half_angle + widened)
         return first_entry(self.station, slews, (sun, *self.boxes), self.margin, compiled=compiled)
 
-    def pointing(self, mjd: float, counts: ArrayLike) -> Verdict:
+    def pointing(self, mjd: float, counts: ArrayLike) -> GuardAnswer:
         """Whether the mirror may stand at counts (2,) at a time, and if not for the Sun, when it may."""
         n = _pair(counts)
         gap = self.clearance(mjd, n)
         left = float(np.min(gap))
         beyond = self._beyond(n)
         if beyond:
-            return Verdict(False, f"{self.name}: pointing at {_shown(n)}: {beyond}", left)
+            return GuardAnswer(False, f"{self.name}: pointing at {_shown(n)}: {beyond}", left)
         if left > TOUCH:
-            return Verdict(True, "", left)
+            return GuardAnswer(True, "", left)
         zone = int(np.argmin(gap))
         text = f"{self.name}: pointing at {_shown(n)} {self._nearness(zone, left)}"
         return self._refused(text, zone, left, self._change(mjd, n) if zone == 0 else None, None)
 
-    def slew(self, mjd: float, start: ArrayLike, end: ArrayLike) -> Verdict:
+    def slew(self, mjd: float, start: ArrayLike, end: ArrayLike) -> GuardAnswer:
         """Whether the mirror may go from counts to counts (2,), along the profiles of its axes, beginning at mjd."""
         return self.route(mjd, [_pair(start), _pair(end)])
 
-    def route(self, mjd: float, waypoints: ArrayLike, dwell: float = 0.0) -> Verdict:
+    def route(self, mjd: float, waypoints: ArrayLike, dwell: float = 0.0) -> GuardAnswer:
         """Whether the mirror may go through counts (n, 2), halting at each for a dwell, s; n at least 2."""
         points = np.asarray(waypoints, dtype=float)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not 0.0 <= dwell < np.inf:
@@ -176,12 +178,12 @@ class Guard:
         if dwell > 0.0:
             halts = straight(points, points, dwell)
             order = np.argsort(np.r_[np.arange(len(points)) * 2, np.arange(len(moves.start)) * 2 + 1])
-            parts = [np.concatenate([getattr(halts, k), getattr(moves, k)])[order] for k in Slew.__annotations__]
-            moves = Slew(*parts)
+            parts = [np.concatenate([getattr(halts, k), getattr(moves, k)])[order] for k in MirrorSlew.__annotations__]
+            moves = MirrorSlew(*parts)
         before = np.concatenate([[0.0], np.cumsum(moves.total)[:-1]])
         return self._along(mjd, before, moves, word="slew", waits=True)
 
-    def track(self, mjd: ArrayLike, counts: ArrayLike) -> Verdict:
+    def track(self, mjd: ArrayLike, counts: ArrayLike) -> GuardAnswer:
         """Whether the mirror may follow counts (n, 2) at rising times mjd (n,), straight between them; n at least 2."""
         times, points = np.asarray(mjd, dtype=float), np.asarray(counts, dtype=float)
         if times.ndim != 1 or points.shape != (len(times), 2) or len(times) < 2 or not np.all(np.diff(times) > 0.0):
@@ -195,16 +197,18 @@ class Guard:
         """When the Sun's cone comes to a mirror that stands at counts (2,); mjd if it is there; None within a day."""
         return self._change(mjd, _pair(counts), comes=True)
 
-    def _along(self, mjd: float, before: NDArray[np.float64], moves: Slew, *, word: str, waits: bool) -> Verdict:
+    def _along(
+        self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew, *, word: str, waits: bool
+    ) -> GuardAnswer:
         """The verdict on moves that follow each other, each `before` s after mjd; `waits`: all may begin later."""
         for n in (*moves.start, moves.end[-1]):
             beyond = self._beyond(n)
             if beyond:
-                return Verdict(False, f"{self.name}: {word} by {_shown(n)}: {beyond}", np.nan)
+                return GuardAnswer(False, f"{self.name}: {word} by {_shown(n)}: {beyond}", np.nan)
         before, moves = _cut(before, moves)
         bad = self._first_bad(mjd, before, moves)
         if bad is None:
-            return Verdict(True, "", float(np.min(self.clearance(mjd, moves.start[0]))))
+            return GuardAnswer(True, "", float(np.min(self.clearance(mjd, moves.start[0]))))
         at, n, zone, inside = bad
         when = mjd + at / SECONDS_PER_DAY
         # A cone that counts for some of a move counts for all of it, also where the Sun is not up yet.
@@ -215,7 +219,7 @@ class Guard:
         return self._refused(text, zone, left, free, at)
 
     def _first_bad(
-        self, mjd: float, before: NDArray[np.float64], moves: Slew
+        self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew
     ) -> tuple[float, NDArray[np.float64], int, bool] | None:
         """Time, s after mjd, counts, zone of the first entry of moves in a row, and whether it is their start."""
         found = self.entries(mjd + before / SECONDS_PER_DAY, moves)
@@ -227,7 +231,7 @@ class Guard:
         time = found.time[first]
         return float(before[first] + time), moves[first].position(time), int(found.zone[first]), inside
 
-    def _free_start(self, mjd: float, before: NDArray[np.float64], moves: Slew) -> float | None:
+    def _free_start(self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew) -> float | None:
         """The first start from which the whole way keeps out of the Sun; None if none is within a day, or a box is hit.
 
         The deepest place of the way stays in the cone until `_change` says: no start that comes there before succeeds.
@@ -247,7 +251,7 @@ class Guard:
                 return None
         return None
 
-    def _deepest(self, mjd: float, before: NDArray[np.float64], moves: Slew) -> tuple[float, NDArray[np.float64]]:
+    def _deepest(self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew) -> tuple[float, NDArray[np.float64]]:
         """Time, s after mjd, and counts where moves in a row come deepest into the Sun's cone, of some looked at."""
         times = moves.total[:, None] * np.linspace(0.0, 1.0, PLACES)
         n = moves[:, None].position(times)
@@ -261,7 +265,7 @@ class Guard:
         direction = ray(self.station, n).direction
         return self._cone(days, np.zeros(days.shape)).clearance(direction) - self.margin
 
-    def _refused(self, text: str, zone: int, left: float, free: float | None, at: float | None) -> Verdict:
+    def _refused(self, text: str, zone: int, left: float, free: float | None, at: float | None) -> GuardAnswer:
         if zone > 0:
             why = self.boxes[zone - 1].why
             ending = f"a box does not go away{f' ({why})' if why else ''}: choose another way or target"
@@ -269,7 +273,7 @@ class Guard:
             ending = f"not free within {LOOK_AHEAD:g} day: choose another way or target"
         else:
             ending = f"free at {utc_text(free)}"
-        return Verdict(False, f"{text}; {ending}", left, at, free)
+        return GuardAnswer(False, f"{text}; {ending}", left, at, free)
 
     def _nearness(self, zone: int, left: float) -> str:
         """How near a beam is to a zone of which `left` (rad, margin off) remains."""
@@ -290,10 +294,10 @@ class Guard:
             return f"elevation count {n[1]:.1f} is more than a turn from {zero:.1f}"
         return ""
 
-    def _cone(self, mjd: NDArray[np.float64], total: NDArray[np.float64]) -> Cone:
+    def _cone(self, mjd: NDArray[np.float64], total: NDArray[np.float64]) -> ConeZone:
         """The Sun's cone for paths that begin at mjd (...) and take a total (...) s; not counting while it is set."""
         if self.place is None:
-            return Cone(np.array([0.0, 0.0, 1.0]), np.array(-np.inf))
+            return ConeZone(np.array([0.0, 0.0, 1.0]), np.array(-np.inf))
         seen = sun_at(np.stack([mjd, mjd + total / SECONDS_PER_DAY]), self.place).direction
         highest = np.max(np.arcsin(np.clip(seen[..., 2], -1.0, 1.0)), axis=0) + 0.5 * SUN_RATE * total
         bend = (SUN_RATE * total) ** 2 / 8.0
@@ -301,7 +305,7 @@ class Guard:
             lowest = np.min(np.arcsin(np.clip(seen[..., 2], -1.0, 1.0)), axis=0) - 0.5 * SUN_RATE * total
             bend = bend * np.where(lowest > HIGH, BENDING_HIGH, BENDING)
         half = np.where(highest >= self.horizon, np.minimum(self.half_angle + bend, WIDEST), -np.inf)
-        return Cone(seen[0], half, seen[1])
+        return ConeZone(seen[0], half, seen[1])
 
     def _change(self, mjd: float, n: NDArray[np.float64], *, comes: bool = False) -> float | None:
         """The first time from mjd on when the Sun's cone has left a standing beam, or come to it; None within a day.
@@ -332,7 +336,7 @@ class Guard:
         return None
 
 
-def _cut(before: NDArray[np.float64], moves: Slew) -> tuple[NDArray[np.float64], Slew]:
+def _cut(before: NDArray[np.float64], moves: MirrorSlew) -> tuple[NDArray[np.float64], MirrorSlew]:
     """Moves in a row, each `before` s after the start, with those of even speed cut into pieces of at most LONGEST."""
     even = np.all(moves.ramp == 0.0, axis=-1)
     pieces = np.where(even, np.maximum(np.ceil(moves.total / LONGEST), 1.0), 1.0).astype(int)
@@ -343,12 +347,18 @@ def _cut(before: NDArray[np.float64], moves: Slew) -> tuple[NDArray[np.float64],
     whole, way = moves[which], (moves.end - moves.start)[which]
     start = whole.start + share[:, None] * way
     end = whole.start + (share + 1.0 / pieces[which])[:, None] * way
-    cut = Slew(start, end, whole.ramp, whole.duration / pieces[which, None])
+    cut = MirrorSlew(start, end, whole.ramp, whole.duration / pieces[which, None])
     return before[which] + share * whole.total, cut
 
 
 def guard_of(
-    name: str, station: Station, mirror: MirrorGeometry, *, keep_out: KeepOut, place: Place | None, pace: Pace
+    name: str,
+    station: MirrorStation,
+    mirror: MirrorGeometry,
+    *,
+    keep_out: KeepOut,
+    place: FramePlace | None,
+    pace: Pace,
 ) -> Guard:
     """The guard of a ranger by its records.
 

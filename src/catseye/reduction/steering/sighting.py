@@ -7,16 +7,16 @@ import numpy as np
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.mirror.imperfect import imperfect_ray
-from catseye.geometry.mirror.pointing import Station, ray
+from catseye.geometry.mirror.pointing import MirrorStation, ray
 from catseye.geometry.mirror.slew import Pace
 from catseye.geometry.sky.sun import altitude_azimuth
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.records.site.solids import Solids
-from catseye.reduction.site.earth_rotation import Place, standard_pressure_hpa, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, standard_pressure_hpa, sun_at
 from catseye.reduction.site.stations import imperfections_of
-from catseye.reduction.steering.guard import Verdict, guard_of
+from catseye.reduction.steering.guard import GuardAnswer, guard_of
 from catseye.reduction.steering.visibility import Retroreflectors, Visibility, frames_at, visibility
 
 STANDING = Pace((1.0, 1.0), (1.0, 1.0))  # a pointing asks nothing of the axes' speeds
@@ -34,15 +34,17 @@ class Sighting:
     """
 
     mjd: float = np.nan
-    sun: Verdict | None = None
-    keep_out: Verdict | None = None
+    sun: GuardAnswer | None = None
+    keep_out: GuardAnswer | None = None
     separation: float | None = None
     altitude: float | None = None
     azimuth: float | None = None
     earth_rotation: str = ""
 
 
-def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None) -> Place:
+def place_of_monument(
+    monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None
+) -> FramePlace:
     """Where on Earth the site is: the options, else the monument's record; with standard air, which lifts the Sun.
 
     Raises InputError where neither says it, and for one that is no place.
@@ -60,17 +62,17 @@ def place_of_monument(monument: MonumentGeometry, longitude_deg: float | None, l
             )
     height = monument.elevation_m or 0.0
     latitude, longitude = float(found["latitude_deg"]) * DEGREE, float(found["longitude_deg"]) * DEGREE
-    return Place(latitude, longitude, height, standard_pressure_hpa(height))
+    return FramePlace(latitude, longitude, height, standard_pressure_hpa(height))
 
 
 def sightings(
-    station: Station,
+    station: MirrorStation,
     mirror: MirrorGeometry,
     counts: np.ndarray,
     *,
     name: str,
     mjd: float | None,
-    place: Place | None,
+    place: FramePlace | None,
     keep_out: KeepOut,
 ) -> list[Sighting]:
     """The Sun and the keep-out boxes for beams at counts (n, 2); the azimuth stops are not asked here.
@@ -106,7 +108,7 @@ def sightings(
 
 
 def seen_from(
-    station: Station,
+    station: MirrorStation,
     name: str,
     to: np.ndarray,
     *,

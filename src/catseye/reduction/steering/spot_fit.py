@@ -26,7 +26,7 @@ NODES = 4  # of each axis within a count
 
 
 @dataclass(frozen=True)
-class Head:
+class SearchHead:
     """What a search must know of a ranger and its spot.
 
     zeros             (na0, ne0) counts
@@ -101,7 +101,7 @@ class Spot:
         return np.sqrt(np.diag(self.covariance))
 
 
-def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: Head) -> Spot:
+def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
     """A round spot on a background, Gaussian or flatter, fitted to amplitudes at counts by least squares.
 
     counts       (n, 2) counts (Na, Ne), all in one pointing
@@ -165,7 +165,7 @@ class _Sheet:
     xy: Array
     a: Array
     clipped: NDArray[np.bool_]
-    head: Head
+    head: SearchHead
     size: Array
 
     @cached_property
@@ -273,7 +273,7 @@ def _surrounded(xy: Array, centre: Array) -> bool:
     return bool(gaps.max() < np.pi)
 
 
-def _in_counts(middle: Array, head: Head, at: Array) -> tuple[Array, Array]:
+def _in_counts(middle: Array, head: SearchHead, at: Array) -> tuple[Array, Array]:
     """The place as counts, and the derivatives (2, 2) of counts by the place in units of the radius."""
     step = 1e-4
     probes = at + step * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])

@@ -18,7 +18,7 @@ from catseye.errors import InputError, ValidityError
 from catseye.geometry.antenna.frames import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
 from catseye.geometry.frames.rotation import rx, rz
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN, within
-from catseye.geometry.mirror.pointing import Station, counts, in_mirror_axes
+from catseye.geometry.mirror.pointing import MirrorStation, counts, in_mirror_axes
 from catseye.geometry.mirror.track import CountLine, longest_interval, miss
 from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 
@@ -168,16 +168,16 @@ class AntennaPath:
         return azimuth_rate * down + rate * x_axis, change
 
 
-Stations = Callable[[Array], Station]
+Stations = Callable[[Array], MirrorStation]
 Targets = Callable[[Array], Array]
 
 
-def mounted(stations: Station) -> Stations:
+def mounted(stations: MirrorStation) -> Stations:
     """Rangers (r,) on the ground, the same at all times, ready for `follow`."""
     return lambda t: stations[None, :, None]
 
 
-def carried(stations: Station, path: AntennaPath, when: float) -> Stations:
+def carried(stations: MirrorStation, path: AntennaPath, when: float) -> Stations:
     """Rangers (r,) that ride on the reflector's frame, given as they stand at one time, ready for `follow`.
 
     stations    (r,), in the ground frame at `when`
@@ -190,10 +190,10 @@ def carried(stations: Station, path: AntennaPath, when: float) -> Stations:
     own_point = (stations.scan_point - place) @ first
     own_gamma = stations.gamma @ first
 
-    def at(t: Array) -> Station:
+    def at(t: Array) -> MirrorStation:
         here, _, _ = path.motion(own_point, "reflector", t)
         gamma = own_gamma[None] @ np.swapaxes(path.rotation(t), -1, -2)[:, None]
-        moved = Station.from_matrix(here, gamma, offset=stations.offset, beta=stations.beta, zeros=stations.zeros)
+        moved = MirrorStation.from_matrix(here, gamma, offset=stations.offset, beta=stations.beta, zeros=stations.zeros)
         return moved[:, :, None]
 
     return at
@@ -223,7 +223,7 @@ REASONS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class CountTrack:
     """Counts along which rangers follow targets, interval by interval.
 
     begin      (s,) instants t0
@@ -253,7 +253,7 @@ def follow(
     interval: float = BUFFER,
     limits: ArrayLike = (-np.inf, np.inf),
     most_rate: float = np.inf,
-) -> Track:
+) -> CountTrack:
     """Counts of every ranger for every target at the ends of each interval, and whether they can be run.
 
     stations    times (s,) -> Station (s or 1, r, 1); times count from `begin`
@@ -294,11 +294,11 @@ def follow(
     fast = np.abs(lines.rate).max(axis=(0, -1)) > most_rate
     status = np.where((status == Following.FOLLOWED) & fast, Following.TOO_FAST, status)
     status = np.where(np.isfinite(chosen).all(axis=(0, -1)), status, Following.NOWHERE)
-    return Track(begin.plus(steps[:-1]), since, lines, second, status.astype(np.int64))
+    return CountTrack(begin.plus(steps[:-1]), since, lines, second, status.astype(np.int64))
 
 
 def safe_intervals(
-    stations: Station,
+    stations: MirrorStation,
     points: ArrayLike,
     frame: str,
     path: AntennaPath,
@@ -330,7 +330,7 @@ def safe_intervals(
 
 
 def misses(
-    track: Track, stations: Stations, targets: Targets, *, whole_counts: bool = False, shares: ArrayLike = SHARES
+    track: CountTrack, stations: Stations, targets: Targets, *, whole_counts: bool = False, shares: ArrayLike = SHARES
 ) -> Array:
     """By how much (s, k, r, p), m, the beams pass their targets at shares of each interval.
 

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.antenna.deformation import (
-    Motion,
-    Posture,
-    Table,
-    Terms,
+    KnotTable,
+    PostureMotion,
+    PostureTerms,
+    TelescopePosture,
     Validity,
     carried,
     carried_jacobian,
@@ -43,7 +43,7 @@ Added = Mapping[str, ArrayLike]  # frame or group: (..., 6) m and rad, on top of
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class RestPoints:
     """Points of a group at rest.
 
     names      n
@@ -86,11 +86,11 @@ class Antenna:
 
     record: StructuralModel
     parents: dict[str, str]
-    motions: dict[str, Motion]
+    motions: dict[str, PostureMotion]
     validity: Validity
 
     @cached_property
-    def groups(self) -> dict[str, Points]:
+    def groups(self) -> dict[str, RestPoints]:
         """Points by the name of their group."""
         return {group.name: _points(group) for group in self.record.group}
 
@@ -107,7 +107,9 @@ class Antenna:
             names.append(self.parents[names[-1]])
         return names[::-1]
 
-    def nominal(self, frame: str, posture: Posture, subreflector: SubreflectorPosition | None = None) -> Transforms:
+    def nominal(
+        self, frame: str, posture: TelescopePosture, subreflector: SubreflectorPosition | None = None
+    ) -> Transforms:
         """The frame's parent from the frame at rest: first order, and what the subreflector was told.
 
         frame, posture   which, and how the telescope stands
@@ -131,7 +133,7 @@ class Antenna:
         place = subreflector.pivot + subreflector.shift + np.einsum("...ij,j->...i", matrix, arm)
         return Transforms(self.parents[frame], frame, matrix, place)
 
-    def six(self, name: str, posture: Posture, added: Added | None = None) -> np.ndarray:
+    def six(self, name: str, posture: TelescopePosture, added: Added | None = None) -> np.ndarray:
         """Shift and turn (..., 6), m and rad, of a frame or group, with what is added; zero without a motion."""
         found = self.motions[name].six(posture) if name in self.motions else np.zeros((*posture.shape, 6))
         return found + np.asarray(added[name], dtype=float) if added and name in added else found
@@ -153,7 +155,7 @@ class Antenna:
     def ground_from(
         self,
         frame: str,
-        posture: Posture,
+        posture: TelescopePosture,
         *,
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
@@ -183,7 +185,7 @@ class Antenna:
     def points(
         self,
         group: str,
-        posture: Posture,
+        posture: TelescopePosture,
         *,
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
@@ -198,7 +200,7 @@ class Antenna:
         transform = self.ground_from(found.frame, posture, added=added, subreflector=subreflector)
         return transform[..., None].points(self.in_frame(group, posture, added=added))
 
-    def in_frame(self, group: str, posture: Posture, *, added: Added | None = None) -> np.ndarray:
+    def in_frame(self, group: str, posture: TelescopePosture, *, added: Added | None = None) -> np.ndarray:
         """Points of a group in the axes of their frame (..., n, 3), m, as the group's own motion leaves them."""
         found = self.groups[_known(group, self.groups)]
         record = next(g for g in self.record.group if g.name == group)
@@ -218,7 +220,7 @@ class Antenna:
         self,
         frame: str,
         points: ArrayLike,
-        posture: Posture,
+        posture: TelescopePosture,
         *,
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
@@ -240,7 +242,7 @@ class Antenna:
         return found
 
     def _outward(
-        self, frame: str, posture: Posture, added: Added | None, subreflector: SubreflectorPosition | None
+        self, frame: str, posture: TelescopePosture, added: Added | None, subreflector: SubreflectorPosition | None
     ) -> np.ndarray:
         """Rotation (..., 3, 3) from a frame's nominal axes, in which it moves, to the ground."""
         own, parent = self.nominal(frame, posture, subreflector).rotation, self.parents[frame]
@@ -251,7 +253,7 @@ class Antenna:
     def group_derivatives(
         self,
         group: str,
-        posture: Posture,
+        posture: TelescopePosture,
         *,
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
@@ -268,7 +270,7 @@ class Antenna:
             slopes[group] = out @ carried_jacobian(self.six(group, posture, added), self.pivot(group), found.position)
         return slopes
 
-    def axis_derivatives(self, points: ArrayLike, posture: Posture) -> np.ndarray:
+    def axis_derivatives(self, points: ArrayLike, posture: TelescopePosture) -> np.ndarray:
         """Derivatives (..., 3, 2), m/rad, of ground points above the elevation axis by azimuth and elevation.
 
         points    (..., 3), m, ground frame
@@ -283,7 +285,7 @@ class Antenna:
         by_elevation = np.cross(turn[..., :, 0], x - turn @ height)
         return np.stack(np.broadcast_arrays(by_azimuth, by_elevation), axis=-1)
 
-    def turns(self, frame: str, posture: Posture, added: Added | None = None) -> dict[str, np.ndarray]:
+    def turns(self, frame: str, posture: TelescopePosture, added: Added | None = None) -> dict[str, np.ndarray]:
         """Derivatives (..., 3, 6) of the frame's small turn about ground axes by shifts and turns on the way to it."""
         found: dict[str, np.ndarray] = {}
         for name in self.chain(frame)[::-1]:
@@ -307,7 +309,7 @@ def antenna_of(record: StructuralModel) -> Antenna:
     return Antenna(record, {frame.name: frame.parent for frame in record.frame}, motions, validity)
 
 
-def motion_of(record: MotionRecord, reference_c: float) -> Motion:
+def motion_of(record: MotionRecord, reference_c: float) -> PostureMotion:
     """A motion in metres and radians.
 
     record        mm and arc seconds
@@ -320,18 +322,18 @@ def motion_of(record: MotionRecord, reference_c: float) -> Motion:
     covariance = np.zeros((0, 0)) if record.covariance is None else np.array(record.covariance) * np.outer(units, units)
     u = np.repeat([record.u_shift_mm, record.u_turn_arcsec], 3) * UNITS
     pivot = np.array(record.pivot_mm) * MILLIMETRE
-    return Motion(_basis(record, reference_c), values, pivot, u, covariance)
+    return PostureMotion(_basis(record, reference_c), values, pivot, u, covariance)
 
 
-def _basis(record: Basis, reference_c: float) -> Terms | Table:
+def _basis(record: Basis, reference_c: float) -> PostureTerms | KnotTable:
     if record.terms is not None:
-        return Terms(record.terms, reference_c)
+        return PostureTerms(record.terms, reference_c)
     warm = record.temperature_c if record.temperature_c is not None else (reference_c,)
-    return Table(np.array(record.elevation_deg) * DEGREE, np.array(warm))
+    return KnotTable(np.array(record.elevation_deg) * DEGREE, np.array(warm))
 
 
-def _points(group: GroupRecord) -> Points:
-    return Points(
+def _points(group: GroupRecord) -> RestPoints:
+    return RestPoints(
         tuple(point.name for point in group.point),
         group.frame,
         group.name,
@@ -348,7 +350,7 @@ def _shifts(group: GroupRecord) -> np.ndarray:
     return np.array(values) * MILLIMETRE
 
 
-def _known(group: str, groups: Sequence[str] | Mapping[str, Points]) -> str:
+def _known(group: str, groups: Sequence[str] | Mapping[str, RestPoints]) -> str:
     if group not in groups:
         raise InputError(f"group {group!r} is not in the structural model (it has {', '.join(groups)})")
     return group

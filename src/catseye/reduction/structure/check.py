@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.errors import EstimationError, InputError
-from catseye.reduction.structure.series import GroupSeries, Scatter, SeriesModel, StructureFit, fit_structure, widened
+from catseye.reduction.structure.series import (
+    EpochScatter,
+    GroupSeries,
+    SeriesModel,
+    StructureFit,
+    fit_structure,
+    widened,
+)
 
 Array = NDArray[np.float64]
 FOLDS = 5
@@ -99,7 +106,7 @@ def _foretell(
         beyond[epoch] = bool(single.outside)
 
 
-def of_points(series: GroupSeries, scatter: Scatter | None = None) -> Array:
+def of_points(series: GroupSeries, scatter: EpochScatter | None = None) -> Array:
     """Covariance (T, n, 3, 3) m^2 of each place by itself, with what is new in an epoch where it is given."""
     arms = np.nanmean(series.places, axis=0) - series.pivot
     spread = series.spread if scatter is None else widened(series.spread, arms, scatter)

@@ -15,7 +15,7 @@ import numpy as np
 
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.shapes.rigid_body import fit_transformation
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.geometry.frames.frame import Transforms
 from catseye.geometry.frames.rotation import to_vector
 from catseye.reduction.structure.antenna import Added, Antenna, SubreflectorPosition
@@ -25,7 +25,7 @@ SETTLED = 1e-9  # m: largest change of a predicted coordinate in the last step
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredPosture:
     """Targets as measured in one posture.
 
     names         n, points of the model's groups
@@ -38,7 +38,7 @@ class Measured:
     names: tuple[str, ...]
     coordinates: np.ndarray
     covariance: np.ndarray
-    posture: Posture
+    posture: TelescopePosture
     subreflector: SubreflectorPosition | None = None
 
 
@@ -94,10 +94,10 @@ class Corrections:
 def measured_of(
     document: Mapping[str, Any],
     antenna: Antenna,
-    posture: Posture,
+    posture: TelescopePosture,
     *,
     subreflector: SubreflectorPosition | None = None,
-) -> Measured:
+) -> MeasuredPosture:
     """The model's targets among the points of a `coordinates.json`, with their covariance.
 
     document       the file as read: points, covariance_order, covariance
@@ -127,10 +127,10 @@ def measured_of(
     for name, row in zip(names, np.isfinite(coordinates).all(axis=1), strict=True):
         if not row:
             raise InputError(f"coordinates: {name} has no x, y and z (expected three numbers)")
-    return Measured(names, coordinates, covariance, posture, subreflector)
+    return MeasuredPosture(names, coordinates, covariance, posture, subreflector)
 
 
-def frame_motion(antenna: Antenna, measured: Measured, frame: str, *, added: Added | None = None) -> FrameMotion:
+def frame_motion(antenna: Antenna, measured: MeasuredPosture, frame: str, *, added: Added | None = None) -> FrameMotion:
     """Shift and turn of one frame from the targets it carries, its parents where the model and `added` have them.
 
     antenna    the structural model
@@ -167,7 +167,7 @@ def frame_motion(antenna: Antenna, measured: Measured, frame: str, *, added: Add
     return FrameMotion(frame, names, six, correction, fit.covariance, fit.residual, fit.pvv, fit.degrees_of_freedom)
 
 
-def correct_posture(antenna: Antenna, measured: Measured) -> Corrections:
+def correct_posture(antenna: Antenna, measured: MeasuredPosture) -> Corrections:
     """Corrections to all frames on which measured targets stand, from one posture, the model's u as their prior.
 
     antenna    the structural model
@@ -225,7 +225,9 @@ def u_sheet(antenna: Antenna, target: str) -> float:
     return float(group.u[group.names.index(target)])
 
 
-def _places(antenna: Antenna, names: Sequence[str], posture: Posture, added: Added) -> tuple[np.ndarray, np.ndarray]:
+def _places(
+    antenna: Antenna, names: Sequence[str], posture: TelescopePosture, added: Added
+) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 3) in the axes of the targets' frames, and their u (n,) in one posture."""
     place, u = [], []
     for name in names:
@@ -244,7 +246,7 @@ def _frames_of(antenna: Antenna, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def predicted_points(
-    antenna: Antenna, measured: Measured, added: Added, places: Mapping[str, np.ndarray] | None = None
+    antenna: Antenna, measured: MeasuredPosture, added: Added, places: Mapping[str, np.ndarray] | None = None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Coordinates (n, 3) of the targets, and derivatives (3n, 6) by the shift and turn of each frame and group."""
     n = len(measured.names)
@@ -270,6 +272,6 @@ def predicted_points(
     return predicted, {frame: slope.reshape(3 * n, 6) for frame, slope in by_frame.items()}
 
 
-def ground_from_group(antenna: Antenna, measured: Measured, group: str, added: Added) -> Transforms:
+def ground_from_group(antenna: Antenna, measured: MeasuredPosture, group: str, added: Added) -> Transforms:
     frame = antenna.groups[group].frame
     return antenna.ground_from(frame, measured.posture, added=added, subreflector=measured.subreflector)

@@ -20,7 +20,7 @@ from catseye.reduction.structure.antenna import UNITS, Antenna
 from catseye.reduction.structure.corrections import (
     ITERATIONS,
     SETTLED,
-    Measured,
+    MeasuredPosture,
     ground_from_group,
     group_of,
     predicted_points,
@@ -58,7 +58,7 @@ class ModelFit:
 
 def fit_model(
     antenna: Antenna,
-    epochs: Sequence[Measured],
+    epochs: Sequence[MeasuredPosture],
     *,
     free: Mapping[str, Sequence[str]],
 ) -> ModelFit:
@@ -187,7 +187,7 @@ def _owner(record: StructuralModel, name: str) -> MotionRecord:
 
 def _rows(
     antenna: Antenna,
-    epoch: Measured,
+    epoch: MeasuredPosture,
     layout: tuple[tuple[str, str], ...],
     targets: list[str],
     change: np.ndarray,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.estimation.harmonic.series import Spread
-from catseye.geometry.antenna.deformation import Posture
+from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
     REFLECTOR_TO_ELEVATION,
@@ -117,7 +117,9 @@ def group_series(
         turn = np.kron(np.eye(len(own)), carrier.rotation.T)
         full[t][np.ix_(into, into)] = turn @ epoch.covariance[np.ix_(rows, rows)] @ turn.T
     e = np.array([epoch.elevation for epoch in kept])
-    posture = Posture(np.array([epoch.azimuth for epoch in kept]), e, np.array([epoch.temperature_c for epoch in kept]))
+    posture = TelescopePosture(
+        np.array([epoch.azimuth for epoch in kept]), e, np.array([epoch.temperature_c for epoch in kept])
+    )
     middle = np.nanmean(places, axis=(0, 1)) if pivot is None else np.asarray(pivot, dtype=float)
     mjd = np.array([epoch.mjd for epoch in kept])
     told = tuple(epoch.label for epoch in kept)

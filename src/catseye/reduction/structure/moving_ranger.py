@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna.deformation import Posture, carried_jacobian
+from catseye.geometry.antenna.deformation import TelescopePosture, carried_jacobian
 from catseye.geometry.antenna.frames import ground_from_alidade_at
 from catseye.geometry.frames.frame import Transform, Transforms
 from catseye.geometry.frames.rotation import skew
-from catseye.geometry.mirror.pointing import Station, counts_jacobian
+from catseye.geometry.mirror.pointing import MirrorStation, counts_jacobian
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import StructuralModel
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
 from catseye.reduction.structure.antenna import Antenna, SubreflectorPosition
 from catseye.reduction.structure.corrections import group_of
-from catseye.signal.vibration.filter import State
+from catseye.signal.vibration.filter import FilterState
 
 FEED_ARM = "feed_arm"
 
@@ -48,18 +48,18 @@ class Driven:
     u_azimuth: float
     u_elevation: float
 
-    def posture(self, times: ArrayLike) -> Posture:
+    def posture(self, times: ArrayLike) -> TelescopePosture:
         """How the telescope stands at times (...), s, near its own: both axes at constant rates.
 
         Source: [PARKER04] section 2.6.1, positions and velocities from the monitor and control system.
         """
         ahead = np.asarray(times, dtype=float) - self.time
         azimuth, elevation = self.azimuth + self.azimuth_rate * ahead, self.elevation + self.elevation_rate * ahead
-        return Posture(azimuth, elevation, np.full(ahead.shape, self.temperature_c))
+        return TelescopePosture(azimuth, elevation, np.full(ahead.shape, self.temperature_c))
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class FrameCorrections:
     """Shifts and turns of frames on top of the model's, with what is known of them.
 
     six           frame or group: (..., 6) m and rad, F of them
@@ -93,7 +93,7 @@ class MovingRanger:
     covariance    (..., 6, 6): scan point, ground frame, m; then the small turn of the mount about ground axes, rad
     """
 
-    station: Station
+    station: MirrorStation
     covariance: np.ndarray
 
     def counts_covariance(self, points: ArrayLike, of_points: ArrayLike | None = None) -> np.ndarray:
@@ -115,7 +115,7 @@ class MovingRanger:
 
 
 def tracked(
-    antenna: Antenna, target: str, coordinates: ArrayLike, covariance: ArrayLike, posture: Posture
+    antenna: Antenna, target: str, coordinates: ArrayLike, covariance: ArrayLike, posture: TelescopePosture
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacements (N, 3), m, of a target in its frame's axes and their covariances: samples for the vibration filter.
 
@@ -137,8 +137,8 @@ def tracked(
 
 
 def vibrating(
-    record: StructuralModel, state: State, times: ArrayLike, *, seen_at: tuple[Antenna, str] | None = None
-) -> Known:
+    record: StructuralModel, state: FilterState, times: ArrayLike, *, seen_at: tuple[Antenna, str] | None = None
+) -> FrameCorrections:
     """What the vibration adds to the frames at times (...), s, foretold from the filter's state.
 
     record    whose vibrations are the state's modes, in the same order
@@ -172,7 +172,7 @@ def vibrating(
         response[first : first + 6, axes * k : axes * (k + 1)] = by_detector
     six = flat @ response.T
     each = {frame: six[..., 6 * i : 6 * i + 6] for i, frame in enumerate(frames)}
-    return Known(each, response @ spread @ response.T)
+    return FrameCorrections(each, response @ spread @ response.T)
 
 
 def _displaced(antenna: Antenna, target: str, frame: str) -> np.ndarray:
@@ -192,7 +192,7 @@ def moving_ranger(
     *,
     u_mount: float,
     u_position: float = 0.010,
-    known: tuple[Known, ...] = (),
+    known: tuple[FrameCorrections, ...] = (),
 ) -> MovingRanger:
     """A feed-arm ranger's station at times, with the covariance of its scan point and of the turn of its mount.
 
@@ -218,7 +218,7 @@ def moving_ranger(
     at_rest = arm_from_reflector.points(still.scan_point)
     ground_from_arm = antenna.ground_from(FEED_ARM, posture, added=added)
     turn = Transforms("ground", FEED_ARM, ground_from_arm.rotation, np.zeros(3)) @ arm_from_reflector
-    station = Station.from_matrix(
+    station = MirrorStation.from_matrix(
         ground_from_arm.points(at_rest),
         still.gamma @ np.swapaxes(turn.rotation, -1, -2),
         offset=still.offset,
@@ -240,7 +240,7 @@ def projected(
     drive: Driven,
     times: ArrayLike,
     *,
-    known: tuple[Known, ...] = (),
+    known: tuple[FrameCorrections, ...] = (),
     subreflector: SubreflectorPosition | None = None,
 ) -> Placed:
     """Coordinates (..., n, 3) of a group's targets in the ground frame at times (...), such as t0 and t1 of a buffer.
@@ -258,7 +258,9 @@ def projected(
     """
     posture, added = drive.posture(times), _added(known)
     position = antenna.points(group, posture, added=added, subreflector=subreflector)
-    wide = Posture(*(np.asarray(v)[..., None] for v in (posture.azimuth, posture.elevation, posture.temperature_c)))
+    wide = TelescopePosture(
+        *(np.asarray(v)[..., None] for v in (posture.azimuth, posture.elevation, posture.temperature_c))
+    )
     room = {name: np.asarray(value)[..., None, :] for name, value in added.items()}
     at = antenna.in_frame(group, posture, added=added)
     frame = antenna.groups[group].frame
@@ -278,7 +280,7 @@ def projected(
     return Placed(position, covariance)
 
 
-def _added(known: tuple[Known, ...]) -> dict[str, np.ndarray]:
+def _added(known: tuple[FrameCorrections, ...]) -> dict[str, np.ndarray]:
     """The sum of all that is known, by frame."""
     found: dict[str, np.ndarray] = {}
     for one in known:
@@ -289,9 +291,9 @@ def _added(known: tuple[Known, ...]) -> dict[str, np.ndarray]:
 
 def _propagated(
     antenna: Antenna,
-    posture: Posture,
+    posture: TelescopePosture,
     slopes: Mapping[str, np.ndarray],
-    known: tuple[Known, ...],
+    known: tuple[FrameCorrections, ...],
     *,
     room: bool = False,
 ) -> np.ndarray:
@@ -317,13 +319,13 @@ def _of_axes(slopes: np.ndarray, drive: Driven) -> np.ndarray:
     return (slopes * u**2) @ np.swapaxes(slopes, -1, -2)
 
 
-def _axis_turns(posture: Posture) -> np.ndarray:
+def _axis_turns(posture: TelescopePosture) -> np.ndarray:
     """The small turn (..., 3, 2) about ground axes that a radian of azimuth, of elevation makes."""
     across = ground_from_alidade_at(posture.azimuth).rotation[..., :, 0]
     return np.stack(np.broadcast_arrays(np.array([0.0, 0.0, -1.0]), across), axis=-1)
 
 
-def _somewhere(posture: Posture) -> Posture:
+def _somewhere(posture: TelescopePosture) -> TelescopePosture:
     """One posture: how two frames stand to each other at rest is the same in all."""
     first = [float(np.ravel(v)[0]) for v in (posture.azimuth, posture.elevation, posture.temperature_c)]
-    return Posture(*first)
+    return TelescopePosture(*first)

@@ -20,7 +20,7 @@ from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
 from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
-from catseye.geometry.antenna.deformation import Posture, Terms
+from catseye.geometry.antenna.deformation import PostureTerms, TelescopePosture
 
 Array = NDArray[np.float64]
 Own = Literal["place", "each"]
@@ -61,7 +61,7 @@ class SeriesModel:
         """How many of the functions, from the first, the points have themselves."""
         return 1 if self.own == "place" else len(self.functions)
 
-    def rows(self, posture: Posture, way: ArrayLike, reference_c: float) -> Array:
+    def rows(self, posture: TelescopePosture, way: ArrayLike, reference_c: float) -> Array:
         """Values (..., k) of the functions.
 
         posture       (...)
@@ -69,7 +69,7 @@ class SeriesModel:
         reference_c   degrees C at which t is 0
         """
         named = tuple(name for name in self.functions if name != UP)
-        found = Terms(named, reference_c).rows(posture)
+        found = PostureTerms(named, reference_c).rows(posture)
         if not self.hysteresis:
             return found
         ways = np.broadcast_to(np.asarray(way, dtype=float), found.shape[:-1])
@@ -95,7 +95,7 @@ class GroupSeries:
     frame: str
     names: tuple[str, ...]
     mjd: Array
-    posture: Posture
+    posture: TelescopePosture
     way: Array
     places: Array
     spread: Spread
@@ -125,7 +125,7 @@ class GroupSeries:
             self,
             names=tuple(self.names[i] for i in at),
             mjd=self.mjd[epochs],
-            posture=Posture(*told),
+            posture=TelescopePosture(*told),
             way=self.way[epochs],
             places=self.places[np.ix_(epochs, at)],
             spread=spread,
@@ -134,7 +134,7 @@ class GroupSeries:
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class EpochScatter:
     """What no function foretells, new in each epoch.
 
     covariance   (6, 6) m and rad, of the group's shift and turn
@@ -194,7 +194,7 @@ class StructureFit:
     rest: Array
     reference_c: float
     fit: HarmonicFit
-    scatter: Scatter
+    scatter: EpochScatter
 
     @property
     def arms(self) -> Array:
@@ -237,7 +237,7 @@ class StructureFit:
         spread = shared + self.scatter.covariance
         return Prediction(self.series.names, place, covariance, change @ six.T, spread, self.outside(posture, way))
 
-    def outside(self, posture: Posture, way: ArrayLike = 0.0) -> tuple[str, ...]:
+    def outside(self, posture: TelescopePosture, way: ArrayLike = 0.0) -> tuple[str, ...]:
         """What of a posture lies outside the epochs of the fit, in words."""
         found = []
         asked: list[tuple[str, ArrayLike, ArrayLike, float, str]] = [
@@ -254,10 +254,10 @@ class StructureFit:
             found.append("way is outside -1 to 1: extrapolated")
         return tuple(found)
 
-    def _asked(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> Posture:
+    def _asked(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> TelescopePosture:
         e = np.atleast_1d(np.asarray(elevation, dtype=float))
         warm = np.broadcast_to(self.reference_c if temperature_c is None else np.asarray(temperature_c, float), e.shape)
-        return Posture(np.zeros_like(e), e, warm)
+        return TelescopePosture(np.zeros_like(e), e, warm)
 
     def _fresh(self) -> Array:
         """Covariance (n, 3, 3) m^2 of what is new in an epoch."""
@@ -282,7 +282,7 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
     reference_c = float(np.mean(np.asarray(series.posture.temperature_c, dtype=float))) if what.temperature else 0.0
     rows = what.rows(fitted_posture(series, what), series.way, reference_c)
     m = what.own_count
-    scatter = Scatter(np.zeros((6, 6)), 0.0)
+    scatter = EpochScatter(np.zeros((6, 6)), 0.0)
 
     def fitted() -> StructureFit:
         spread = widened(series.spread, rest - series.pivot, scatter)
@@ -304,14 +304,14 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
     return answer
 
 
-def fitted_posture(series: GroupSeries, model: SeriesModel) -> Posture:
+def fitted_posture(series: GroupSeries, model: SeriesModel) -> TelescopePosture:
     """Postures of the epochs as the functions need them: at the reference temperature 0 where none counts."""
     e = np.asarray(series.posture.elevation, dtype=float)
     warm = np.asarray(series.posture.temperature_c, dtype=float) if model.temperature else np.zeros_like(e)
-    return Posture(np.zeros_like(e), e, warm)
+    return TelescopePosture(np.zeros_like(e), e, warm)
 
 
-def widened(spread: Spread, arms: Array, scatter: Scatter) -> Spread:
+def widened(spread: Spread, arms: Array, scatter: EpochScatter) -> Spread:
     """A spread with what is new in each epoch.
 
     spread    of the measurements
@@ -333,7 +333,7 @@ def widened(spread: Spread, arms: Array, scatter: Scatter) -> Spread:
     return Spread(points=points, shared=shared)
 
 
-def scatter_of(answer: StructureFit) -> Scatter:
+def scatter_of(answer: StructureFit) -> EpochScatter:
     """What is new in each epoch, by moments of the residuals' rigid parts and of what is left of them.
 
     answer   a fit; its own scatter does not matter but for the weights
@@ -363,11 +363,11 @@ def scatter_of(answer: StructureFit) -> Scatter:
             noise.append(np.einsum("jni,nil,knl->jk", part, q, part))
             expected += float(np.einsum("nii->", q)) * (1.0 - 2.0 / len(at))
     if not squares:
-        return Scatter(np.zeros((6, 6)), 0.0)
+        return EpochScatter(np.zeros((6, 6)), 0.0)
     more = _excess(degrees * np.mean(squares, axis=0), np.mean(noise, axis=0))
     free = 3 * int(np.isfinite(e).all(axis=2).sum()) - 6 * len(squares)
     each = (own_degrees * left - expected) / free if free > 0 else 0.0
-    return Scatter(more, float(np.sqrt(max(each, 0.0))))
+    return EpochScatter(more, float(np.sqrt(max(each, 0.0))))
 
 
 def _excess(found: Array, noise: Array) -> Array:

@@ -14,7 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.errors import CatseyeError, InputError
 from catseye.signal.vibration.filter import Mode
 from catseye.signal.vibration.modes import find_modes
-from catseye.signal.vibration.spectrum import Peak, Shape, Spectrum, aliases, likely_alias, peaks, shape_at, spectrum
+from catseye.signal.vibration.spectrum import (
+    ModeShape,
+    Peak,
+    Spectrum,
+    aliases,
+    likely_alias,
+    peaks,
+    shape_at,
+    spectrum,
+)
 
 Array = NDArray[np.float64]
 LEAST = 64  # samples of a series: 8 s at full rate
@@ -71,7 +80,7 @@ class FoundPeak:
     likely_hz: float
     share: Array
     decided: bool
-    shape: Shape | None
+    shape: ModeShape | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +245,7 @@ def difference(one: RangeSeries, other: RangeSeries, *, scale: float = 1.0, long
 
 
 @dataclass(frozen=True, eq=False)
-class Movements:
+class TargetMovement:
     """A target's movement by differences of ranges.
 
     seconds      (n,) s
@@ -249,7 +258,7 @@ class Movements:
     covariance: Array
 
 
-def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_gap: float = 0.5) -> Movements:
+def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_gap: float = 0.5) -> TargetMovement:
     """How a target moved, from three rangers or more and approximate coordinates.
 
     series        ranges of A rangers, three up, to one target; the first one's instants count
@@ -284,4 +293,4 @@ def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_g
     weighted = e[None] / sigma[..., None] ** 2
     covariance = np.linalg.inv(np.einsum("nai,aj->nij", weighted, e))
     x = np.einsum("nij,naj,na->ni", covariance, weighted, y - y.mean(axis=0))
-    return Movements(when, x, covariance)
+    return TargetMovement(when, x, covariance)

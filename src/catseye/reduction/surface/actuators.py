@@ -18,7 +18,7 @@ from catseye.optics.zernike import terms, zernike
 from catseye.records.files.refusal import shown
 from catseye.records.panels.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.surface.shape import Aperture, Shape
+from catseye.reduction.surface.shape import LitAperture, SurfaceShape
 
 NEAR = 1e-9  # of a trend's columns: what is left of one beside the others
 TREND_TERMS = 10  # Zernike terms to the third order
@@ -73,7 +73,7 @@ def actuators_of(site: SiteFolder) -> tuple[tuple[str, ...], np.ndarray]:
 
 
 def corrections(
-    shape: Shape,
+    shape: SurfaceShape,
     names: tuple[str, ...],
     places: np.ndarray,
     *,
@@ -167,9 +167,9 @@ def rows_of(found: Actuators) -> list[ActuatorCorrection]:
     return made
 
 
-def _trend(shape: Shape, seen: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _trend(shape: SurfaceShape, seen: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Columns that span the Zernike terms and the paraboloid's parameters, at prisms and at actuators."""
-    aperture: Aperture = shape.aperture
+    aperture: LitAperture = shape.aperture
     low = terms(TREND_TERMS, "noll")
     here, there = aperture.unit(seen), aperture.unit(wanted)
     one = np.column_stack([shape.fit.design, zernike(low, here[:, 0], here[:, 1])])
@@ -187,7 +187,7 @@ def _trimmed(one: np.ndarray, two: np.ndarray, kept: np.ndarray) -> tuple[np.nda
     return orthogonal, np.linalg.solve(triangle.T, two[:, kept].T).T
 
 
-def _parameter_rows(shape: Shape, wanted: np.ndarray) -> np.ndarray:
+def _parameter_rows(shape: SurfaceShape, wanted: np.ndarray) -> np.ndarray:
     """(m, p) of `ParaboloidFit.design` at other places of the fitted surface."""
     return design_rows(shape.fit, wanted, shape.prisms.nominal)
 

@@ -15,9 +15,9 @@ from catseye.geometry.frames.rotation import from_vector, skew, to_vector
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import zernike
 from catseye.reduction.surface.shape import (
-    Aperture,
     Expansion,
     Gain,
+    LitAperture,
     MeanSquare,
     Prisms,
     ShapeSettings,
@@ -49,7 +49,7 @@ class Change:
 
     first: Prisms
     second: Prisms
-    aperture: Aperture
+    aperture: LitAperture
     settings: ShapeSettings
     names: tuple[str, ...]
     local: np.ndarray
@@ -65,7 +65,7 @@ class Change:
     gains: tuple[Gain, ...]
 
 
-def change_between(first: Prisms, second: Prisms, aperture: Aperture, settings: ShapeSettings) -> Change:
+def change_between(first: Prisms, second: Prisms, aperture: LitAperture, settings: ShapeSettings) -> Change:
     """What the surface did between two epochs, each in its own nominal posture.
 
     first, second   at least six prisms of the same names

@@ -14,7 +14,7 @@ import numpy as np
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError
 from catseye.optics.zernike import Term
-from catseye.reduction.surface.shape import Shape
+from catseye.reduction.surface.shape import SurfaceShape
 
 APART_DEG = 1.0  # elevations nearer than this count as one
 APART_C = 0.5  # temperatures that differ by less say nothing of a thermal term
@@ -62,7 +62,7 @@ class Lookup:
     u_table        (e, t, 3) m
     """
 
-    shapes: tuple[Shape, ...]
+    shapes: tuple[SurfaceShape, ...]
     columns: tuple[str, ...]
     left_out: dict[str, str]
     elevation_deg: np.ndarray
@@ -76,7 +76,7 @@ class Lookup:
     u_table: np.ndarray
 
 
-def lookup_of(shapes: Sequence[Shape]) -> Lookup:
+def lookup_of(shapes: Sequence[SurfaceShape]) -> Lookup:
     """The look-up table of several epochs, in the order in which the telescope came to them.
 
     shapes   two epochs or more, each with its elevation; all with the same terms and the same free parts
@@ -144,7 +144,7 @@ def directions(elevation_deg: np.ndarray) -> np.ndarray:
     return made
 
 
-def _elevations(shapes: Sequence[Shape]) -> np.ndarray:
+def _elevations(shapes: Sequence[SurfaceShape]) -> np.ndarray:
     if len(shapes) < 2:
         raise EstimationError(f"a look-up table needs 2 epochs at least, {len(shapes)} given")
     given: list[float] = []
@@ -155,7 +155,7 @@ def _elevations(shapes: Sequence[Shape]) -> np.ndarray:
     return np.array(given)
 
 
-def _temperatures(shapes: Sequence[Shape]) -> np.ndarray | None:
+def _temperatures(shapes: Sequence[SurfaceShape]) -> np.ndarray | None:
     given = [shape.prisms.temperature_c for shape in shapes if shape.prisms.temperature_c is not None]
     return np.array(given) if len(given) == len(shapes) else None
 

@@ -10,13 +10,13 @@ from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
-from catseye.records.site.site import Paraboloid
+from catseye.records.site.site import ParaboloidRecord
 
 HELD = 1e-8  # smallest singular value of Zernike terms beside the paraboloid: below it nothing tells them apart
 
 
 @dataclass(frozen=True, eq=False)
-class Aperture:
+class LitAperture:
     """What is lit of a paraboloid: a circle in the projection along its axis.
 
     centre         (2,) m, from the axis
@@ -29,7 +29,7 @@ class Aperture:
     focal_length: float
 
     @classmethod
-    def of(cls, record: Paraboloid) -> "Aperture":
+    def of(cls, record: ParaboloidRecord) -> "LitAperture":
         """The aperture that a site's record says."""
         return cls(
             np.array(record.aperture_centre_mm) * MILLIMETRE,
@@ -146,7 +146,7 @@ class Gain:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class SurfaceShape:
     """One epoch's surface.
 
     weights      (k,) share of the illumination that each prism stands for
@@ -154,7 +154,7 @@ class Shape:
     """
 
     prisms: Prisms
-    aperture: Aperture
+    aperture: LitAperture
     settings: ShapeSettings
     fit: ParaboloidFit
     weights: np.ndarray
@@ -169,7 +169,7 @@ class Shape:
         return float(np.sqrt(np.mean(self.fit.deviation**2)))
 
 
-def shape_of(prisms: Prisms, aperture: Aperture, settings: ShapeSettings | None = None) -> Shape:
+def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | None = None) -> SurfaceShape:
     """The surface of one epoch: half-path errors, squared under the illumination, are least.
 
     prisms     their places and covariance
@@ -203,7 +203,7 @@ def shape_of(prisms: Prisms, aperture: Aperture, settings: ShapeSettings | None 
     )
     square = mean_square(fit.half_path, fit.half_path_covariance, weights)
     gains = gains_of(fit.half_path, weights, square, settings.frequencies)
-    return Shape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
+    return SurfaceShape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
 
 
 def expansion_of(

@@ -141,7 +141,7 @@ def telescope_error(d: Departures, *, scan_point: Any, h_error: Any = 0.0) -> Ar
     return ball_distance(d_mp, sight, np.asarray(h_corr + h_error)[..., None] * taken) - true
 
 
-class Sensitivity(NamedTuple):
+class LargestEffects(NamedTuple):
     """Largest effects of one cause at both its signs, m.
 
     cause         in words
@@ -167,7 +167,7 @@ def triplet_sensitivities(
     above: float = 0.05,
     distance: float = 46.0,
     incidence: float = 12.0 * DEGREE,
-) -> tuple[Sensitivity, ...]:
+) -> tuple[LargestEffects, ...]:
     """The table: every cause alone at its tolerance, the worst sign and the worst direction on the telescope.
 
     depth, aside, above    m, of the scan point at the calibration; A.8's bound is for the perpendicular on a prism
@@ -187,7 +187,9 @@ def triplet_sensitivities(
         h = [calibration_error(d, depth=depth, aside=aside, above=above) for d in both]
         used = [np.abs(telescope_error(d, scan_point=around)).max() for d in both]
         tie = [telescope_error(d, scan_point=ahead, h_error=e) + d.ball_excess for d, e in zip(both, h, strict=True)]
-        rows.append(Sensitivity(cause, size, memo, float(np.abs(h).max()), float(max(used)), float(np.abs(tie).max())))
+        rows.append(
+            LargestEffects(cause, size, memo, float(np.abs(h).max()), float(max(used)), float(np.abs(tie).max()))
+        )
     return tuple(rows)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
 from catseye.estimation.observations.fixed_distance import U_FIXED
-from catseye.estimation.observations.kinds import Distances, Linear, Observations, RigidTriplets
+from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup, RigidTriplets
 from catseye.estimation.observations.unit_direction import across
 from catseye.reduction.triplet.use import MountedTriplet, obliquity_by_tilt
 
@@ -47,7 +47,7 @@ def triplet_start(units: Sequence[MountedTriplet]) -> NDArray[np.float64]:
     return np.concatenate([np.concatenate([u.prisms.ravel(), u.ball, np.zeros(4)]) for u in units])
 
 
-def triplet_observations(units: Sequence[MountedTriplet], at: TripletParameters) -> tuple[Observations, ...]:
+def triplet_observations(units: Sequence[MountedTriplet], at: TripletParameters) -> tuple[ObservationGroup, ...]:
     """What the sheets say: rigid bodies, priors of the plates' tilts and of the balls' lateral offsets.
 
     units   n, in the frame of the network

@@ -33,7 +33,7 @@ D_12 = 0.635  # m: the design's spacing
 RATIO = 1.527077  # D.1
 
 
-class Slopes(NamedTuple):
+class RefractivitySlopes(NamedTuple):
     """Change of air's group refractivity per deg C, per hPa and per % of relative humidity."""
 
     per_c: float
@@ -41,9 +41,9 @@ class Slopes(NamedTuple):
     per_percent: float
 
 
-MEMO_SLOPES = Slopes(-0.985e-6, 0.272e-6, -0.0096e-6)  # D.4 as printed
+MEMO_SLOPES = RefractivitySlopes(-0.985e-6, 0.272e-6, -0.0096e-6)  # D.4 as printed
 # right, by the formula that the memo used, at D.3's weather with the right temperature: 20 deg C, 933 hPa, 50 %
-SLOPES = Slopes(-0.895887e-6, 0.272048e-6, -0.0096058e-6)
+SLOPES = RefractivitySlopes(-0.895887e-6, 0.272048e-6, -0.0096058e-6)
 
 
 def spacing_effect(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> Array:
@@ -145,7 +145,7 @@ def across_effect(across: ArrayLike, *, height: ArrayLike, d_mp: ArrayLike) -> A
 
 def refractivity_slopes(
     temperature_c: float = 20.0, pressure_hpa: float = 933.0, humidity_percent: float = 50.0
-) -> Slopes:
+) -> RefractivitySlopes:
     """How air's group refractivity at 0.780 um moves with the weather.
 
     temperature_c, pressure_hpa, humidity_percent   deg C, hPa, %
@@ -156,11 +156,11 @@ def refractivity_slopes(
     [-0.895887, 0.272048, -0.009606]
     """
     slope = air(temperature_c, pressure_hpa, humidity_percent, model="rueger1990").sensitivity
-    return Slopes(float(slope.temperature_c), float(slope.pressure_hpa), float(slope.humidity_percent))
+    return RefractivitySlopes(float(slope.temperature_c), float(slope.pressure_hpa), float(slope.humidity_percent))
 
 
 def refractivity_change(
-    temperature_c: ArrayLike, pressure_hpa: ArrayLike, humidity_percent: ArrayLike, slopes: Slopes = SLOPES
+    temperature_c: ArrayLike, pressure_hpa: ArrayLike, humidity_percent: ArrayLike, slopes: RefractivitySlopes = SLOPES
 ) -> Array:
     """Change of air's group refractivity for moderate changes of the weather, linear.
 

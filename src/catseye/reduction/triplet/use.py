@@ -28,11 +28,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.least_squares.adjustment import Solution, adjust
-from catseye.estimation.observations.kinds import Coordinates, Distances
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
+from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
-from catseye.records.site.triplet import Triplet
+from catseye.records.site.triplet import TripletRecord
 
 Array = NDArray[np.float64]
 SQUARE = 1e-9  # of unit vectors: their dot product and their lengths
@@ -74,7 +74,7 @@ class MountedTriplet:
             raise ValidityError(f"triplet {self.name}: normal and axis are not square unit vectors within {SQUARE:g}")
 
     @classmethod
-    def of(cls, record: Triplet, frame: Transform, *, ratio: float, u_normal: float) -> "MountedTriplet":
+    def of(cls, record: TripletRecord, frame: Transform, *, ratio: float, u_normal: float) -> "MountedTriplet":
         """The unit of a data sheet.
 
         record     the sheet
@@ -284,7 +284,7 @@ def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Any]:
 
 def scan_points_from_balls(
     start: ArrayLike, balls: ArrayLike, *, ball_covariance: ArrayLike, ranges: BallRanges
-) -> Solution:
+) -> LeastSquaresSolution:
     """Coordinates of feed-arm scan points from those of the balls and the distances between: the memo's third step.
 
     start             (k, 3) m, approximate scan points
@@ -306,7 +306,7 @@ def scan_points_from_balls(
     unit, ranger = np.divmod(used, k)
     first = 3 * k
     groups = (
-        Coordinates.of_points("balls", b, np.asarray(ball_covariance, dtype=float), first + 3 * np.arange(n)),
+        ObservedCoordinates.of_points("balls", b, np.asarray(ball_covariance, dtype=float), first + 3 * np.arange(n)),
         Distances(
             "ball distances",
             ranges.d_bc.ravel()[used],

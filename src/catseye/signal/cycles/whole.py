@@ -110,7 +110,7 @@ class CycleStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Decision:
+class CycleDecision:
     """Whole cycles with what speaks for them, one value a shot.
 
     cycles             N, the nearest integer; 0 where unknown
@@ -142,7 +142,7 @@ def decision(
     u_coarse: ArrayLike,
     u_phase: ArrayLike,
     sigmas: float = 5.0,
-) -> Decision:
+) -> CycleDecision:
     """Whole cycles by the nearest integer, and whether the margin is worth five standard uncertainties.
 
     coarse_optical     m, as for `whole_cycles`
@@ -177,7 +177,7 @@ def decision(
         thin = np.abs(misfit) + sigmas * u >= quarter
     status = np.where(known, np.where(thin, CycleStatus.THIN, CycleStatus.SURE), CycleStatus.UNKNOWN)
     slip = np.where(known, slip_probability(np.where(known, misfit, 0.0), np.where(known, u, 0.0), 2 * quarter), np.nan)
-    return Decision(cycles, margin, misfit, u, slip, status.astype(np.int8))
+    return CycleDecision(cycles, margin, misfit, u, slip, status.astype(np.int8))
 
 
 def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike) -> NDArray[np.float64]:

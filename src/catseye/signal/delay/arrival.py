@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-from catseye.signal.delay.peak import FINE, HANN, DelayStatus, Search, cross_spectrum, find, transformed, windowed
+from catseye.signal.delay.peak import FINE, HANN, DelayStatus, PeakSearch, cross_spectrum, find, transformed, windowed
 
 WEIGHTINGS = ("plain", "whitened", "phat")
 GUARD = 32  # samples beside the window: what the cut at the ends of a stretch does fades within them
@@ -163,7 +163,7 @@ class DelayPlan:
         fine[run] = carried
         side = np.fft.irfft(fine)[: FINE * (2 * self.half + 2) + 1] * (0.5 * FINE * self.stretch / total)
         own = np.concatenate([side[:0:-1], side])
-        self.search = Search(omega, spectrum[run], weight, self.weighting == "phat", own, self.first, self.stretch,
+        self.search = PeakSearch(omega, spectrum[run], weight, self.weighting == "phat", own, self.first, self.stretch,
                              self.half, self._least_snr(side))  # fmt: skip
 
     def _least_snr(self, side: NDArray) -> float:

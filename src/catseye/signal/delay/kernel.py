@@ -14,7 +14,7 @@ from catseye.signal.delay.peak import (
     SETTLED,
     TOLD_APART,
     DelayStatus,
-    Search,
+    PeakSearch,
     cross_spectrum,
     transformed,
 )
@@ -30,7 +30,7 @@ _compiled = njit(cache=True, error_model="numpy", nogil=True)
 _inlined = njit(error_model="numpy")  # kept with their caller
 
 
-def find(piece, low, search: Search, ends):
+def find(piece, low, search: PeakSearch, ends):
     """As `peak.find`, its plain form."""
     found, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
     spectrum, scale = transformed(piece, search)

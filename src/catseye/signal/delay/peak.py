@@ -33,7 +33,7 @@ class DelayStatus(IntEnum):
     NOT_FINITE = 7
 
 
-class Search(NamedTuple):
+class PeakSearch(NamedTuple):
     """What is sought, in which lines of the spectrum, and where.
 
     omega       (l,) rad a sample, of the lines in work
@@ -59,7 +59,7 @@ class Search(NamedTuple):
 
 
 def find(
-    piece: NDArray, low: NDArray[np.int64], search: Search, ends: tuple[float, float]
+    piece: NDArray, low: NDArray[np.int64], search: PeakSearch, ends: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
     """Arrivals in b stretches.
 
@@ -79,7 +79,7 @@ def find(
     return judged(found, damage, search.least_snr)
 
 
-def transformed(piece: NDArray, search: Search) -> tuple[NDArray, float]:
+def transformed(piece: NDArray, search: PeakSearch) -> tuple[NDArray, float]:
     """The lines in work (b, l), and what makes a Hann-windowed residual's power that of the noise in a stretch."""
     n = piece.shape[1]
     if n < search.stretch:  # zeros follow, so a constant must go
@@ -94,7 +94,7 @@ def measured(
     weight: NDArray,
     correlation: NDArray,
     low: NDArray,
-    search: Search,
+    search: PeakSearch,
     scale: float,
 ) -> NDArray[np.float64]:
     """(7, b): lag, NaN at the window's edge; variance; amplitude; snr; height of the second peak over the highest, and
@@ -151,7 +151,7 @@ def damaged(piece: NDArray, ends: tuple[float, float]) -> NDArray[np.int8]:
     return status
 
 
-def cross_spectrum(spectrum: NDArray, search: Search) -> tuple[NDArray, NDArray]:
+def cross_spectrum(spectrum: NDArray, search: PeakSearch) -> tuple[NDArray, NDArray]:
     """W X conj(S), (b, l), and W, (l,) or (b, l)."""
     if not search.phases:
         return spectrum * (search.weight * np.conj(search.template)), search.weight
@@ -160,7 +160,7 @@ def cross_spectrum(spectrum: NDArray, search: Search) -> tuple[NDArray, NDArray]
     return spectrum * np.conj(search.template) * weight, weight
 
 
-def windowed(cross: NDArray, low: NDArray, search: Search) -> NDArray:
+def windowed(cross: NDArray, low: NDArray, search: PeakSearch) -> NDArray:
     """J at the whole lags of the window, (b, 2 half + 1)."""
     padded = np.zeros((len(cross), search.stretch // 2 + 1), complex)
     padded[:, search.first : search.first + cross.shape[1]] = cross

@@ -20,7 +20,7 @@ INTERMEDIATE_LIMIT_HZ = 10_000.0
 
 
 @dataclass(frozen=True)
-class Sampling:
+class SamplingPlan:
     """How a buffer is taken: m cycles of n samples at the intermediate frequency, within the instrument's limits.
 
     samples_per_cycle    n, at least 3 (two show no phase)
@@ -29,7 +29,7 @@ class Sampling:
 
     A value that breaks a limit raises ValidityError; the one at hand, frozen, stays as it was.
 
-    >>> usual = Sampling()
+    >>> usual = SamplingPlan()
     >>> usual.samples, usual.duration, usual.ranges_per_second()
     (8192, 0.128, 7.8125)
     >>> usual.with_(cycles=1200)
@@ -67,7 +67,7 @@ class Sampling:
         samples_per_cycle: int | None = None,
         cycles: int | None = None,
         intermediate_hz: float | None = None,
-    ) -> "Sampling":
+    ) -> "SamplingPlan":
         """Another sampling with some values changed together; raises ValidityError where that breaks a limit."""
         given = {"samples_per_cycle": samples_per_cycle, "cycles": cycles, "intermediate_hz": intermediate_hz}
         return replace(self, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
@@ -102,7 +102,7 @@ class Sampling:
         return 1.0 / (self.duration + overhead)
 
 
-def buffer_mean(turns: ArrayLike, sampling: Sampling) -> NDArray[np.complex128]:
+def buffer_mean(turns: ArrayLike, sampling: SamplingPlan) -> NDArray[np.complex128]:
     """Mean over a buffer of exp(2 pi i x j/n), j = 0 to m n - 1: what survives of a rotation by x turns a cycle.
 
     turns       x, turns in a cycle of the IF, any, either sign
@@ -112,7 +112,7 @@ def buffer_mean(turns: ArrayLike, sampling: Sampling) -> NDArray[np.complex128]:
 
     Source: sum of a geometric series (the Dirichlet kernel). Good to 1e-15 times the turns in a buffer.
 
-    >>> np.round(np.abs(buffer_mean([0.0, 1.0, 63.0, 64.0, 0.057], Sampling())), 4)
+    >>> np.round(np.abs(buffer_mean([0.0, 1.0, 63.0, 64.0, 0.057], SamplingPlan())), 4)
     array([1.   , 0.   , 0.   , 1.   , 0.035])
     """
     n, m = sampling.samples_per_cycle, sampling.cycles
@@ -148,7 +148,7 @@ class ToneResponse:
         return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), np.pi)
 
 
-def tone_response(sampling: Sampling, frequency_hz: ArrayLike) -> ToneResponse:
+def tone_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> ToneResponse:
     """Exact response of the sums 5.1 and 5.2 to a tone of any frequency: signal off its lock, harmonic, line or spur.
 
     sampling        n, m and IF
@@ -162,7 +162,7 @@ def tone_response(sampling: Sampling, frequency_hz: ArrayLike) -> ToneResponse:
 
     Source: [PARKER04] eq. 5.1 and 5.2, summed in closed form.
 
-    >>> response = tone_response(Sampling(), [1000.0, 2000.0, 63000.0, 60.0])
+    >>> response = tone_response(SamplingPlan(), [1000.0, 2000.0, 63000.0, 60.0])
     >>> np.round(response.bound, 4)
     array([1.    , 0.    , 1.    , 0.0042])
     """
@@ -183,7 +183,7 @@ def aliasing_harmonics(samples_per_cycle: int, highest: int) -> list[int]:
     return [k for k in range(2, highest + 1) if k % n in (1, n - 1)]
 
 
-def modulation_response(sampling: Sampling, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+def modulation_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
     """What is left, in the phase of a buffer, of a small line exp(2 pi i f t) in phase (hum, vibration of the path).
 
     sampling        n, m and IF
@@ -195,13 +195,13 @@ def modulation_response(sampling: Sampling, frequency_hz: ArrayLike) -> NDArray[
 
     Source: mean of the phase over the samples, first order in b.
 
-    >>> [round(float(abs(modulation_response(Sampling(cycles=m), 57.0))), 4) for m in (128, 1000)]
+    >>> [round(float(abs(modulation_response(SamplingPlan(cycles=m), 57.0))), 4) for m in (128, 1000)]
     [0.035, 0.0]
     """
     return buffer_mean(np.asarray(frequency_hz, dtype=float) / sampling.intermediate_hz, sampling)
 
 
-def jitter_amplitude_factor(sampling: Sampling, u_trigger: ArrayLike) -> NDArray[np.float64]:
+def jitter_amplitude_factor(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
     """Factor on the amplitude by independent normal jitter of the sample times.
 
     sampling     IF
@@ -214,7 +214,7 @@ def jitter_amplitude_factor(sampling: Sampling, u_trigger: ArrayLike) -> NDArray
     return np.exp(-0.5 * (TWO_PI * sampling.intermediate_hz * np.asarray(u_trigger, dtype=float)) ** 2)
 
 
-def jitter_u_phase(sampling: Sampling, u_trigger: ArrayLike) -> NDArray[np.float64]:
+def jitter_u_phase(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
     """Standard uncertainty of a buffer's phase, rad, by independent normal jitter of its sample times.
 
     sampling     n, m and IF
@@ -226,7 +226,7 @@ def jitter_u_phase(sampling: Sampling, u_trigger: ArrayLike) -> NDArray[np.float
 
     Source: variance of the sum 5.2 over the jitter, phasor noise taken as small against the phasor.
 
-    >>> round(float(jitter_u_phase(Sampling(), 1e-6)) * 1e6, 1)  # microradian, for 1 us at 1 kHz: 1.4 um of range
+    >>> round(float(jitter_u_phase(SamplingPlan(), 1e-6)) * 1e6, 1)  # microradian, for 1 us at 1 kHz: 1.4 um of range
     85.0
     """
     v = (TWO_PI * sampling.intermediate_hz * np.asarray(u_trigger, dtype=float)) ** 2
@@ -257,7 +257,7 @@ class MotionEffect:
 
 def motion_effect(
     plan: FrequencyPlan,
-    sampling: Sampling,
+    sampling: SamplingPlan,
     *,
     range_rate: ArrayLike,
     acceleration: ArrayLike = 0.0,
@@ -276,7 +276,7 @@ def motion_effect(
     Source: [PARKER04] eq. 5.9 in time, through `tone_response`; acceleration to first order, while the phase turns
     little.
 
-    >>> effect = motion_effect(FrequencyPlan(), Sampling(), range_rate=0.010)
+    >>> effect = motion_effect(FrequencyPlan(), SamplingPlan(), range_rate=0.010)
     >>> round(effect.epoch, 7), round(float(effect.range_since_trigger), 6), round(float(effect.phase_rate), 4)
     (0.0639922, 0.00064, -0.6288)
     """

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
-from catseye.signal.systematics.columns import Columns, fit_columns
+from catseye.signal.systematics.columns import LinearFit, fit_columns
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ class AmplitudeFit:
     u_quadratic: float
     phase: float
     covariance: Array
-    fit: Columns
+    fit: LinearFit
     curvature: float
     probability: float
 

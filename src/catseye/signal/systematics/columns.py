@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class LinearFit:
     """What a linear fit says.
 
     coefficient          (p,) in the order of the columns
@@ -35,7 +35,7 @@ class Columns:
         return np.sqrt(np.diag(self.covariance))
 
 
-def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> Columns:
+def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> LinearFit:
     """Least squares with given uncertainties: observed = design @ coefficient.
 
     design     (n, p)
@@ -75,4 +75,4 @@ def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> Co
     degrees = len(y) - a.shape[1]
     squares = float(np.sum((seen - white @ coefficient) ** 2))
     factor_ = squares / degrees if degrees else float("nan")
-    return Columns(coefficient, inverse @ inverse.T, y - a @ coefficient, factor_, degrees)
+    return LinearFit(coefficient, inverse @ inverse.T, y - a @ coefficient, factor_, degrees)

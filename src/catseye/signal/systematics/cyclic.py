@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
-from catseye.signal.systematics.columns import Columns, fit_columns
+from catseye.signal.systematics.columns import LinearFit, fit_columns
 
 WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty against phases spread evenly over the circle
 
@@ -205,7 +205,7 @@ def fit_cyclic(
     *,
     orders: int,
     others: ArrayLike | None = None,
-) -> tuple[Array, Array, Columns]:
+) -> tuple[Array, Array, LinearFit]:
     """Cosine and sine coefficients (K,) of a range's deviation, and the whole fit: cosines, sines, then the others.
 
     phase_fraction   (n,) rad, x

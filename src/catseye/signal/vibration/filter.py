@@ -87,7 +87,7 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FilterState:
     """What the filter knows at one time.
 
     time         s
@@ -133,7 +133,7 @@ class State:
         pairs = np.array([[[2 * axes * k + a, 2 * axes * k + axes + a] for a in range(axes)] for k in range(m)])
         return self.mean[pairs], self.covariance[pairs[..., :, None], pairs[..., None, :]]
 
-    def advanced(self, time: float) -> "State":
+    def advanced(self, time: float) -> "FilterState":
         """The state at a later time, without a look at anything.
 
         time    s, not before the state's
@@ -183,7 +183,7 @@ class State:
 
     def looked(
         self, time: float, sample: ArrayLike, noise: ArrayLike, window: float = 0.0
-    ) -> tuple["State", Array, Array]:
+    ) -> tuple["FilterState", Array, Array]:
         """The state after a sample; the innovation (A,) m, observed minus foretold; and its covariance (A, A).
 
         time     s, of the sample, the middle of its window
@@ -247,7 +247,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class FilterTrack:
     """What the filter did with a row of samples.
 
     state         after the last
@@ -255,7 +255,7 @@ class Track:
     spreads       (N, A, A) m^2, the covariance that the filter claimed for them
     """
 
-    state: State
+    state: FilterState
     innovations: Array
     spreads: Array
 
@@ -266,7 +266,7 @@ class Track:
         return np.sum(self.innovations * weighted, axis=-1)
 
 
-def start(time: float, modes: Sequence[Mode], *, u_offset: float, offset_walk: float = 0.0) -> State:
+def start(time: float, modes: Sequence[Mode], *, u_offset: float, offset_walk: float = 0.0) -> FilterState:
     """The filter before its first sample: no phase is known, the amplitudes are as large as they usually are.
 
     time          s
@@ -295,10 +295,12 @@ def start(time: float, modes: Sequence[Mode], *, u_offset: float, offset_walk: f
         first += len(block)
     mean = np.zeros(n)
     mean[_frequencies(len(modes), axes)] = [mode.angular for mode in modes]
-    return State(time, tuple(modes), mean, covariance, offset_walk)
+    return FilterState(time, tuple(modes), mean, covariance, offset_walk)
 
 
-def follow(state: State, times: ArrayLike, samples: ArrayLike, *, noise: ArrayLike, window: float = 0.0) -> Track:
+def follow(
+    state: FilterState, times: ArrayLike, samples: ArrayLike, *, noise: ArrayLike, window: float = 0.0
+) -> FilterTrack:
     """The filter led through samples.
 
     state     before them
@@ -324,7 +326,7 @@ def follow(state: State, times: ArrayLike, samples: ArrayLike, *, noise: ArrayLi
     innovations, spreads = np.empty_like(y), np.empty((*y.shape, state.axes))
     for i in range(len(when)):
         state, innovations[i], spreads[i] = state.looked(float(when[i]), y[i], r[i], window)
-    return Track(state, innovations, spreads)
+    return FilterTrack(state, innovations, spreads)
 
 
 def window_gain(w: ArrayLike, d: ArrayLike, window: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:

@@ -263,7 +263,7 @@ def likely_alias(
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ModeShape:
     """How channels move together about a frequency.
 
     frequency_hz   the middle of the band
@@ -280,7 +280,7 @@ class Shape:
     first_share: float
 
 
-def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> Shape:
+def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> ModeShape:
     """The shape of a mode from the cross densities about its frequency.
 
     found           a spectrum of two channels or more
@@ -306,4 +306,4 @@ def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | Non
     averages = 0.5 * found.degrees * max(1.0, at.sum() * step / found.bandwidth_hz)
     safe = np.where(coherence > 0.05, np.minimum(coherence, 1.0), np.nan)
     u = np.abs(shape) * np.sqrt((1.0 - safe) / (2.0 * averages * safe))
-    return Shape(float(frequency_hz), np.sqrt(np.maximum(power, 0.0)), shape, u, float(values[-1] / values.sum()))
+    return ModeShape(float(frequency_hz), np.sqrt(np.maximum(power, 0.0)), shape, u, float(values[-1] / values.sum()))

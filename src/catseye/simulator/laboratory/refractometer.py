@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.constants import PPM, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
-from catseye.simulator.night.air import NIGHT, Air, Conditions, group_refractivity_ppm
+from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir, group_refractivity_ppm
 from catseye.simulator.night.faults import Streams
 
 START_MJD_UTC = 52889.0
@@ -60,7 +60,7 @@ class PathPlan:
     jumps: dict[float, float] = field(default_factory=dict)
     gaps: tuple[tuple[float, float], ...] = ()
     weather_gaps: tuple[tuple[float, float], ...] = ()
-    conditions: Conditions = NIGHT
+    conditions: AirConditions = NIGHT
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def simulate_path_night(seed: int, plan: PathPlan | None = None) -> PathNight:
 
 def _air(plan: PathPlan, place: np.ndarray, seconds: np.ndarray, streams: Streams) -> tuple[np.ndarray, ...]:
     """Refractivity, temperature, pressure (m, places) and humidity (m, 1) along the path."""
-    air, z = Air(plan.conditions), HEAD_HEIGHT + (TARGET_HEIGHT - HEAD_HEIGHT) * place
+    air, z = TrueAir(plan.conditions), HEAD_HEIGHT + (TARGET_HEIGHT - HEAD_HEIGHT) * place
     when = seconds[:, None]
     turn = streams("swing").uniform(0.0, TWO_PI)
     swing = plan.swing_c * np.sin(TWO_PI * when / 86400.0 * 2.0 + turn)

@@ -16,7 +16,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # 12 nodes: below 1e-12 on
 
 
 @dataclass(frozen=True)
-class Conditions:
+class AirConditions:
     """The air at z = 0 and at the start of the campaign, and how it changes.
 
     surface_layer_c   temperature gained on leaving the ground (positive at night), within `surface_layer_m`
@@ -35,7 +35,7 @@ class Conditions:
     index_fluctuation_ppm: float = 0.15  # one sigma, each path from a ranger to a target, all through the campaign
 
 
-NIGHT = Conditions()
+NIGHT = AirConditions()
 SUMMER_DAY = replace(
     NIGHT, temperature_c=28.0, humidity_percent=60.0, gradient_c_per_m=-0.0098, surface_layer_c=-0.8, drift_c_per_h=0.8
 )
@@ -69,10 +69,10 @@ def group_refractivity_ppm(temperature_c, pressure_hpa, humidity_percent):
 
 
 @dataclass(frozen=True)
-class Air:
+class TrueAir:
     """True air, a function of height (m, ground frame) and of time (s since the start)."""
 
-    conditions: Conditions
+    conditions: AirConditions
     stratification: float = 1.0  # factor on every change with height
 
     def temperature_c(self, z, seconds):
@@ -115,7 +115,7 @@ class WeatherReading:
 
 
 def weather_readings(
-    air: Air, *, streams: Streams, faults: Faults, planted: Planted, until_s: float
+    air: TrueAir, *, streams: Streams, faults: Faults, planted: Planted, until_s: float
 ) -> tuple[list[WeatherReading], dict[str, float]]:
     """Readings of both stations every 30 s from 180 s before the start, and the true thermometer offsets."""
     seconds = np.arange(-180.0, max(4110.0, until_s + 600.0), READING_INTERVAL_S)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.simulator.night.air import Air
+from catseye.simulator.night.air import TrueAir
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, ball_delay, prism_delay
-from catseye.simulator.night.schedule import REFERENCE, PlannedShot
-from catseye.simulator.night.structure import Target, unit
-from catseye.simulator.night.world import Head
+from catseye.simulator.night.schedule import REFERENCE, ScheduledShot
+from catseye.simulator.night.structure import TrueTarget, unit
+from catseye.simulator.night.world import TrueHead
 
 MODULATION_HZ = 1.5e9
 RADIANS_PER_METRE = 2.0 * TWO_PI * MODULATION_HZ / SPEED_OF_LIGHT  # of one-way optical path
@@ -27,7 +27,7 @@ BENCHMARK_VOLT = (4.4, 5.4)
 class Return:
     """The truth of one shot before sampling."""
 
-    shot: PlannedShot
+    shot: ScheduledShot
     phasor: complex  # V, wanted, foreign and leaked together
     status: str  # 'good', 'blocked' or 'reflected'
     index: float  # group index averaged along the path, its fluctuation included; 1 for a reference shot
@@ -35,7 +35,7 @@ class Return:
     phase_error: float  # that a foreign return adds to the phase, rad
 
 
-def glass_delay(target: Target, towards_ranger, *, obliquity: float):
+def glass_delay(target: TrueTarget, towards_ranger, *, obliquity: float):
     """Optical path that the glass of a target adds one way, air metres; `obliquity` scales what the angle changes."""
     if target.kind == "ball":
         return ball_delay(*target.sizes)
@@ -46,7 +46,7 @@ def glass_delay(target: Target, towards_ranger, *, obliquity: float):
     return straight + obliquity * (slanted - straight)
 
 
-def electronic_phase(head: Head, seconds, streams: Streams, planted: Planted):
+def electronic_phase(head: TrueHead, seconds, streams: Streams, planted: Planted):
     """Phase of the electronics at the times of the shots (ascending): a random walk; every third head warms up."""
     rng = streams(f"electronics/{head.ranger}")
     start, warms, rise = rng.uniform(0.0, TWO_PI), rng.uniform() < 1.0 / 3.0, rng.uniform(0.010, 0.030)
@@ -85,12 +85,12 @@ def foreign_return(amplitude: float, draws) -> tuple[complex, complex]:
 
 
 def returns_of_ranger(
-    head: Head,
-    shots: list[PlannedShot],
+    head: TrueHead,
+    shots: list[ScheduledShot],
     *,
     points: dict[str, np.ndarray],
-    targets: dict[str, Target],
-    air: Air,
+    targets: dict[str, TrueTarget],
+    air: TrueAir,
     faults: Faults,
     planted: Planted,
     streams: Streams,
@@ -135,7 +135,7 @@ def returns_of_ranger(
     return found
 
 
-def sampled_frames(head: Head, returns: list[Return], streams: Streams, planted: Planted) -> np.ndarray:
+def sampled_frames(head: TrueHead, returns: list[Return], streams: Streams, planted: Planted) -> np.ndarray:
     """Converter codes of every shot of one head, int16, (shots, samples): harmonics, offset, noise, rounding, ends."""
     rng = streams(f"samples/{head.ranger}")
     offset, spread = rng.uniform(-0.25, 0.25), rng.uniform(0.165, 0.245)  # V

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.simulator.night.air import Conditions, WeatherReading
-from catseye.simulator.night.schedule import PlannedShot
-from catseye.simulator.night.structure import Structure, Target
+from catseye.simulator.night.air import AirConditions, WeatherReading
+from catseye.simulator.night.schedule import ScheduledShot
+from catseye.simulator.night.structure import Structure, TrueTarget
 from catseye.simulator.night.truth import Truth
 from catseye.simulator.night.world import (
-    Benchmark,
-    Head,
-    Monument,
+    TrueBenchmark,
+    TrueHead,
+    TrueMonument,
 )
 
 
@@ -35,14 +35,14 @@ class Night:
     azimuth_deg: float
     elevation_deg: float
     start_mjd_utc: float
-    conditions: Conditions
-    monuments: dict[str, Monument]
-    heads: dict[str, Head]
+    conditions: AirConditions
+    monuments: dict[str, TrueMonument]
+    heads: dict[str, TrueHead]
     telescope: Structure
-    benchmarks: list[Benchmark]
-    single_targets: list[Target]
+    benchmarks: list[TrueBenchmark]
+    single_targets: list[TrueTarget]
     weather: list[WeatherReading]
-    shots: list[PlannedShot]  # by time; row i of frames is shot i + 1
+    shots: list[ScheduledShot]  # by time; row i of frames is shot i + 1
     frames: np.ndarray  # int16, (shots, 8192)
     truth: Truth
     sounded: tuple[Sounding, ...] = ()  # rows of path_temperatures.csv; no file without

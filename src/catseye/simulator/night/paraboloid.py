@@ -6,14 +6,14 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.structure import FOCAL_LENGTH
 
 MINIMUM_PRISMS = 6
 
 
 @dataclass(frozen=True)
-class Paraboloid:
+class GroundParaboloid:
     """A paraboloid in the ground frame; `deviations` are normal to it, positive towards the focus, m."""
 
     axis: np.ndarray  # unit vector, from the vertex to the focus
@@ -28,7 +28,7 @@ def normal_deviation(point):
     return (point[..., 2] - FOCAL_LENGTH * slope2) / np.sqrt(1.0 + slope2)
 
 
-def best_paraboloid(points: dict[str, np.ndarray], pose: Posture) -> Paraboloid | None:
+def best_paraboloid(points: dict[str, np.ndarray], pose: TruePosture) -> GroundParaboloid | None:
     """Least squares of the normal deviations over two tilts and three shifts; None below six prisms."""
     if len(points) < MINIMUM_PRISMS:
         return None
@@ -42,7 +42,7 @@ def best_paraboloid(points: dict[str, np.ndarray], pose: Posture) -> Paraboloid 
     turned = Rotation.from_rotvec([fit.x[0] / 100.0, fit.x[1] / 100.0, 0.0])
     axis = turned.apply([0.0, 0.0, 1.0])
     vertex = pose.nominal(fit.x[2:])
-    return Paraboloid(
+    return GroundParaboloid(
         axis=pose.nominal_direction(axis),
         vertex=vertex,
         focus=vertex + FOCAL_LENGTH * pose.nominal_direction(axis),

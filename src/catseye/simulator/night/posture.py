@@ -14,7 +14,7 @@ FEED_ARM_FOOT = np.array([0.0, -8.0, 10.0])
 
 
 @dataclass(frozen=True)
-class Posture:
+class TruePosture:
     """Nominal rotation and shift of the reflector, and the night's departure from it (reflector frame)."""
 
     azimuth_deg: float
@@ -62,14 +62,14 @@ class Posture:
         return self.dish(bent)
 
 
-def posture(azimuth_deg: float, elevation_deg: float, streams: Streams, planted: Planted) -> Posture:
+def posture(azimuth_deg: float, elevation_deg: float, streams: Streams, planted: Planted) -> TruePosture:
     """The posture of the night: some millimetres and arc seconds from nominal, the feed arm more.
 
     The magnitudes are chosen; two sigma is the most.
     """
     draw = np.clip(streams("posture").normal(size=(4, 3)), -2.0, 2.0)
     rigid, arm = planted.gain("posture"), planted.gain("feed_arm")
-    return Posture(
+    return TruePosture(
         azimuth_deg,
         elevation_deg,
         shift=rigid * draw[0] * 3.0 * MILLIMETRE,

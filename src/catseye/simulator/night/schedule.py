@@ -6,9 +6,9 @@ import numpy as np
 
 from catseye.constants import DEGREE
 from catseye.simulator.night.faults import Faults, Streams
-from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.structure import Structure, unit
-from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, Benchmark, Monument
+from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, TrueBenchmark, TrueMonument
 
 REFERENCE = "ZRG"
 
@@ -39,7 +39,7 @@ class Schedule:
 
 
 @dataclass(frozen=True)
-class PlannedShot:
+class ScheduledShot:
     """One shot of the plan, s since the start."""
 
     seconds: float
@@ -50,10 +50,10 @@ class PlannedShot:
 def ground_targets(
     rule: Schedule,
     *,
-    monuments: dict[str, Monument],
+    monuments: dict[str, TrueMonument],
     telescope: Structure,
-    marks: list[Benchmark],
-    pose: Posture,
+    marks: list[TrueBenchmark],
+    pose: TruePosture,
     streams: Streams,
 ) -> dict[str, list[str]]:
     """What each ground ranger shoots, repeats included; seen from the design, so that no plant changes it."""
@@ -97,7 +97,7 @@ def with_references(targets: list[str], every: int) -> list[str]:
     return [REFERENCE, *(name for block in blocks for name in (*block, REFERENCE))]
 
 
-def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Streams) -> dict[str, list[PlannedShot]]:
+def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Streams) -> dict[str, list[ScheduledShot]]:
     """Shots of every ranger in its own time."""
     plan = {}
     for ranger, targets in shot_lists.items():
@@ -108,5 +108,5 @@ def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Stream
         room = rule.span_s - rule.interval_s * len(names)
         start = rng.uniform(40.0, max(room, 60.0) if on_ground else 0.3 * rule.span_s)
         times = start + rule.interval_s * np.arange(len(names)) + rng.uniform(-rule.jitter_s, rule.jitter_s, len(names))
-        plan[ranger] = [PlannedShot(float(t), ranger, name) for t, name in zip(times, names, strict=True)]
+        plan[ranger] = [ScheduledShot(float(t), ranger, name) for t, name in zip(times, names, strict=True)]
     return plan

@@ -12,8 +12,8 @@ from catseye.simulator.night.air import ELEVATION_OF_Z0
 from catseye.simulator.night.glass import GLASS_TO_AIR
 from catseye.simulator.night.head import CYCLES, SAMPLES_PER_CYCLE
 from catseye.simulator.night.night import Night
-from catseye.simulator.night.structure import Target, Triplet
-from catseye.simulator.night.world import METRES_PER_DEGREE, SITE_LATITUDE_DEG, Head, Monument
+from catseye.simulator.night.structure import TrueTarget, TrueTriplet
+from catseye.simulator.night.world import METRES_PER_DEGREE, SITE_LATITUDE_DEG, TrueHead, TrueMonument
 
 README = """# Measurement campaign, {name}
 
@@ -82,7 +82,7 @@ def prism_constants(height_mm: float, u_height_mm: float = 0.002) -> str:
     return f"height_mm = {height_mm:.3f}\nu_height_mm = {u_height_mm:.3f}\nhrp_mm = {hrp:.3f}\npc_mm = {pc:.4f}\n"
 
 
-def monument_sheet(m: Monument) -> str:
+def monument_sheet(m: TrueMonument) -> str:
     x, y, z = m.fixed_point_mm
     zero = "   # defines z = 0" if m.u_mm[2] == 0.0 else ""
     return (
@@ -99,7 +99,7 @@ def monument_sheet(m: Monument) -> str:
     )
 
 
-def head_sheet(h: Head) -> str:
+def head_sheet(h: TrueHead) -> str:
     dx, dy, dz = h.offset_mm
     return (
         "# Laser mirror assembly calibration report\n"
@@ -115,7 +115,7 @@ def head_sheet(h: Head) -> str:
     )
 
 
-def target_entry(t: Target) -> str:
+def target_entry(t: TrueTarget) -> str:
     entry = f'[[target]]\nname = "{t.name}"\ntype = "{t.kind}"\n'
     entry += 'material = "BK7"\n' if t.kind == "prism" else ""
     entry += f'frame = "{t.frame}"\nposition_mm = {vector(t.position_mm, 1)}\n'
@@ -125,7 +125,7 @@ def target_entry(t: Target) -> str:
     return entry
 
 
-def triplet_sheet(t: Triplet) -> str:
+def triplet_sheet(t: TrueTriplet) -> str:
     left, right, ball = t.targets
     serial = 99 + 2 * int(t.name[2:])
     r1, r2 = ball.sizes_mm
@@ -148,7 +148,7 @@ def triplet_sheet(t: Triplet) -> str:
     )
 
 
-def feed_arm_sheet(feed_arm: dict[str, Target], aim_point_mm) -> str:
+def feed_arm_sheet(feed_arm: dict[str, TrueTarget], aim_point_mm) -> str:
     text = "# Rangers on the feed arm: nominal scan points, reflector frame (good to some 15 mm).\n\n"
     for name, t in feed_arm.items():
         text += f'[[ranger]]\nname = "{name}"\nzp = "ZP{name[2:]}"\n'

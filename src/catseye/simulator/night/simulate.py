@@ -7,19 +7,19 @@ import numpy as np
 
 from catseye.constants import PPM, TWO_PI
 from catseye.errors import InputError, ValidityError
-from catseye.simulator.night.air import NIGHT, Air, Conditions, group_refractivity_ppm, weather_readings
+from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir, group_refractivity_ppm, weather_readings
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.head import Return, returns_of_ranger, sampled_frames
 from catseye.simulator.night.night import Night, Sounding
 from catseye.simulator.night.posture import posture
 from catseye.simulator.night.schedule import Schedule, feed_arm_targets, ground_targets, plan_shots
-from catseye.simulator.night.structure import Target, structure, typed_mm, typing_error
+from catseye.simulator.night.structure import TrueTarget, structure, typed_mm, typing_error
 from catseye.simulator.night.truth import truth_of
 from catseye.simulator.night.world import (
     FEED_ARM_RANGERS,
     GROUND_RANGERS,
-    Benchmark,
-    Head,
+    TrueBenchmark,
+    TrueHead,
     benchmarks,
     head,
     monument,
@@ -32,7 +32,7 @@ SOUNDING_INTERVAL_S = 120.0
 
 
 @dataclass(frozen=True)
-class WarmLine(Air):
+class WarmLine(TrueAir):
     """Air that is warmer by a plume on the way to some points than smooth air at these heights.
 
     plumes   (point (3,) m, °C that the mean of the straight line is warmer: twice that half-way, none at the ends)
@@ -41,7 +41,7 @@ class WarmLine(Air):
     plumes: tuple[tuple[np.ndarray, float], ...] = ()
 
     def path_index(self, start, end, seconds):
-        """As of `Air`; towards a plume's point by the midpoint rule over 500 parts."""
+        """As of `TrueAir`; towards a plume's point by the midpoint rule over 500 parts."""
         index = super().path_index(start, end, seconds)
         for point, warmer in self.plumes:
             share = (np.arange(500) + 0.5) / 500
@@ -69,7 +69,7 @@ def simulate_night(
     dish_prisms: int = 60,
     triplets: int = 10,
     faults: Faults | None = None,
-    conditions: Conditions = NIGHT,
+    conditions: AirConditions = NIGHT,
     schedule: Schedule | None = None,
     planted: Planted | None = None,
     warm_lines: Mapping[tuple[str, str], float] | None = None,
@@ -112,7 +112,7 @@ def simulate_night(
         r: feed_arm_targets(r, rule, telescope, faults, streams) for r in FEED_ARM_RANGERS
     }
     plan = plan_shots(rule, lists, streams)
-    air = Air(conditions, planted.gain("stratification"))
+    air = TrueAir(conditions, planted.gain("stratification"))
     warm = dict(warm_lines or {})
     for ranger, target in warm:
         if ranger not in heads or target not in points:
@@ -169,7 +169,7 @@ def simulate_night(
 
 
 def soundings(
-    air: Air,
+    air: TrueAir,
     warm: Mapping[tuple[str, str], float],
     points: Mapping[str, np.ndarray],
     u_sound_c: float | None,
@@ -191,11 +191,11 @@ def soundings(
     return tuple(sorted(found, key=lambda row: row.seconds))
 
 
-def benchmark_targets(marks: list[Benchmark], streams: Streams, planted: Planted) -> list[Target]:
+def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:
     """The benchmarks as targets with approximate positions."""
     rng = streams("benchmark positions")
     typed = [typed_mm(b.true_point + typing_error(planted, rng)) for b in marks]
-    return [Target(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
+    return [TrueTarget(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
 
 
 def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.ndarray]:
@@ -207,7 +207,7 @@ def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.nda
 
 
 def in_time(
-    heads: dict[str, Head], returns: dict[str, list[Return]], streams: Streams, planted: Planted
+    heads: dict[str, TrueHead], returns: dict[str, list[Return]], streams: Streams, planted: Planted
 ) -> tuple[list[Return], np.ndarray]:
     """All returns in the order of their triggers, with their frames."""
     every = [r for ranger in heads for r in returns[ranger]]

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.simulator.night.faults import Faults, Planted, Streams
-from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.world import FEED_ARM_RANGERS
 
 FOCAL_LENGTH = 60.0
@@ -31,7 +31,7 @@ WEDGE_DEG = 10.0  # the dish prisms stand on wedges of multiples of this
 
 
 @dataclass(frozen=True)
-class Target:
+class TrueTarget:
     """A target: what was typed about it, and its truth. `normal` looks at the rangers (a ball: its axis)."""
 
     name: str
@@ -46,7 +46,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Triplet:
+class TrueTriplet:
     """A triplet unit: its data sheet, and its three targets (left, right, ball)."""
 
     name: str
@@ -57,23 +57,23 @@ class Triplet:
     h_corr_mm: float
     l_mpbc_mm: float
     design: np.ndarray  # of the ball, m, reflector frame
-    targets: tuple[Target, Target, Target]
+    targets: tuple[TrueTarget, TrueTarget, TrueTarget]
 
 
 @dataclass(frozen=True)
 class Structure:
     """Everything on the telescope."""
 
-    feed_arm: dict[str, Target]
-    dish: list[Target]
-    triplets: list[Triplet]
-    structural: list[Target]
+    feed_arm: dict[str, TrueTarget]
+    dish: list[TrueTarget]
+    triplets: list[TrueTriplet]
+    structural: list[TrueTarget]
     aim_point_mm: np.ndarray
     design: dict[str, np.ndarray]  # where ground rangers look for balls and structural targets, m, ground frame
     wrongly_typed: str | None
 
     @property
-    def targets(self) -> dict[str, Target]:
+    def targets(self) -> dict[str, TrueTarget]:
         units = [t for unit in self.triplets for t in unit.targets]
         return {t.name: t for t in (*self.feed_arm.values(), *self.dish, *units, *self.structural)}
 
@@ -112,7 +112,7 @@ def height_above_vertex(xy):
     return np.sum(xy**2, axis=-1) / (4.0 * FOCAL_LENGTH)
 
 
-def dish_prisms(count: int, pose: Posture, streams: Streams, planted: Planted) -> list[Target]:
+def dish_prisms(count: int, pose: TruePosture, streams: Streams, planted: Planted) -> list[TrueTarget]:
     """Prisms strewn over the aperture like sunflower seeds, on wedges that aim them roughly at the feed arm."""
     if count == 0:
         return []
@@ -138,7 +138,7 @@ def dish_prisms(count: int, pose: Posture, streams: Streams, planted: Planted) -
     true_heights = (heights + planted.gain("calibration") * rng.normal(0.0, U_HEIGHT_MM, count)) * MILLIMETRE
     points, normals = pose.dish(point), pose.dish_direction(true_normal)
     return [
-        Target(
+        TrueTarget(
             name=f"DP{i + 1:03d}",
             kind="prism",
             frame="reflector",
@@ -153,7 +153,7 @@ def dish_prisms(count: int, pose: Posture, streams: Streams, planted: Planted) -
     ]
 
 
-def triplet(number: int, count: int, pose: Posture, streams: Streams, planted: Planted) -> Triplet:
+def triplet(number: int, count: int, pose: TruePosture, streams: Streams, planted: Planted) -> TrueTriplet:
     """One triplet at the rim, its plate looking at the aim point, its ball the other way."""
     rng = streams(f"triplet/{number}")
     calibration = planted.gain("calibration")
@@ -183,7 +183,7 @@ def triplet(number: int, count: int, pose: Posture, streams: Streams, planted: P
     ground_normal = pose.dish_direction(true_normal)
 
     prisms = [
-        Target(
+        TrueTarget(
             name=f"{name}-{side}",
             kind="prism",
             frame="reflector",
@@ -196,7 +196,7 @@ def triplet(number: int, count: int, pose: Posture, streams: Streams, planted: P
         )
         for i, (side, sign) in enumerate((("L", -1.0), ("R", 1.0)))
     ]
-    looker = Target(
+    looker = TrueTarget(
         name=f"{name}-B",
         kind="ball",
         frame="reflector",
@@ -208,18 +208,18 @@ def triplet(number: int, count: int, pose: Posture, streams: Streams, planted: P
         sizes=tuple(float(r) for r in true_radii),
     )
     l_mpbc_mm = round(float(h_mm + miss[1] + miss[4]), 3)
-    return Triplet(name, typed, normal, axis, d12_mm, h_mm, l_mpbc_mm, ball, (prisms[0], prisms[1], looker))
+    return TrueTriplet(name, typed, normal, axis, d12_mm, h_mm, l_mpbc_mm, ball, (prisms[0], prisms[1], looker))
 
 
 def structure(
-    pose: Posture, *, dish_count: int, triplet_count: int, streams: Streams, faults: Faults, planted: Planted
+    pose: TruePosture, *, dish_count: int, triplet_count: int, streams: Streams, faults: Faults, planted: Planted
 ) -> Structure:
     """The telescope in one posture, with one approximate position typed wrong."""
     rng = streams("feed_arm")
     place = FEED_ARM_DESIGN + rng.normal(0.0, 0.01, FEED_ARM_DESIGN.shape)
     arm_typed = typed_mm(place + typing_error(planted, rng, place.shape))
     arm = {
-        name: Target(name, "hollow", "reflector", arm_typed[i], pose.arm(place[i]))
+        name: TrueTarget(name, "hollow", "reflector", arm_typed[i], pose.arm(place[i]))
         for i, name in enumerate(FEED_ARM_RANGERS)
     }
     aim_mm = typed_mm(AIM_POINT_DESIGN + typing_error(planted, rng))
@@ -231,19 +231,19 @@ def structure(
     return Structure(arm, dish, units, fixed, aim_mm, design, wrong)
 
 
-def structural_targets(pose: Posture, streams: Streams, planted: Planted):
+def structural_targets(pose: TruePosture, streams: Streams, planted: Planted):
     """Hollow cubes on the feed arm and at the elevation bearing, and their design points in the ground frame."""
     rng = streams("structural")
     targets, design = [], {}
     for name, at in STRUCTURAL_REFLECTOR.items():
         design[name] = pose.nominal(np.array(at))
         typed = typed_mm(np.array(at) + typing_error(planted, rng))
-        targets.append(Target(name, "hollow", "reflector", typed, pose.arm(np.array(at))))
+        targets.append(TrueTarget(name, "hollow", "reflector", typed, pose.arm(np.array(at))))
     for name, at in STRUCTURAL_ALIDADE.items():
         design[name] = pose.alidade(np.array(at))
         point = design[name] + planted.gain("posture") * rng.normal(0.0, 2.0, 3) * MILLIMETRE
         typed = typed_mm(design[name] + typing_error(planted, rng))
-        targets.append(Target(name, "hollow", "ground", typed, point))
+        targets.append(TrueTarget(name, "hollow", "ground", typed, point))
     return targets, design
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import PPM
-from catseye.simulator.night.air import Air
+from catseye.simulator.night.air import TrueAir
 from catseye.simulator.night.head import Return
-from catseye.simulator.night.paraboloid import Paraboloid, best_paraboloid
-from catseye.simulator.night.posture import Posture
+from catseye.simulator.night.paraboloid import GroundParaboloid, best_paraboloid
+from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.schedule import REFERENCE
 from catseye.simulator.night.structure import Structure
-from catseye.simulator.night.world import Head, Monument
+from catseye.simulator.night.world import TrueHead, TrueMonument
 
 
 @dataclass(frozen=True)
@@ -45,22 +45,22 @@ class Truth:
     mirror_offsets: dict[str, np.ndarray]
     thermometer_offsets_c: dict[str, float]
     normals: dict[str, np.ndarray]
-    paraboloid: Paraboloid | None
-    posture: Posture
-    air: Air
+    paraboloid: GroundParaboloid | None
+    posture: TruePosture
+    air: TrueAir
     wrongly_typed: str | None
 
 
 def truth_of(
     *,
-    heads: dict[str, Head],
-    monuments: dict[str, Monument],
+    heads: dict[str, TrueHead],
+    monuments: dict[str, TrueMonument],
     telescope: Structure,
     points: dict[str, np.ndarray],
     returns: list[Return],
-    air: Air,
+    air: TrueAir,
     thermometer_offsets_c: dict[str, float],
-    pose: Posture,
+    pose: TruePosture,
 ) -> Truth:
     """Gather the truth; returns in the order of the shots."""
     shots = {str(i + 1): r for i, r in enumerate(returns)}

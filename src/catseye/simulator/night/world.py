@@ -14,7 +14,7 @@ SITE_LATITUDE_DEG, METRES_PER_DEGREE = 38.433121, 110_950.0
 
 
 @dataclass(frozen=True)
-class Head:
+class TrueHead:
     """A ranger head: what its sheet says, and what is true of it (`true_...`, SI)."""
 
     ranger: str
@@ -35,7 +35,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class Monument:
+class TrueMonument:
     """A ground monument: its survey as printed, and its true fixed point and scan point (m, ground frame)."""
 
     ranger: str
@@ -48,7 +48,7 @@ class Monument:
 
 
 @dataclass(frozen=True)
-class Benchmark:
+class TrueBenchmark:
     """A hollow cube on the ground with a certified distance to one ranger."""
 
     name: str
@@ -70,7 +70,7 @@ def kelvin_from_ground(alpha):
     )
 
 
-def head(ranger: str, streams: Streams, planted: Planted) -> Head:
+def head(ranger: str, streams: Streams, planted: Planted) -> TrueHead:
     """A head with its calibration sheet, drawn for one ranger."""
     rng = streams(f"head/{ranger}")
     amplitude, angle = round(rng.uniform(0.012, 0.040), 5), round(rng.uniform(0.0, 2 * np.pi), 4)
@@ -80,7 +80,7 @@ def head(ranger: str, streams: Streams, planted: Planted) -> Head:
     na0, ne0 = (int(v) for v in rng.integers(-5500, 5500, 2))
     miss = planted.gain("calibration") * rng.normal(size=6)
     leakage = amplitude * np.exp(1j * angle) + U_LEAKAGE_VOLT * complex(miss[0], miss[1])
-    return Head(
+    return TrueHead(
         ranger=ranger,
         leakage_amplitude_volt=amplitude,
         leakage_phase_rad=angle,
@@ -95,7 +95,7 @@ def head(ranger: str, streams: Streams, planted: Planted) -> Head:
     )
 
 
-def monument(ranger: str, head: Head, streams: Streams, planted: Planted) -> Monument:
+def monument(ranger: str, head: TrueHead, streams: Streams, planted: Planted) -> TrueMonument:
     """A monument some 120 m from the pintle bearing, pointing at it, with the true scan point of its head."""
     rng = streams(f"monument/{ranger}")
     bearing = (12.0 + 30.0 * GROUND_RANGERS.index(ranger) + rng.uniform(-5.0, 5.0)) * DEGREE
@@ -107,7 +107,7 @@ def monument(ranger: str, head: Head, streams: Streams, planted: Planted) -> Mon
     azimuth_deg = round(float((bearing / DEGREE + 180.0 + rng.normal(0.0, 0.01)) % 360.0), 6)
     alpha = np.round(np.array([np.pi - azimuth_deg * DEGREE, *rng.normal(0.0, 7e-5, 2)]), 7)
     fixed = (fixed_mm + planted.gain("calibration") * u_mm * rng.normal(size=3)) * MILLIMETRE
-    return Monument(
+    return TrueMonument(
         ranger=ranger,
         fixed_point_mm=fixed_mm,
         u_mm=u_mm,
@@ -118,7 +118,7 @@ def monument(ranger: str, head: Head, streams: Streams, planted: Planted) -> Mon
     )
 
 
-def benchmarks(monuments: dict[str, Monument], streams: Streams, planted: Planted) -> list[Benchmark]:
+def benchmarks(monuments: dict[str, TrueMonument], streams: Streams, planted: Planted) -> list[TrueBenchmark]:
     """Six benchmarks, 60 to 140 m along chords of the ring, each certified from its own ranger."""
     found = []
     for k in range(6):
@@ -134,5 +134,5 @@ def benchmarks(monuments: dict[str, Monument], streams: Streams, planted: Plante
             0.0, U_BENCHMARK_MM
         )
         neighbour = GROUND_RANGERS[2 * k + 2] if k % 2 == 0 else None
-        found.append(Benchmark(f"ZBM{k + 1:02d}", ranger, neighbour, round(float(certified), 3), point))
+        found.append(TrueBenchmark(f"ZBM{k + 1:02d}", ranger, neighbour, round(float(certified), 3), point))
     return found

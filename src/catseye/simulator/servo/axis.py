@@ -26,7 +26,7 @@ Status = Literal["done", "motor off", "timeout"]
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class AxisTrace:
     """What an axis did, one row a sample.
 
     time       s, since power came on, when the encoder was read
@@ -115,7 +115,7 @@ class ServoAxis:
         """Since power came on, s."""
         return self.samples * self.motor.sample
 
-    def run(self, samples: int) -> Trace:
+    def run(self, samples: int) -> AxisTrace:
         """Let time pass and record every sample.
 
         samples   number of samples, 0 or above
@@ -131,7 +131,7 @@ class ServoAxis:
         rows[0] /= FRACTION
         rows[1] *= per_second
         time: NDArray[np.float64] = (begin + np.arange(samples, dtype=np.float64)) * motor.sample
-        return Trace(time, *rows)
+        return AxisTrace(time, *rows)
 
     def skip(self, samples: int) -> None:
         """Let time pass without a record."""
@@ -330,7 +330,7 @@ class ServoAxis:
             self.abp(0)
         return Homing(found, text, (self.samples - begin) * self.motor.sample)
 
-    def follow(self, counts: Sequence[float], samples: int = TRACKING_SAMPLES) -> Trace:
+    def follow(self, counts: Sequence[float], samples: int = TRACKING_SAMPLES) -> AxisTrace:
         """Track a moving target: the profile passes the given counts one after another, straight between them.
 
         counts    where the target is after each interval, with fractions
@@ -357,7 +357,7 @@ class ServoAxis:
             if not started:
                 raise ValidityError("ABA: the acceleration was changed during a move (expected the same until it ends)")
             rows.append(self.run(samples))
-        return Trace(*(np.concatenate([getattr(row, name) for row in rows]) for name in ("time", *COLUMNS)))
+        return AxisTrace(*(np.concatenate([getattr(row, name) for row in rows]) for name in ("time", *COLUMNS)))
 
     def _samples_of(self, seconds: float) -> int:
         if not np.isfinite(seconds):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import EstimationError, ValidityError
 from catseye.ranger.motion_units import LARGEST_GAIN, LIMITS, SAMPLE_TIME, checked
-from catseye.simulator.servo.axis import ServoAxis, Trace
+from catseye.simulator.servo.axis import AxisTrace, ServoAxis
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign, Motor
 
@@ -138,7 +138,7 @@ def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:
     return Plant(gain, design.damping / design.inertia, design.coulomb / torque, sample)
 
 
-def identify(*traces: Trace, output_bits: int = 8) -> Plant:
+def identify(*traces: AxisTrace, output_bits: int = 8) -> Plant:
     """An axis's gain, decay and friction from recorded moves, by least squares over the samples in which it moved.
 
     traces        of moves that accelerate, cruise and brake; both directions for the friction's sake

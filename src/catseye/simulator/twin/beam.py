@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE
 from catseye.geometry.frames.rotation import from_vector
-from catseye.records.site.site import Paraboloid
+from catseye.records.site.site import ParaboloidRecord
 
 Array = NDArray[np.float64]
 RINGS, SPOKES = 20, 50
@@ -32,7 +32,7 @@ class TracedDish:
     weight: Array
 
     @classmethod
-    def of(cls, record: Paraboloid) -> "TracedDish":
+    def of(cls, record: ParaboloidRecord) -> "TracedDish":
         """Of a site's paraboloid and aperture."""
         radius = record.aperture_radius_mm * MILLIMETRE
         nodes, weights = np.polynomial.legendre.leggauss(RINGS)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import TWO_PI
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.night.head import HARMONICS, VOLT_PER_CODE
 
@@ -36,7 +36,7 @@ class Converter:
         at: NDArray[np.float64],
         phasors: Complex,
         *,
-        sampling: Sampling,
+        sampling: SamplingSettings,
         generator: np.random.Generator,
         gain: float = 1.0,
     ) -> NDArray[np.int16]:
@@ -76,7 +76,7 @@ def _cycle_by_cycle(edges: Complex, n: int, harmonics: Complex) -> NDArray[np.fl
 
 
 def _sample_by_sample(
-    at: NDArray[np.float64], phasors: Complex, sampling: Sampling, harmonics: Complex
+    at: NDArray[np.float64], phasors: Complex, sampling: SamplingSettings, harmonics: Complex
 ) -> NDArray[np.float64]:
     """The same for a slow intermediate frequency: the return at every sample."""
     j = np.arange(sampling.cycles * sampling.samples)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from catseye.ranger.network import Listener, Network, P
+from catseye.ranger.network import ConnectionMaker, Listener, P
 
 
 @dataclass
@@ -35,7 +35,7 @@ class FaultyNetwork:
     gate      what is wrong
     """
 
-    def __init__(self, network: Network, gate: Gate):
+    def __init__(self, network: ConnectionMaker, gate: Gate):
         self._network, self._gate = network, gate
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> Listener:

@@ -19,7 +19,7 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
-from catseye.ranger.network import Listener, Network, Sockets
+from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.records.night.live import LiveWeather
 from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.twin.faults import FaultBoard
@@ -67,12 +67,12 @@ class SiteFeed:
         clock: Clock,
         *,
         weather_every: float = WEATHER_EVERY,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
     ):
         if weather_every <= 0.0:
             raise InputError(f"weather every {weather_every:g} s (expected more than 0)")
         self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
-        self._network: Network = network or Sockets()
+        self._network: ConnectionMaker = network or Sockets()
         self._weather_ns = round(weather_every * PER_SECOND)
         self._listener: Listener | None = None
         self.clients: set[FeedConnection] = set()

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
-from catseye.ranger.head import Buffer, Homing, Sampling
+from catseye.ranger.head import Buffer, Homing, SamplingSettings
 from catseye.ranger.motion_units import CLOCK_HZ, CLOCKS_PER_SAMPLE, SAMPLE_TIME
 from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.night.head import VOLT_PER_CODE
 from catseye.simulator.twin.converter import Converter
 from catseye.simulator.twin.faults import FaultBoard
-from catseye.simulator.twin.mirror import NEAR_STOP, TRAVEL, MirrorTuning, Track, TwinMirror
+from catseye.simulator.twin.mirror import NEAR_STOP, TRAVEL, CountSegment, MirrorTuning, TwinMirror
 
 POINTS = 24  # along a buffer, where mirror and return are looked at: 5.3 ms of 128 ms
 LONGEST_STEP = 15  # samples between two of them, 5 ms, in longer buffers
@@ -32,7 +32,7 @@ BEHIND = 3_000  # samples that a head may be behind before a call that asks for 
 SUPPLIES = {"+5": 5.0, "+12": 12.0, "-12": -12.0, "+24": 24.0}  # V
 
 
-class World(Protocol):
+class HeadWorld(Protocol):
     """What a head needs of the site's truth."""
 
     def seconds(self, ns: int, /) -> float:
@@ -65,7 +65,7 @@ class TwinHead:
     def __init__(
         self,
         ranger: str,
-        world: World,
+        world: HeadWorld,
         clock: Clock,
         *,
         seed: int,
@@ -95,7 +95,7 @@ class TwinHead:
         self._forget()
 
     def _forget(self) -> None:
-        self._taking: tuple[Sampling, int, TimeTag, bool] | None = None
+        self._taking: tuple[SamplingSettings, int, TimeTag, bool] | None = None
         self._last: Buffer | None = None
         self._laser = True
 
@@ -141,7 +141,7 @@ class TwinHead:
 
     # Buffers --------------------------------------------------------------------------------------------------------
 
-    def trigger(self, sampling: Sampling) -> None:
+    def trigger(self, sampling: SamplingSettings) -> None:
         """Begin to take a buffer; one being taken is given up."""
         now = self._clock.now_ns()
         self._taking, self._last = (sampling, now, self.now(), self._laser), None
@@ -165,7 +165,7 @@ class TwinHead:
             self._taking = None
         return self._last
 
-    def _codes(self, sampling: Sampling, begun: int, lit: bool) -> NDArray[np.int16]:
+    def _codes(self, sampling: SamplingSettings, begun: int, lit: bool) -> NDArray[np.int16]:
         """What the converter made of the return along the way that the mirror went."""
         since_boot = np.array([sample for sample, _ in self._mirror.marked]) * SAMPLE_TIME
         counts = np.array([counts for _, counts in self._mirror.marked])
@@ -212,7 +212,7 @@ class TwinHead:
         begin, end = ((_nanoseconds(tag) + ahead - self._boot) / PER_SECOND / SAMPLE_TIME for tag in when)
         if not begin < end:
             raise InputError(f"{self.ranger}: a track from {when[0].text()} to {when[1].text()} (expected later)")
-        return self._caught_up(exactly=True).follow(Track((begin, end), counts))
+        return self._caught_up(exactly=True).follow(CountSegment((begin, end), counts))
 
     def moving(self, axis: int) -> bool:
         """Whether a profile, a track, or a search for the index, is under way."""
@@ -273,5 +273,5 @@ def _nanoseconds(tag: TimeTag) -> int:
     return int(tag.day) * PER_DAY + int(tag.nanoseconds)
 
 
-def _duration_ns(sampling: Sampling) -> int:
+def _duration_ns(sampling: SamplingSettings) -> int:
     return sampling.cycles * PER_SECOND // sampling.frequency_hz

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE, TWO_PI
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import DRIFT_RAD_PER_ROOT_HOUR
-from catseye.simulator.twin.targets import Retro
+from catseye.simulator.twin.targets import BodyRetroreflector
 from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def prism_way(height: float, cosine: Array, *, group: float, phase: float) -> Ar
     return height * (group / inside - cosine / group - phase * sine * sine / inside)
 
 
-def glass_way(retro: Retro, cosine: Array, *, group: float, phase: float, obliquity: float) -> Array:
+def glass_way(retro: BodyRetroreflector, cosine: Array, *, group: float, phase: float, obliquity: float) -> Array:
     """Way (k,), air metres, that a retroreflector's glass adds one way, light coming in at cosines of incidence (k,).
 
     obliquity   factor on what the angle changes
@@ -50,7 +50,7 @@ def glass_way(retro: Retro, cosine: Array, *, group: float, phase: float, obliqu
     return straight + obliquity * (prism_way(retro.sizes[0], cosine, group=group, phase=phase) - straight)
 
 
-def acceptance(retro: Retro, cosine: Array) -> Array:
+def acceptance(retro: BodyRetroreflector, cosine: Array) -> Array:
     """Share of amplitude (k,) that comes back at cosines (k,) of the angle off where the retroreflector looks."""
     if retro.facing is None:
         return np.ones_like(cosine)
@@ -73,7 +73,7 @@ def path_waves(ranger: str, target: str, *, index_ppm: float, streams: Streams, 
     return Waves(whole.omega, whole.cosine @ mixing, whole.sine @ mixing, np.zeros(2))
 
 
-class Electronics:
+class ElectronicsWalk:
     """Phase of a head's electronics: a random walk of 10 mrad in the root of an hour; every third warms up.
 
     It is a sum of waves with a 1/f^2 spectrum (`waves.walk`): smooth below 5 s, a walk up to some days.

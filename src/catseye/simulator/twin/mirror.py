@@ -64,7 +64,7 @@ class MirrorTuning:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class CountSegment:
     """Counts (2,) at two samples, which may be fractions; linear between, held at the ends."""
 
     samples: tuple[float, float]
@@ -312,7 +312,7 @@ class TwinMirror:
         """Whether a track is under way."""
         return "track" in self._jobs
 
-    def follow(self, track: Track) -> bool:
+    def follow(self, track: CountSegment) -> bool:
         """Follow a track with both axes; another track before is taken over from. False: amplifier off, or a move.
 
         Far from the line the chip makes a trapezoidal move at it, aimed ahead by the way that its speed brakes in; near
@@ -334,7 +334,7 @@ class TwinMirror:
         self._begin("track", self._follow(track), 0)
         return True
 
-    def _follow(self, track: Track) -> Job:
+    def _follow(self, track: CountSegment) -> Job:
         while self.samples < track.samples[1]:
             stop = min([self.samples + INTERVAL, *(ceil(t) for t in track.samples if t > self.samples)])
             for k in (0, 1):
@@ -346,7 +346,7 @@ class TwinMirror:
             if not self.axes.motor_off(k):
                 self._go(k, round(track.at(self.samples, k)))
 
-    def _lead(self, k: int, track: Track, stop: int) -> None:
+    def _lead(self, k: int, track: CountSegment, stop: int) -> None:
         """Bring the profile of an axis to the track at a sample to come."""
         span, rate = stop - self.samples, track.rate(self.samples, k)
         goal = track.at(stop, k) + 0.5

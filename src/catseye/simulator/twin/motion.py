@@ -31,7 +31,7 @@ EAST = np.array([1.0, 0.0, 0.0])
 COLUMNS = ["mjd", "azimuth_deg", "elevation_deg"]
 
 
-class Angles(NamedTuple):
+class AxisAngles(NamedTuple):
     """Azimuth and elevation (k,), rad, and their rates (k,), rad/s."""
 
     azimuth: Array
@@ -40,19 +40,19 @@ class Angles(NamedTuple):
     elevation_rate: Array
 
 
-class Motion(ABC):
+class AxisMotion(ABC):
     """Where the axes are at times."""
 
     @abstractmethod
-    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> Angles:
+    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         """Angles at times (k,), s since the start at `start_mjd`, UTC; of a site at a latitude, rad."""
 
     @staticmethod
-    def parse(text: str) -> "Motion":
+    def parse(text: str) -> "AxisMotion":
         """A motion as people type it, above. Raises InputError with what was expected.
 
-        >>> Motion.parse("slew 10 30 40 50")
-        Slew(start_deg=(10.0, 30.0), end_deg=(40.0, 50.0))
+        >>> AxisMotion.parse("slew 10 30 40 50")
+        TelescopeSlew(start_deg=(10.0, 30.0), end_deg=(40.0, 50.0))
         """
         kind, *words = (text.split(maxsplit=1) if text.startswith("table ") else text.split()) or [""]
         if kind == "table" and words:
@@ -68,11 +68,11 @@ class Motion(ABC):
                 "(degrees, degrees a minute) or table FILE"
             )
         if kind == "fixed":
-            return Slew((n[0], n[1]), (n[0], n[1]))
+            return TelescopeSlew((n[0], n[1]), (n[0], n[1]))
         if kind == "track":
-            return Track((n[0], n[1]))
+            return SkyTrack((n[0], n[1]))
         if kind == "slew":
-            return Slew((n[0], n[1]), (n[2], n[3]))
+            return TelescopeSlew((n[0], n[1]), (n[2], n[3]))
         return Scan((n[0], n[1]), n[2], n[3])
 
 
@@ -84,7 +84,7 @@ def _refuse_elevation(elevation_deg: float, where: str, highest: float = HIGHEST
 
 
 @dataclass(frozen=True)
-class Slew(Motion):
+class TelescopeSlew(AxisMotion):
     """From one posture to another, each axis by itself with a trapezoid of speed; standing is a slew to where it is.
 
     start_deg, end_deg   azimuth, elevation
@@ -97,7 +97,7 @@ class Slew(Motion):
         _refuse_elevation(self.start_deg[1], "slew")
         _refuse_elevation(self.end_deg[1], "slew")
 
-    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> Angles:
+    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         found = []
         for axis in (0, 1):
             begin = self.start_deg[axis] * DEGREE
@@ -113,7 +113,7 @@ class Slew(Motion):
             passed = np.where(t < rise, 0.5 * ACCELERATION * t**2, speed * (t - 0.5 * rise))
             passed = np.where(end < rise, abs(way) - 0.5 * ACCELERATION * end**2, passed)
             found.append((begin + np.sign(way) * passed, np.sign(way) * ACCELERATION * _least(t, end, rise)))
-        return Angles(found[0][0], found[1][0], found[0][1], found[1][1])
+        return AxisAngles(found[0][0], found[1][0], found[0][1], found[1][1])
 
 
 def _least(since: Array, until: Array, rise: float) -> Array:
@@ -122,7 +122,7 @@ def _least(since: Array, until: Array, rise: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Track(Motion):
+class SkyTrack(AxisMotion):
     """After an object of the sky: its direction turns about the pole once a sidereal day, without refraction.
 
     start_deg   azimuth, elevation at the start; where the object is below 5 degrees the telescope waits there
@@ -133,7 +133,7 @@ class Track(Motion):
     def __post_init__(self) -> None:
         _refuse_elevation(self.start_deg[1], "track", 90.0 - TRACK_CLEARANCE_DEG)
 
-    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> Angles:
+    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         a, e = np.array(self.start_deg) * DEGREE
         here = np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])  # east, north, up
         pole = np.array([0.0, np.cos(latitude), np.sin(latitude)])
@@ -174,7 +174,7 @@ class Track(Motion):
         even = (round_trip - 2.0 * begin) / max(TWO_PI - 2.0 * sets, 1e-9)
         waits = begin + even * (np.where(hour > 0.0, hour, hour + TWO_PI) - sets)
         whole = round_trip * np.where(up | (hour > 0.0), transit, transit - 1.0)
-        return Angles(
+        return AxisAngles(
             a - float(seen(np.array([first]))[0][0]) + whole + np.where(up, off, waits),
             np.where(up, elevation, LOWEST_DEG * DEGREE),
             speed * np.where(up, turn, even),
@@ -183,7 +183,7 @@ class Track(Motion):
 
 
 @dataclass(frozen=True)
-class Scan(Motion):
+class Scan(AxisMotion):
     """To and fro in azimuth at one elevation; it turns round outside the width, at the drives' acceleration.
 
     middle_deg      azimuth, elevation
@@ -203,7 +203,7 @@ class Scan(Motion):
                 "and 0 to 35.2, both above 0)"
             )
 
-    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> Angles:
+    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         speed, width = self.rate_deg_min * DEGREE / 60.0, self.width_deg * DEGREE
         sweep, turn = width / speed, 2.0 * speed / ACCELERATION
         half = sweep + turn
@@ -215,11 +215,11 @@ class Scan(Motion):
         rate = speed - ACCELERATION * late
         sign = np.where(back, -1.0, 1.0)
         elevation = np.full_like(up, self.middle_deg[1] * DEGREE)
-        return Angles(self.middle_deg[0] * DEGREE + sign * up, elevation, sign * rate, np.zeros_like(up))
+        return AxisAngles(self.middle_deg[0] * DEGREE + sign * up, elevation, sign * rate, np.zeros_like(up))
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Motion):
+class PostureTable(AxisMotion):
     """Through given postures, by cubics with the mean slopes of their neighbours; before and after it stands.
 
     mjd, azimuth, elevation   (n,) UTC ascending, rad
@@ -229,7 +229,7 @@ class Table(Motion):
     azimuth: Array
     elevation: Array
 
-    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> Angles:
+    def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         at = (self.mjd - start_mjd) * SECONDS_PER_DAY
         t = np.clip(seconds, at[0], at[-1])
         k = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(at) - 2)
@@ -245,10 +245,10 @@ class Table(Motion):
             found.append(
                 (y[k] + s * (left + s * (c2 + s * c3)), (left + s * (2.0 * c2 + 3.0 * s * c3)) / span * moving)
             )
-        return Angles(found[0][0], found[1][0], found[0][1], found[1][1])
+        return AxisAngles(found[0][0], found[1][0], found[0][1], found[1][1])
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> PostureTable:
     """A table of postures. Raises InputError with file, row and what was expected."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -272,4 +272,4 @@ def read_table(path: Path) -> Table:
     if len(values) < 2:
         raise InputError(f"motion table {path}: {len(values)} postures (expected at least 2)")
     table = np.array(values)
-    return Table(table[:, 0], table[:, 1] * DEGREE, table[:, 2] * DEGREE)
+    return PostureTable(table[:, 0], table[:, 1] * DEGREE, table[:, 2] * DEGREE)

@@ -12,10 +12,10 @@ from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import REFERENCE_VOLT
 from catseye.simulator.twin.air import LivingAir
 from catseye.simulator.twin.faults import FaultBoard
-from catseye.simulator.twin.light import CUBE_RADIUS, SPOT, Electronics, acceptance, glass_way, path_waves
-from catseye.simulator.twin.scene import Beam, Scene
-from catseye.simulator.twin.stations import Station, reference_cube
-from catseye.simulator.twin.telescope import Standing
+from catseye.simulator.twin.light import CUBE_RADIUS, SPOT, ElectronicsWalk, acceptance, glass_way, path_waves
+from catseye.simulator.twin.scene import Beam, TwinPlaces
+from catseye.simulator.twin.stations import TrueStation, reference_cube
+from catseye.simulator.twin.telescope import TelescopeStanding
 from catseye.simulator.twin.waves import Waves
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ class Returns:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: TwinPlaces,
         air: LivingAir,
         ranging: Ranging,
         *,
@@ -58,11 +58,11 @@ class Returns:
         self._group = ranging.bk7_to_air_group_index_ratio
         self._bending = ranging.bk7_to_air_phase_index_ratio or self._group
         self._index_ppm = air.conditions.turbulence * ranging.path_index_fluctuation_ppm
-        self.electronics = {name: Electronics(name, streams, planted) for name in scene.stations}
+        self.electronics = {name: ElectronicsWalk(name, streams, planted) for name in scene.stations}
         self._cubes = {name: reference_cube(station) for name, station in scene.stations.items()}
         self._paths: dict[tuple[str, str], tuple[Waves, float]] = {}
 
-    def lit(self, ranger: str, counts: Array, t: Array, standing: Standing) -> str | None:
+    def lit(self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding) -> str | None:
         """The retroreflector on which a beam falls at counts (1, 2) and one time (1,), the nearest; None: on none."""
         if self._off_cube(self._scene.station(ranger), counts)[0][0] < CUBE_RADIUS:
             return REFERENCE
@@ -74,12 +74,12 @@ class Returns:
                 taken[name] = float(meeting.off[0])
         return min(taken, key=lambda name: taken[name], default=None)
 
-    def beam(self, ranger: str, counts: Array, t: Array, standing: Standing) -> Beam:
+    def beam(self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding) -> Beam:
         """Where the light goes at what the encoders read (k, 2)."""
         return self._scene.beam(self._scene.frame(ranger, t, standing), self._scene.station(ranger).ray(counts))
 
     def phasors(
-        self, ranger: str, counts: Array, t: Array, standing: Standing, *, among: tuple[str, ...] | None = None
+        self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding, *, among: tuple[str, ...] | None = None
     ) -> Complex:
         """What returns (k,), V, at counts (k, 2) and times (k,), and what leaks.
 
@@ -97,14 +97,14 @@ class Returns:
             found = found + self._return(ranger, name, beam, t, standing)
         return station.leakage + turned * found
 
-    def _near(self, beam: Beam, standing: Standing) -> list[str]:
+    def _near(self, beam: Beam, standing: TelescopeStanding) -> list[str]:
         """Names of what the beam may fall on at any of its times."""
         last = len(beam.way) - 1
         sweep = FARTHEST * float(np.max(np.abs(beam.direction[-1] - beam.direction[0])))
         at = (last // 2,) if sweep < SWEEP else (0, last // 2, last)
         return list(dict.fromkeys(name for k in at for name in self._scene.near(beam, standing, k)))
 
-    def _meeting(self, name: str, beam: Beam, t: Array, standing: Standing) -> Meeting:
+    def _meeting(self, name: str, beam: Beam, t: Array, standing: TelescopeStanding) -> Meeting:
         sight = self._scene.point(name, t, standing) - beam.origin
         along = np.einsum("ij,ij->i", sight, beam.direction)
         aside = sight - along[:, None] * beam.direction
@@ -112,7 +112,7 @@ class Returns:
         cosine = np.ones(len(t)) if facing is None else -np.einsum("ij,ij->i", facing, beam.direction)
         return Meeting(along, np.sqrt(np.einsum("ij,ij->i", aside, aside)), cosine)
 
-    def _return(self, ranger: str, name: str, beam: Beam, t: Array, standing: Standing) -> Complex:
+    def _return(self, ranger: str, name: str, beam: Beam, t: Array, standing: TelescopeStanding) -> Complex:
         """What one retroreflector returns (k,), V, but for the electronics' phase."""
         retro, at = self._scene.retros[name], float(t[len(t) // 2])
         met = self._meeting(name, beam, t, standing)
@@ -134,7 +134,7 @@ class Returns:
         phase = -self.radians_per_metre * ((index + 1e-6 * ppm) * length + end_index * glass)
         return volts * np.exp(1j * (phase + self._coupled(self._scene.stations[ranger], volts, phase)))
 
-    def _coupled(self, station: Station, volts: Array, phase: Array) -> Array | float:
+    def _coupled(self, station: TrueStation, volts: Array, phase: Array) -> Array | float:
         """Phase that a head adds by amplitude and by phase (k,), rad; to the reference it adds none."""
         added: Array | float = 0.0
         if station.amplitude_to_phase:
@@ -145,7 +145,7 @@ class Returns:
             added = added - self.radians_per_metre * long
         return added
 
-    def _off_cube(self, station: Station, counts: Array) -> tuple[Array, Array]:
+    def _off_cube(self, station: TrueStation, counts: Array) -> tuple[Array, Array]:
         """How far the beam passes the internal cube (k,), m, and the way of the light to it (k,), m."""
         ray, (cube, _) = station.ray(counts), self._cubes[station.name]
         sight = cube - ray.leaves
@@ -154,7 +154,7 @@ class Returns:
         off = np.sqrt(np.einsum("ij,ij->i", aside, aside))
         return np.where(along > 0.0, off, np.inf), ray.way + along
 
-    def _reference(self, ranger: str, off: Array, way: Array, t: Array, standing: Standing) -> Complex:
+    def _reference(self, ranger: str, off: Array, way: Array, t: Array, standing: TelescopeStanding) -> Complex:
         """What the internal cube returns (k,), V, but for the electronics' phase: nothing blocks or wets it."""
         volts = np.where(off < CUBE_RADIUS, REFERENCE_VOLT * np.exp(-0.5 * (off / SPOT) ** 2), 0.0)
         index = self._air.index(self._scene.point(ranger, t, standing), t)

@@ -11,9 +11,9 @@ from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import USUAL_VOLT
-from catseye.simulator.twin.stations import Ray, Station, stations
-from catseye.simulator.twin.targets import PRISM_RADIUS, Retro, drawing, retroreflectors
-from catseye.simulator.twin.telescope import Standing, low_orders, turning
+from catseye.simulator.twin.stations import BeamAtMirror, TrueStation, stations
+from catseye.simulator.twin.targets import PRISM_RADIUS, BodyRetroreflector, drawing, retroreflectors
+from catseye.simulator.twin.telescope import TelescopeStanding, low_orders, turning
 
 Array = NDArray[np.float64]
 ASIDE = PRISM_RADIUS + 0.15  # m: how far from the beam a target is looked at closely; bending stays far below
@@ -28,7 +28,7 @@ class StationFrame(NamedTuple):
 
 
 class Beam(NamedTuple):
-    """A beam at k times, ground: where it leaves the mirror (k, 3), m, its direction (k, 3), and `Ray.way` (k,), m."""
+    """A beam at k times, ground: where it leaves the mirror (k, 3), m, direction (k, 3), `BeamAtMirror.way` (k,), m."""
 
     origin: Array
     direction: Array
@@ -45,7 +45,7 @@ class Crowd:
     orders: Array
 
 
-class Scene:
+class TwinPlaces:
     """The places of a site's things.
 
     site   its records
@@ -55,12 +55,12 @@ class Scene:
 
     def __init__(self, site: SiteFolder, *, streams: Streams, planted: Planted):
         draw = drawing(site, streams, planted)
-        self.stations: dict[str, Station] = stations(site, draw)
+        self.stations: dict[str, TrueStation] = stations(site, draw)
         certified = {name: s.place + s.gamma.T @ s.offset for name, s in self.stations.items() if s.body == "ground"}
-        self.retros: dict[str, Retro] = retroreflectors(site, certified, draw)
+        self.retros: dict[str, BodyRetroreflector] = retroreflectors(site, certified, draw)
         for name, s in self.stations.items():  # a ranger shows others the retroreflector in its mirror's back
             rest = s.place if s.body == "arm" else certified[name]
-            self.retros[name] = Retro("hollow", s.body, rest, None, (), USUAL_VOLT["arm"])
+            self.retros[name] = BodyRetroreflector("hollow", s.body, rest, None, (), USUAL_VOLT["arm"])
         self._surface = draw.surface
         self._crowds = {body: self._crowd(body) for body in ("ground", "alidade", "dish", "arm")}
         self._rows = {name: row for crowd in self._crowds.values() for row, name in enumerate(crowd.names)}
@@ -84,7 +84,7 @@ class Scene:
             raise InputError(f"point {name!r} is not at this site (expected a target, a ranger or a ranger's -F)")
         return base if name not in self.retros else name
 
-    def point(self, name: str, seconds: Array, standing: Standing) -> Array:
+    def point(self, name: str, seconds: Array, standing: TelescopeStanding) -> Array:
         """True place of a point (k, 3), m, ground frame."""
         known = self._known(name)
         station = self.stations.get(known)
@@ -96,7 +96,7 @@ class Scene:
             place = self._ridden(self.retros[known].body, [self._rows[known]], standing)[:, 0]
         return place + self._shifts.get(name, 0.0)
 
-    def points(self, names: Iterable[str], seconds: Array, standing: Standing) -> Array:
+    def points(self, names: Iterable[str], seconds: Array, standing: TelescopeStanding) -> Array:
         """True places (k, n, 3), m, ground frame; what rides on one body is done at once."""
         names = list(names)
         found = np.empty((len(seconds), len(names), 3))
@@ -113,7 +113,7 @@ class Scene:
                     found[:, i] += self._shifts[names[i]]
         return found
 
-    def _ridden(self, body: str, rows: list[int], standing: Standing) -> Array:
+    def _ridden(self, body: str, rows: list[int], standing: TelescopeStanding) -> Array:
         """(k, m, 3) of rows of a body's crowd."""
         crowd, (turn, shift) = self._crowds[body], standing.bodies[body]
         rest = crowd.rest[rows]
@@ -122,18 +122,18 @@ class Scene:
             rest = rest + bent[..., None] * crowd.up[rows]
         return rest @ np.swapaxes(turn, -1, -2) + shift[:, None]
 
-    def facing(self, name: str, standing: Standing) -> Array | None:
+    def facing(self, name: str, standing: TelescopeStanding) -> Array | None:
         """Where a retroreflector looks (k, 3), ground frame; None: any way."""
         retro = self.retros[name]
         return None if retro.facing is None else standing.bodies[retro.body].turn @ retro.facing
 
-    def station(self, ranger: str) -> Station:
+    def station(self, ranger: str) -> TrueStation:
         """A ranger. Raises InputError for a stranger."""
         if ranger not in self.stations:
             raise InputError(f"ranger {ranger!r} is not at this site (expected one of {', '.join(self.stations)})")
         return self.stations[ranger]
 
-    def frame(self, ranger: str, seconds: Array, standing: Standing) -> StationFrame:
+    def frame(self, ranger: str, seconds: Array, standing: TelescopeStanding) -> StationFrame:
         """Where a ranger's mirror stands."""
         station = self.station(ranger)
         mirror = station.lambda_ @ station.gamma
@@ -145,13 +145,13 @@ class Scene:
         scan = place + turn @ (station.gamma.T @ station.offset) + self._shifts.get(ranger, 0.0)
         return StationFrame(scan, mirror @ np.swapaxes(turn, -1, -2))
 
-    def beam(self, frame: StationFrame, ray: Ray) -> Beam:
+    def beam(self, frame: StationFrame, ray: BeamAtMirror) -> Beam:
         """A ray of the mirror in the ground frame."""
         turn = frame.mirror_from_ground
         leaves, direction = ((v[:, None] @ turn)[:, 0] for v in (ray.leaves, ray.direction))
         return Beam(frame.scan_point + leaves, direction, ray.way)
 
-    def near(self, beam: Beam, standing: Standing, k: int) -> list[str]:
+    def near(self, beam: Beam, standing: TelescopeStanding, k: int) -> list[str]:
         """Names of what may lie in a beam at its k-th time: rests within `ASIDE` of it, nearest first."""
         found: list[tuple[float, str]] = []
         for body, crowd in self._crowds.items():

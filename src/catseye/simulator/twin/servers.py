@@ -15,9 +15,9 @@ from pathlib import Path
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, ranger_addresses
 from catseye.ranger.handlers.table import file_names, replace_file
-from catseye.ranger.head import Head
-from catseye.ranger.initialisation import Place, files_of_ranger, places_of
-from catseye.ranger.network import Network, Sockets
+from catseye.ranger.head import RangerHead
+from catseye.ranger.initialisation import RangedPoint, files_of_ranger, places_of
+from catseye.ranger.network import ConnectionMaker, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer
 from catseye.ranger.sun_watch import OwnSun, own_sun
@@ -34,7 +34,7 @@ class Served:
     """One ranger: its server, what is wrong with it now, the task that turns it."""
 
     server: ZyServer
-    head: Head
+    head: RangerHead
     gate: Gate = field(default_factory=Gate)
     dead: bool = False
     shut: bool = False
@@ -57,13 +57,13 @@ class TwinSite:
     def __init__(
         self,
         site: SiteFolder,
-        heads: Mapping[str, Head],
+        heads: Mapping[str, RangerHead],
         *,
         world_faults: FaultBoard,
         seconds: Callable[[], float],
         addresses: Addresses = PORT_BASE,
         files: Path | None = None,
-        network: Network | None = None,
+        network: ConnectionMaker | None = None,
     ):
         unknown = sorted(set(heads) - set(site.rangers))
         if unknown:
@@ -132,7 +132,7 @@ class TwinSite:
             self._temporary.cleanup()
             self._temporary, self._folder = None, None
 
-    def _ranger(self, name: str, head: Head) -> Ranger:
+    def _ranger(self, name: str, head: RangerHead) -> Ranger:
         mirror = self.site.mirror_of(name)
         aboard = name not in self.site.monuments
         return Ranger(
@@ -145,7 +145,7 @@ class TwinSite:
             turning=aboard,
         )
 
-    def _write_files(self, ranger: Ranger, places: Mapping[str, Place]) -> None:
+    def _write_files(self, ranger: Ranger, places: Mapping[str, RangedPoint]) -> None:
         if ranger.files is None:
             return
         try:

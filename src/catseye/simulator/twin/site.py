@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
-from catseye.ranger.head import Sampling
+from catseye.ranger.head import SamplingSettings
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
@@ -29,10 +29,10 @@ from catseye.simulator.twin.air import LivingAir, station_places
 from catseye.simulator.twin.conditions import LIVING_NIGHT, LivingConditions
 from catseye.simulator.twin.converter import Converter
 from catseye.simulator.twin.faults import FaultBoard
-from catseye.simulator.twin.motion import Angles, Motion
+from catseye.simulator.twin.motion import AxisAngles, AxisMotion
 from catseye.simulator.twin.returns import Returns
-from catseye.simulator.twin.scene import Beam, Scene, StationFrame
-from catseye.simulator.twin.telescope import Standing, telescope
+from catseye.simulator.twin.scene import Beam, StationFrame, TwinPlaces
+from catseye.simulator.twin.telescope import TelescopeStanding, telescope
 
 Array = NDArray[np.float64]
 NS_PER_TICK = PER_DAY // TICKS_PER_DAY
@@ -41,7 +41,7 @@ POINTS, POINTS_A_SECOND = 17, 125.0  # of a buffer at which a shot's return is l
 RATE_STEP = 1e-3  # s
 
 
-class Drawn(TypedDict):
+class TwinDraws(TypedDict):
     """What every part of a twin is drawn with."""
 
     streams: Streams
@@ -68,20 +68,20 @@ class Twin:
         *,
         seed: int,
         start_mjd: float,
-        motion: Motion,
+        motion: AxisMotion,
         conditions: LivingConditions = LIVING_NIGHT,
         faults: FaultBoard | None = None,
         planted: Planted | None = None,
     ):
         self.site, self.seed = site, seed
         self.faults = FaultBoard() if faults is None else faults
-        drawn: Drawn = {"streams": Streams(seed), "planted": Planted() if planted is None else planted}
+        drawn: TwinDraws = {"streams": Streams(seed), "planted": Planted() if planted is None else planted}
         self._streams, self._planted = drawn["streams"], drawn["planted"]
         self._start_ns = round(start_mjd * PER_DAY)
         self.air = LivingAir.of(site, conditions, start_mjd, **drawn)
         self.telescope = telescope(site, motion, start_mjd, self.air, **drawn)
         self.telescope.angles(np.zeros(1))  # a motion that cannot be is refused here
-        self.scene = Scene(site, **drawn)
+        self.scene = TwinPlaces(site, **drawn)
         self.returns = Returns(self.scene, self.air, site.site.ranging, faults=self.faults, **drawn)
         self._converters = {name: Converter.of(name, seed) for name in self.scene.stations}
         self._weather_at = station_places(site, self._streams)
@@ -108,7 +108,7 @@ class Twin:
 
     # Places ---------------------------------------------------------------------------------------------------------
 
-    def posture(self, seconds: ArrayLike) -> Angles:
+    def posture(self, seconds: ArrayLike) -> AxisAngles:
         """What the telescope's encoders tell: angles (k,), rad, and rates (k,), rad/s."""
         return self.telescope.told(_times(seconds))
 
@@ -116,7 +116,7 @@ class Twin:
         """The same at one instant, as the site's feed says it."""
         return LivePosture(ticks, *(float(values[0]) for values in self.posture(self.seconds_of_ticks(ticks))))
 
-    def standing(self, seconds: ArrayLike) -> Standing:
+    def standing(self, seconds: ArrayLike) -> TelescopeStanding:
         """Where the telescope's bodies stand."""
         return self.telescope.standing(_times(seconds))
 
@@ -151,7 +151,7 @@ class Twin:
         t = _times(seconds)
         return self._counts(ranger, name, t, self.telescope.standing(t))
 
-    def _counts(self, ranger: str, name: str, t: Array, standing: Standing) -> Array:
+    def _counts(self, ranger: str, name: str, t: Array, standing: TelescopeStanding) -> Array:
         station = self.scene.station(ranger)
         if name == REFERENCE:
             return np.broadcast_to(station.zrg, (len(t), 2))
@@ -202,7 +202,7 @@ class Twin:
 
         Without servers and servos, for tests and scatter. The stamp is rounded to the nearest tick.
         """
-        sampling = Sampling(samples, cycles, if_hz)
+        sampling = SamplingSettings(samples, cycles, if_hz)
         t = seconds + np.linspace(0.0, sampling.duration, max(POINTS, round(sampling.duration * POINTS_A_SECOND)))
         standing = self.telescope.standing(t)
         aimed = self._counts(ranger, target, t, standing)

@@ -27,7 +27,7 @@ U_MOUNT, U_ZERO = 30e-6, 0.3  # rad, counts: of orientation and encoder zeros wh
 SINK, SWAY, LEAN = 2e-6 / 3600.0, 15e-6, 5e-6  # m/s, one sigma; m and rad through a day: how monuments settle, chosen
 
 
-class Ray(NamedTuple):
+class BeamAtMirror(NamedTuple):
     """A beam in mirror axes at k settings: where it leaves the face (k, 3), m; its direction (k, 3); the way (k,), m,
     from the plane across the azimuth axis through the scan point to the face, below zero where it is met before."""
 
@@ -37,7 +37,7 @@ class Ray(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Station:
+class TrueStation:
     """A ranger: what is true of it.
 
     body            that carries it: "ground" or "arm"
@@ -78,7 +78,7 @@ class Station:
         day = seconds[:, None] * (TWO_PI / 86_400.0)
         return self.place + self.sinks * seconds[:, None] + self.sways * np.sin(day), self.leans * np.sin(day)
 
-    def ray(self, counts: ArrayLike) -> Ray:
+    def ray(self, counts: ArrayLike) -> BeamAtMirror:
         """The beam at what the encoders read (k, 2)."""
         turns = (np.asarray(counts, dtype=float) - self.zeros) * (TWO_PI / COUNTS_PER_TURN)
         read = turns
@@ -97,7 +97,7 @@ class Station:
         with np.errstate(divide="ignore", invalid="ignore"):
             way = (out + face_offset - face @ start) / against
             leaves = start + way[:, None] * laser
-            return Ray(leaves, laser - 2.0 * against[:, None] * face, way)
+            return BeamAtMirror(leaves, laser - 2.0 * against[:, None] * face, way)
 
     def _high(self, turns: Array) -> Array:
         """What the encoders read too high (k, 2), counts, with the axes turned by (k, 2), rad."""
@@ -125,7 +125,7 @@ class Station:
         return read
 
 
-def reference_cube(station: Station) -> tuple[Array, float]:
+def reference_cube(station: TrueStation) -> tuple[Array, float]:
     """Where the internal cube stands (3,), m, mirror axes, in the middle of its beam, D0 from the scan point; and the
     way of the light to it, m."""
     ray = station.ray(station.zrg[None])
@@ -135,7 +135,7 @@ def reference_cube(station: Station) -> tuple[Array, float]:
     return leaves + length * direction, way + float(length)
 
 
-def stations(site: SiteFolder, draw: Drawing) -> dict[str, Station]:
+def stations(site: SiteFolder, draw: Drawing) -> dict[str, TrueStation]:
     """Every ranger of a site, by name, sorted."""
     found = {}
     arm = {ranger.name: ranger for ranger in site.feedarm.ranger}
@@ -183,7 +183,7 @@ def _station(
     place: Array,
     gamma: Array,
     settle: Array,
-) -> Station:
+) -> TrueStation:
     """The head and mirror of a ranger, by their sheet and its uncertainties."""
     gain = planted.gain("calibration")
 
@@ -198,7 +198,7 @@ def _station(
     axes = [mirror.axis_offset_mm, mirror.mirror_offset_mm, mirror.beam_x_mm, mirror.beam_y_mm]
     tilts = [mirror.face_tilt_rad, mirror.beam_tilt_x_rad, mirror.beam_tilt_y_rad]
     offset = true([mirror.dx_mm, mirror.dy_mm, mirror.dz_mm], mirror.u_offset_mm, MILLIMETRE)
-    return Station(
+    return TrueStation(
         name,
         body,
         place,

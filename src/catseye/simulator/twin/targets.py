@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.target import FrameName
-from catseye.records.site.target import Target as TargetRecord
-from catseye.records.site.triplet import Triplet, TripletPrism
+from catseye.records.site.target import TargetRow as TargetRecord
+from catseye.records.site.triplet import TripletPrism, TripletRecord
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import BENCHMARK_VOLT, USUAL_VOLT
 from catseye.simulator.night.structure import tilted, unit
@@ -24,7 +24,7 @@ PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: how far off its middle a beam sti
 
 
 @dataclass(frozen=True, eq=False)
-class Retro:
+class BodyRetroreflector:
     """A retroreflector in the frame of its body.
 
     kind     "prism", "ball" or "hollow"
@@ -49,7 +49,7 @@ class Retro:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class TrueSurface:
     """The design paraboloid, and the true dish's normal deviations from it.
 
     focal_length, centre (2,), radius   m
@@ -62,12 +62,12 @@ class Surface:
     orders: Array
 
     @staticmethod
-    def of(site: SiteFolder, streams: Streams, planted: Planted) -> "Surface":
+    def of(site: SiteFolder, streams: Streams, planted: Planted) -> "TrueSurface":
         p = site.site.paraboloid
         size = planted.gain("surface") * SURFACE_MM * MILLIMETRE / np.sqrt(6.0)
         centre = np.array(p.aperture_centre_mm) * MILLIMETRE
         orders = size * streams("surface").normal(size=6)
-        return Surface(p.focal_length_mm * MILLIMETRE, centre, p.aperture_radius_mm * MILLIMETRE, orders)
+        return TrueSurface(p.focal_length_mm * MILLIMETRE, centre, p.aperture_radius_mm * MILLIMETRE, orders)
 
     def height(self, xy: Array) -> Array:
         """z of the design (...) at (..., 2), m."""
@@ -89,7 +89,7 @@ class Drawing:
 
     streams: Streams
     planted: Planted
-    surface: Surface
+    surface: TrueSurface
 
     def typed(self, rng: np.random.Generator, u_mm: float | None, shape: int = 3) -> Array:
         """True minus typed coordinates, m."""
@@ -103,10 +103,10 @@ class Drawing:
 
 def drawing(site: SiteFolder, streams: Streams, planted: Planted) -> Drawing:
     """The drawing of a site."""
-    return Drawing(streams, planted, Surface.of(site, streams, planted))
+    return Drawing(streams, planted, TrueSurface.of(site, streams, planted))
 
 
-def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Drawing) -> dict[str, Retro]:
+def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Drawing) -> dict[str, BodyRetroreflector]:
     """Every single target and triplet part of a site.
 
     scan_points   true, ground frame, of the rangers from which benchmarks are certified
@@ -120,11 +120,11 @@ def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Dr
             station, old = scan_points[row.ranger], found[row.target]
             miss = gain * row.u_mm * draw.streams(f"benchmark/{row.target}").normal()
             rest = station + unit(old.rest - station) * (row.certified_distance_mm + miss) * MILLIMETRE
-            found[row.target] = Retro(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
+            found[row.target] = BodyRetroreflector(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
     return found
 
 
-def single(record: TargetRecord, draw: Drawing) -> Retro:
+def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:
     """The truth of one target: on the dish it slides along the surface by typing, and off it by the deviations."""
     rng = draw.streams(f"place/{record.name}")
     miss, rough, lean = draw.typed(rng, record.u_position_mm), rng.normal(), rng.normal(size=3)
@@ -147,10 +147,10 @@ def single(record: TargetRecord, draw: Drawing) -> Retro:
         sizes = ((record.height_mm + u * rng.normal()) * MILLIMETRE,)
     body = draw.body(record.frame, rest)
     volts = USUAL_VOLT["hollow" if facing is None else "dish" if body == "dish" else "prism"]
-    return Retro(record.type, body, rest, facing, sizes, volts)
+    return BodyRetroreflector(record.type, body, rest, facing, sizes, volts)
 
 
-def triplet(record: Triplet, draw: Drawing) -> dict[str, Retro]:
+def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflector]:
     """Prisms and ball as they truly are, by the data sheet and its u (as `simulator.night.structure.triplet`)."""
     rng, gain = draw.streams(f"place/{record.triplet}"), draw.planted.gain
     ball = np.array(record.nominal_position_mm) * MILLIMETRE + draw.typed(rng, record.u_position_mm)
@@ -169,12 +169,14 @@ def triplet(record: Triplet, draw: Drawing) -> dict[str, Retro]:
         for r in (record.ball.r1_mm, record.ball.r2_mm)
     )
 
-    def prism(side: TripletPrism, sign: float) -> Retro:
+    def prism(side: TripletPrism, sign: float) -> BodyRetroreflector:
         height = (side.height_mm + gain("calibration") * side.u_height_mm * rng.normal()) * MILLIMETRE
-        return Retro("prism", body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["prism"])
+        return BodyRetroreflector(
+            "prism", body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["prism"]
+        )
 
     return {
         record.left_prism.target: prism(record.left_prism, -1.0),
         record.right_prism.target: prism(record.right_prism, 1.0),
-        record.ball.target: Retro("ball", body, ball, -normal, (r1, r2), USUAL_VOLT["ball"]),
+        record.ball.target: BodyRetroreflector("ball", body, ball, -normal, (r1, r2), USUAL_VOLT["ball"]),
     }

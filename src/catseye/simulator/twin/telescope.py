@@ -17,7 +17,7 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.twin.air import LivingAir
-from catseye.simulator.twin.motion import Angles, Motion
+from catseye.simulator.twin.motion import AxisAngles, AxisMotion
 from catseye.simulator.twin.waves import Waves, band, joined
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Body(NamedTuple):
     shift: Array
 
 
-class Standing(NamedTuple):
+class TelescopeStanding(NamedTuple):
     """The telescope at k times: its bodies, and what its surface's low orders are (k, 6), m along the normals."""
 
     bodies: dict[str, Body]
@@ -85,7 +85,7 @@ class Telescope:
     encoder          (2, 2, 3) rad: cosines and sines of both encoders' errors by `ENCODER_ORDERS`
     """
 
-    motion: Motion
+    motion: AxisMotion
     latitude: float
     start_mjd: float
     air: LivingAir
@@ -102,11 +102,11 @@ class Telescope:
     tilt: Array
     encoder: Array
 
-    def angles(self, seconds: Array) -> Angles:
+    def angles(self, seconds: Array) -> AxisAngles:
         """Where the axes truly are, at times (k,)."""
         return self.motion.angles(seconds, latitude=self.latitude, start_mjd=self.start_mjd)
 
-    def told(self, seconds: Array) -> Angles:
+    def told(self, seconds: Array) -> AxisAngles:
         """What the encoders tell, at times (k,)."""
         true, told = self.angles(seconds), []
         for axis in (0, 1):
@@ -115,9 +115,9 @@ class Telescope:
             error = np.cos(wave) @ cosine + np.sin(wave) @ sine
             slope = np.cos(wave) @ (ENCODER_ORDERS * sine) - np.sin(wave) @ (ENCODER_ORDERS * cosine)
             told.append((true[axis] + error, true[axis + 2] * (1.0 + slope)))
-        return Angles(told[0][0], told[1][0], told[0][1], told[1][1])
+        return AxisAngles(told[0][0], told[1][0], told[0][1], told[1][1])
 
-    def standing(self, seconds: Array) -> Standing:
+    def standing(self, seconds: Array) -> TelescopeStanding:
         """Where all stands at times (k,), s since the start."""
         a, e, _, _ = self.angles(seconds)
         steel = self.air.steel_c(seconds)[:, None]
@@ -145,7 +145,7 @@ class Telescope:
             "dish": Body(dish, dish_shift),
             "arm": Body(dish @ bend, arm_shift),
         }
-        return Standing(bodies, bent[:, 3:] + warm[:, 4:])
+        return TelescopeStanding(bodies, bent[:, 3:] + warm[:, 4:])
 
     def _leaning(self, azimuth: Array) -> Array:
         """Turn of the alidade (k, 3, 3) by the bearing's lean."""
@@ -156,7 +156,7 @@ class Telescope:
 
 
 def telescope(
-    site: SiteFolder, motion: Motion, start_mjd: float, air: LivingAir, *, streams: Streams, planted: Planted
+    site: SiteFolder, motion: AxisMotion, start_mjd: float, air: LivingAir, *, streams: Streams, planted: Planted
 ) -> Telescope:
     """The telescope of a site, drawn."""
     rest = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)

@@ -8,21 +8,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.estimation.network.approximate.start import approximate
-from catseye.estimation.network.model import Network, Parameter, Points
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
 from catseye.estimation.observations.kinds import (
-    Angles,
     Azimuths,
-    Coordinates,
     Directions,
     DistanceDifferences,
     Distances,
     FixedDistances,
     FramePoints,
     HeightDifferences,
+    HorizontalAngles,
     HorizontalDistances,
     Inclinations,
     Joint,
     LevelPlanes,
+    ObservedCoordinates,
     RigidBodies,
     Vectors,
     ZenithAngles,
@@ -57,7 +57,7 @@ class Survey:
         return np.array(values) + self.rng.normal(size=len(values)) * sigma * self.noise
 
     def parameter(self, true, unit="rad", **more):
-        self.parameters.append(Parameter(f"parameter {len(self.parameters)}", unit=unit, **more))
+        self.parameters.append(NetworkParameter(f"parameter {len(self.parameters)}", unit=unit, **more))
         self.expected[len(self.parameters) - 1] = true
         return 3 * len(self.names) + len(self.parameters) - 1
 
@@ -98,7 +98,7 @@ class Survey:
         v = self.noisy([clockwise(*pair) for pair in triples], ANGLE)
         back, fore = zip(*triples, strict=True)
         columns = self.at(*[at] * len(v)), self.at(*back), self.at(*fore)
-        self.groups.append(Angles("angles", v, np.full(len(v), ANGLE**2), *columns))
+        self.groups.append(HorizontalAngles("angles", v, np.full(len(v), ANGLE**2), *columns))
         return self
 
     def vectors(self, origin, *targets):
@@ -116,8 +116,8 @@ class Survey:
         for name in unknown:
             xyz[self.names.index(name)] = np.nan
         none = np.zeros(xyz.shape, dtype=bool)
-        points = Points(tuple(self.names), xyz, none, none)
-        return Network(points, tuple(self.parameters), tuple(self.groups))
+        points = NetworkPoints(tuple(self.names), xyz, none, none)
+        return ObservationNetwork(points, tuple(self.parameters), tuple(self.groups))
 
     def found(self, *unknown, within=0.02):
         """Everything is found, near the truth, and the orientations with it."""
@@ -373,7 +373,7 @@ def test_an_observed_coordinate_places_a_point_and_a_known_height_chooses_betwee
     survey = Survey(POINT)
     for column, axis in ((12, 0), (12, 1), (12, 2)):
         observed = np.array([survey.true[4, axis]])
-        survey.groups.append(Coordinates("c", observed, np.full(1, 1e-6), np.array([column]), np.array([axis])))
+        survey.groups.append(ObservedCoordinates("c", observed, np.full(1, 1e-6), np.array([column]), np.array([axis])))
     survey.found("P")
     survey = Survey(POINT).ranges("A", "P").ranges("B", "P").ranges("C", "P")
     network = survey.network("P")

@@ -9,7 +9,7 @@ from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.approximate.given import disagreeing
 from catseye.estimation.network.approximate.sightings import sightings
 from catseye.estimation.network.approximate.start import approximate
-from catseye.estimation.network.model import Network, Parameter, Points
+from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
 from catseye.estimation.observations.kinds import Directions, Distances, HorizontalDistances, ZenithAngles
 
 S, T = 8, 30
@@ -34,7 +34,7 @@ def ranging(true, rng):
     datum = np.zeros(true.shape, dtype=bool)
     datum[:S] = True
     names = tuple([f"S{k}" for k in range(S)] + [f"P{k}" for k in range(T)])
-    return Network(Points(names, true, np.zeros_like(datum), datum), (), (group,))
+    return ObservationNetwork(NetworkPoints(names, true, np.zeros_like(datum), datum), (), (group,))
 
 
 def given_as(network, xyz):
@@ -186,8 +186,10 @@ def survey(true, turns=(2.0, -2.0, 1.1)):
         Directions("d", reading, np.full(m, 1e-10), *ends, orientation=3 * len(true) + station),
     )
     nothing = np.zeros(true.shape, dtype=bool)
-    sets = tuple(Parameter(f"set {k}", unit="rad") for k in range(3))
-    return Network(Points(tuple(f"P{k}" for k in range(len(true))), true, nothing, nothing), sets, groups)
+    sets = tuple(NetworkParameter(f"set {k}", unit="rad") for k in range(3))
+    return ObservationNetwork(
+        NetworkPoints(tuple(f"P{k}" for k in range(len(true))), true, nothing, nothing), sets, groups
+    )
 
 
 def test_exchanged_points_of_a_level_network_are_placed_anew():

@@ -13,7 +13,7 @@ from catseye.errors import EstimationError, InputError
 from catseye.estimation.network.positions import dispatch as module
 from catseye.estimation.network.positions.descent import CAP, Ranges, descend
 from catseye.estimation.network.positions.dispatch import positions
-from catseye.estimation.network.positions.status import Status
+from catseye.estimation.network.positions.status import PositionStatus
 from draws import draws
 from repository import TESTS
 
@@ -108,8 +108,10 @@ def awkward():
     d[10] = apart(stations[0] + [2e-5, 0, 0], stations)
     d[10, 5:] = np.nan
     expected = [
-        Status.FOUND, Status.TOO_FEW, Status.COLLINEAR, Status.AMBIGUOUS, Status.CONTRADICTING, Status.NOT_HELD,
-        Status.DISJOINT, Status.REFUSED, Status.REFUSED, Status.TOO_FEW, Status.AT_STATION, Status.FOUND,
+        PositionStatus.FOUND, PositionStatus.TOO_FEW, PositionStatus.COLLINEAR, PositionStatus.AMBIGUOUS,
+        PositionStatus.CONTRADICTING, PositionStatus.NOT_HELD,
+        PositionStatus.DISJOINT, PositionStatus.REFUSED, PositionStatus.REFUSED,
+        PositionStatus.TOO_FEW, PositionStatus.AT_STATION, PositionStatus.FOUND,
     ]  # fmt: skip
     return stations, targets, d, np.full(8, 5e-5), expected
 
@@ -119,8 +121,8 @@ def awkward():
 def test_every_kind_of_trouble_ends_in_its_status_at_any_scale(compiled, scale):
     stations, targets, d, u, expected = awkward()
     got = positions(stations * scale, d * scale, u * scale, compiled=compiled)
-    assert [Status(s).name for s in got.status] == [s.name for s in expected]
-    answered = got.status <= Status.CONTRADICTING
+    assert [PositionStatus(s).name for s in got.status] == [s.name for s in expected]
+    answered = got.status <= PositionStatus.CONTRADICTING
     assert np.isfinite(got.x[answered]).all()
     assert np.isfinite(got.covariance[answered]).all()
     assert np.isnan(got.x[~answered]).all()
@@ -152,7 +154,7 @@ def test_near_takes_the_image_on_its_side_of_coplanar_stations(seed):
     d = apart(above[:, None], stations)
     u = np.full(5, 1e-4)
     for compiled in (False, True):
-        assert (positions(stations, d, u, compiled=compiled).status == Status.AMBIGUOUS).all()
+        assert (positions(stations, d, u, compiled=compiled).status == PositionStatus.AMBIGUOUS).all()
         for x in (above, below):
             got = positions(stations, d, u, near=x.mean(axis=0), compiled=compiled).require_found()
             np.testing.assert_allclose(got.x, x, atol=1e-9)
@@ -161,7 +163,12 @@ def test_near_takes_the_image_on_its_side_of_coplanar_stations(seed):
         np.testing.assert_allclose(got.x, mixed, atol=1e-9)
         mixed[2] = np.nan
         got = positions(stations, d, u, near=mixed, compiled=compiled)
-        assert got.status.tolist() == [Status.FOUND, Status.FOUND, Status.AMBIGUOUS, Status.FOUND]
+        assert got.status.tolist() == [
+            PositionStatus.FOUND,
+            PositionStatus.FOUND,
+            PositionStatus.AMBIGUOUS,
+            PositionStatus.FOUND,
+        ]
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -172,8 +179,8 @@ def test_nearly_coplanar_stations_tell_the_side_when_they_can_and_say_so_when_th
         stations, targets, _ = hall(6, 300, s=6, flat=relief / 60)
         d = apart(targets[:, None], stations) + 5e-5 * np.random.default_rng(1).normal(size=(300, 6))
         got = positions(stations, d, np.full(6, 5e-5), compiled=compiled)
-        assert np.isin(got.status, [Status.FOUND, Status.AMBIGUOUS]).all()
-        found = got.status == Status.FOUND
+        assert np.isin(got.status, [PositionStatus.FOUND, PositionStatus.AMBIGUOUS]).all()
+        found = got.status == PositionStatus.FOUND
         assert (apart(got.x[found], targets[found]) < 0.01).all()
         counts[relief] = int(found.sum())
     assert counts[1e-6] == 0
@@ -199,7 +206,10 @@ def test_a_negative_range_is_refused_even_where_its_sigma_would_excuse_it(compil
     d = np.repeat(apart(x, stations)[None], 2, axis=0)
     d[1, 0] = -0.1
     u = np.where(np.arange(18) == 0, 1.0, 5e-5)
-    assert positions(stations, d, u, compiled=compiled).status.tolist() == [Status.FOUND, Status.REFUSED]
+    assert positions(stations, d, u, compiled=compiled).status.tolist() == [
+        PositionStatus.FOUND,
+        PositionStatus.REFUSED,
+    ]
 
 
 def test_a_wrong_near_does_not_overrule_ranges_that_know_better():
@@ -244,11 +254,11 @@ def test_the_compiled_form_itself_finds_targets_from_any_subset(missing, monkeyp
             left = counted(monkeypatch)
             fast = positions(stations, d, u, compiled=True)
             monkeypatch.undo()
-            assert sum(left) <= 7 + np.sum(plain.status != Status.FOUND)
+            assert sum(left) <= 7 + np.sum(plain.status != PositionStatus.FOUND)
             assert fast.status.tolist() == plain.status.tolist()
             assert fast.ranges.tolist() == plain.ranges.tolist()
             same = np.abs(fast.x - plain.x) <= 1e-5 * np.sqrt(np.einsum("tii->ti", plain.covariance)) + 1e-11
-            assert same[plain.status == Status.FOUND].all()
+            assert same[plain.status == PositionStatus.FOUND].all()
 
 
 def test_the_compiled_form_takes_the_near_image_of_the_stations_that_each_target_is_seen_from(monkeypatch):
@@ -259,12 +269,12 @@ def test_the_compiled_form_takes_the_near_image_of_the_stations_that_each_target
         row[rng.permutation(6)[3:]] = np.nan
     left = counted(monkeypatch)
     got = positions(stations, d, np.full(6, 1e-5), near=targets, compiled=True)
-    found = got.status == Status.FOUND
+    found = got.status == PositionStatus.FOUND
     assert found.mean() > 0.95
     assert sum(left) <= np.sum(~found) + 8
     assert (apart(got.x[found], targets[found]) < 1e-6).all()
     mirrored = positions(stations, d, np.full(6, 1e-5), compiled=True)
-    assert (mirrored.status[found] == Status.AMBIGUOUS).all()
+    assert (mirrored.status[found] == PositionStatus.AMBIGUOUS).all()
 
 
 @draws(60)
@@ -278,7 +288,7 @@ def test_no_target_is_found_on_the_side_that_near_excludes(compiled, runs):
         x = np.concatenate([rng.uniform(-60, 60, (400, 2)), 10 ** rng.uniform(-1.5, 2, (400, 1))], axis=1)
         d = np.abs(apart(x[:, None], stations) + u * rng.normal(size=(400, s)))
         got = positions(stations, d, u, near=x, compiled=compiled)
-        assert not (got.x[got.status == Status.FOUND, 2] <= 0.0).any()
+        assert not (got.x[got.status == PositionStatus.FOUND, 2] <= 0.0).any()
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -313,7 +323,7 @@ def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly(runs)
         d[rng.random(d.shape) < 0.1] = np.nan
         plain, fast = (positions(stations, d, u, near=x if k % 3 else None, compiled=c) for c in (False, True))
         assert fast.status.tolist() == plain.status.tolist()
-        answered = plain.status <= Status.CONTRADICTING
+        answered = plain.status <= PositionStatus.CONTRADICTING
         sigma = np.sqrt(np.trace(plain.covariance[answered], axis1=1, axis2=2))
         assert (apart(fast.x[answered], plain.x[answered]) <= 1e-3 * sigma).all()
 
@@ -325,8 +335,8 @@ def test_undamped_steps_pass_a_narrow_valley_where_damped_ones_creep():
     u = np.array([1e-5, 1e-5, 1e-5, 10.0, 10.0, 10.0])
     d = apart(targets[:, None], stations) + u * rng.normal(size=(200, 6))
     got = positions(stations, d, u, near=targets)
-    assert (got.status == Status.FOUND).mean() > 0.9
-    for t in np.flatnonzero(got.status == Status.FOUND)[:20]:
+    assert (got.status == PositionStatus.FOUND).mean() > 0.9
+    for t in np.flatnonzero(got.status == PositionStatus.FOUND)[:20]:
         x, _, pvv = by_scipy(stations, d[t], u, got.x[t])
         assert apart(x, got.x[t]) < 1e-3 * np.sqrt(np.trace(got.covariance[t]))
         assert got.pvv[t] == pytest.approx(pvv, rel=1e-4, abs=1e-4)
@@ -417,8 +427,8 @@ def test_near_the_stations_plane_an_ellipsoid_is_given_only_where_it_holds():
         x = np.array([10.0, 5, height * unit])
         d = apart(x, stations) + 5e-5 * rng.normal(size=(1000, 4))
         got = positions(stations, d, np.full(4, 5e-5), near=np.array([0.0, 0, 9]))
-        found = got.status == Status.FOUND
-        assert np.isin(got.status[~found], [Status.NOT_HELD]).all()
+        found = got.status == PositionStatus.FOUND
+        assert np.isin(got.status[~found], [PositionStatus.NOT_HELD]).all()
         share.append(found.mean())
         if height >= 3.0:
             e = got.x[found] - x
@@ -435,7 +445,7 @@ def test_a_blunder_far_from_convergence_is_no_silent_answer():
     wrong = d[:, [1, 0, 2, 3, 4, 5]]
     for compiled in (False, True):
         got = positions(stations, wrong, np.full(6, 5e-5), compiled=compiled)
-        assert (got.status != Status.FOUND).mean() > 0.98  # a target midway between the two is no blunder
+        assert (got.status != PositionStatus.FOUND).mean() > 0.98  # a target midway between the two is no blunder
         assert (got.iterations <= CAP).all()
 
 
@@ -464,7 +474,7 @@ def test_a_sigma_that_is_no_sigma_refuses_its_target_alone():
     d[3, 3], u[3, 3] = np.nan, np.nan  # a missing range needs none
     for compiled in (False, True):
         got = positions(stations, d, u, compiled=compiled)
-        assert got.status.tolist() == [Status.REFUSED] * 3 + [Status.FOUND]
+        assert got.status.tolist() == [PositionStatus.REFUSED] * 3 + [PositionStatus.FOUND]
 
 
 @pytest.mark.slow

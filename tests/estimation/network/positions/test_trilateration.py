@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
-from catseye.estimation.network.positions.status import Status
+from catseye.estimation.network.positions.status import PositionStatus
 from catseye.estimation.network.positions.trilateration import (
     trilaterate,
     trilaterate_by_averaging,
@@ -50,7 +50,7 @@ def test_both_points_are_at_the_three_distances_and_the_first_is_on_the_right_ha
     s, x = triangle(rng, 5)
     d = apart(x[:, None], s)
     both = trilaterate(s, d)
-    assert (both.status == Status.FOUND).all()
+    assert (both.status == PositionStatus.FOUND).all()
     np.testing.assert_allclose(apart(both.x[:, :, None], s[:, None]), np.repeat(d[:, None], 2, axis=1), atol=1e-11)
     assert (np.min(apart(both.x, x[:, None]), axis=1) < 1e-11).all()
     n = np.cross(s[:, 1] - s[:, 0], s[:, 2] - s[:, 0])
@@ -84,13 +84,13 @@ def test_the_closed_form_keeps_the_digits_that_the_geometry_leaves():
 def test_ranges_that_do_not_meet_say_by_how_much():
     s = np.array([[0.0, 0, 0], [60, 0, 0], [0, 80, 0]])
     short = trilaterate(s, np.array([40.0, 40, 40]))  # the centre of the circle through them is 50 m from each
-    assert short.status == Status.DISJOINT
+    assert short.status == PositionStatus.DISJOINT
     np.testing.assert_allclose(short.misclosure, 10.0, rtol=1e-12)
     assert np.isnan(short.x).all()
     long = trilaterate(s, np.array([200.0, 30, 90]))  # one sphere holds another: no triangle inequality
-    assert long.status == Status.DISJOINT
+    assert long.status == PositionStatus.DISJOINT
     mended = trilaterate(s, np.array([200.0, 30, 90]) + long.misclosure * (1 + 1e-9))
-    assert mended.status == Status.FOUND
+    assert mended.status == PositionStatus.FOUND
     assert mended.height < 0.1
     assert (trilaterate(s, np.array([50.0, 50, 50.0])).height == 0.0).all()  # touching, to rounding
 
@@ -98,11 +98,11 @@ def test_ranges_that_do_not_meet_say_by_how_much():
 def test_stations_on_a_line_and_impossible_numbers_have_their_status():
     line = np.array([[0.0, 0, 0], [1, 2, 3], [3, 6, 9]])
     x = np.array([5.0, 1, 1])
-    assert trilaterate(line, apart(x, line)).status == Status.COLLINEAR
-    assert trilaterate(line * 1e-9, apart(x, line) * 1e-9).status == Status.COLLINEAR
+    assert trilaterate(line, apart(x, line)).status == PositionStatus.COLLINEAR
+    assert trilaterate(line * 1e-9, apart(x, line) * 1e-9).status == PositionStatus.COLLINEAR
     s = np.array([[0.0, 0, 0], [60, 0, 0], [0, 80, 0]])
     wrong = trilaterate(s, np.array([[-50.0, 60, 60], [np.nan, 60, 60], [np.inf, 60, 60], [60, 60, 60]]))
-    assert wrong.status.tolist() == [Status.REFUSED] * 3 + [Status.FOUND]
+    assert wrong.status.tolist() == [PositionStatus.REFUSED] * 3 + [PositionStatus.FOUND]
     assert np.isnan(wrong.x[:3]).all()
     assert np.isfinite(wrong.x[3]).all()
     with pytest.raises(InputError, match=r"\(\.\.\., 3, 3\)"):
@@ -193,7 +193,7 @@ def test_the_iteration_ends_at_the_closed_forms_point_on_the_side_of_its_start(s
     n = np.cross(s[:, 1] - s[:, 0], s[:, 2] - s[:, 0])
     start = s.mean(axis=1) + rng.uniform(0.1, 100, (6, 1)) * n / np.linalg.norm(n, axis=1, keepdims=True)
     found = trilaterate_by_averaging(s, d, start)
-    assert (found.status == Status.FOUND).all()
+    assert (found.status == PositionStatus.FOUND).all()
     np.testing.assert_allclose(found.x, both.x[:, 0], atol=1e-9)
     assert (found.iterations < 25).all()  # from 0.1 m to 100 m Heron halves ten times, then squares
 
@@ -210,7 +210,7 @@ def test_the_iteration_at_its_cap_and_from_the_plane_says_so():
     s = np.array([[0.0, 0, 0], [60, 0, 0], [0, 80, 0]])
     start = np.array([[20.0, 20, 50], [20, 20, 0]])
     got = trilaterate_by_averaging(s, np.array([[40.0, 40, 40], [60, 60, 60]]), start)
-    assert got.status.tolist() == [Status.NOT_CONVERGED, Status.NOT_HELD]
+    assert got.status.tolist() == [PositionStatus.NOT_CONVERGED, PositionStatus.NOT_HELD]
     assert got.iterations.tolist() == [50, 1]
     assert got.difference[0] > 1e-9
     assert np.isnan(got.x[1]).all()

@@ -24,11 +24,11 @@ def test_a_polygon_gives_back_the_waves_in_the_records_keys():
 
 def test_the_record_is_read_by_the_pointing_as_what_the_encoder_reads_too_high():
     from catseye.geometry.mirror.imperfect import Imperfections, imperfect_ray
-    from catseye.geometry.mirror.pointing import Station, ray
+    from catseye.geometry.mirror.pointing import MirrorStation, ray
 
     found = calibrated(*polygon(TRUTH)).record
     psi = 1.1
-    station = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([2691.0, 1434.0]))
+    station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([2691.0, 1434.0]))
     read = 2691.0 + PER_RADIAN * psi + waves(psi, TRUTH["cosine"], TRUTH["sine"])
     both = np.array([found["azimuth_encoder_cosine_counts"], found["azimuth_encoder_sine_counts"]])
     real = imperfect_ray(station, Imperfections(np.zeros(4), np.zeros(3), both, np.zeros((2, 0))), [read, 9000.0])

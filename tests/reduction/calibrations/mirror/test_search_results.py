@@ -85,11 +85,11 @@ def test_prime_pointings_and_whole_turns_serve_as_well():
 
 
 def test_the_covariance_of_a_linear_adjustment_by_hand():
-    from catseye.geometry.mirror.pointing import Station, counts_jacobian
+    from catseye.geometry.mirror.pointing import MirrorStation, counts_jacobian
 
     truth, u = station_truth()
     found = calibrated(truth, u_counts=0.5, u_target_mm=3.0)
-    by_point, by_station = counts_jacobian(Station.of_parameters(truth), field())
+    by_point, by_station = counts_jacobian(MirrorStation.of_parameters(truth), field())
     normal = np.diag(u**-2.0)
     for point, station in zip(by_point, by_station, strict=True):
         normal += station.T @ np.linalg.inv(0.25 * np.eye(2) + 9e-6 * point @ point.T) @ station

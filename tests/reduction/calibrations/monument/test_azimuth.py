@@ -228,7 +228,7 @@ def test_polaris_gives_the_frame_s_north_not_the_star_s():
         deflection = (4 * ARCSECOND, -9 * ARCSECOND)
         pole = [float(v.to_value("arcsec")) for v in iers.IERS_B.open().pm_xy(2_400_000.5, mjd)]
         reading = polaris(mjd, deflection, ut1=-0.31)
-    from catseye.records.files.readings import Readings
+    from catseye.records.files.readings import SheetReadings
 
     keys = {**SHEET, "xi_arcsec": 4.0, "eta_arcsec": -9.0, "ut1_utc_s": -0.31, "u_ut1_utc_s": 0.0}
     keys |= {"pole_x_arcsec": pole[0], "pole_y_arcsec": pole[1], "u_pole_arcsec": 0.0}
@@ -236,7 +236,7 @@ def test_polaris_gives_the_frame_s_north_not_the_star_s():
 
     def found(**sheet):
         return calibrate_azimuth(
-            Readings(
+            SheetReadings(
                 file="t.csv",
                 sheet=LAYOUT.sheet.model_validate({"kind": LAYOUT.kind, **PROVENANCE, **keys, **sheet}),
                 sheet_file="t.toml",

@@ -5,14 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from catseye.estimation.network.approximate.sightings import parts_of
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.kinds import FramePoints, RigidBodies
 from catseye.estimation.shapes.rigid_body import closed_form
 from catseye.geometry.frames.rotation import to_vector
 
 
-def bodies_of(network: Network, values: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+def bodies_of(
+    network: ObservationNetwork, values: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Points (k,), their coordinates in the body (k, 3), pose columns (6,) and R0 of each body or frame."""
     whole = np.concatenate([np.zeros(3 * len(network.points.names)), values])
     for group, _ in parts_of(network):
@@ -29,7 +31,7 @@ def bodies_of(network: Network, values: np.ndarray) -> Iterator[tuple[np.ndarray
             yield group.point[at] // 3, local[at], columns, start[at[0]]
 
 
-def poses(network: Network, xyz: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, float]]:
+def poses(network: ObservationNetwork, xyz: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, float]]:
     """Column and start of each pose whose six parameters are unknown, from at least three placed points off a line."""
     for point, local, columns, start in bodies_of(network, values):
         motion = rigid_motion(local, xyz[point])

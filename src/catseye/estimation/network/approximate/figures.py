@@ -5,7 +5,7 @@ from collections import Counter, defaultdict
 import numpy as np
 
 from catseye.estimation.network.approximate.bodies import rigid_motion
-from catseye.estimation.network.approximate.search import LENIENT, STRICT, Search
+from catseye.estimation.network.approximate.search import LENIENT, STRICT, PlacingSearch
 from catseye.estimation.network.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
 from catseye.estimation.network.approximate.ties import FLOOR
 from catseye.estimation.network.unfolding.factors import classical_scaling
@@ -13,7 +13,7 @@ from catseye.estimation.network.unfolding.unfold import NO_FIT, TOO_FEW, UNFOLDE
 from catseye.estimation.shapes.rigid_body import closed_form
 
 
-def place_all(search: Search) -> None:
+def place_all(search: PlacingSearch) -> None:
     """Places what can be placed: from placed points, by local figures, and last where one of two fits better."""
     search.spread()
     while len(search.unplaced) and (_attach_level(search) or _attach_ranges(search)):
@@ -22,7 +22,7 @@ def place_all(search: Search) -> None:
         search.spread()
 
 
-def _attach_level(search: Search) -> bool:
+def _attach_level(search: PlacingSearch) -> bool:
     """Places points by local networks about a station, level and turned anyhow; whether any was placed.
 
     The directions of the station's set with all else give local coordinates; two placed points among them (or one, and
@@ -41,7 +41,7 @@ def _attach_level(search: Search) -> bool:
         seen = {station, *turned.target[turned.which == which].tolist()}
         if not (seen & unplaced) - covered:
             continue
-        frame = Search(rows, np.full(search.xyz.shape, np.nan), {which: 0.0}, search.bodies)
+        frame = PlacingSearch(rows, np.full(search.xyz.shape, np.nan), {which: 0.0}, search.bodies)
         frame.xyz[station] = 0.0
         frame.spread()
         covered |= seen & set(np.flatnonzero(np.isfinite(frame.xyz[:, :2]).all(axis=1)).tolist())
@@ -51,7 +51,7 @@ def _attach_level(search: Search) -> bool:
     return any(_helmert(search, frame) for frame in frames)
 
 
-def _helmert(search: Search, frame: Search) -> bool:
+def _helmert(search: PlacingSearch, frame: PlacingSearch) -> bool:
     """Lays a level local network on the placed points, turned about the vertical; whether it placed any coordinate."""
     level = np.isfinite(frame.xyz[:, :2]).all(axis=1)
     placed = np.isfinite(search.xyz[:, :2]).all(axis=1)
@@ -82,7 +82,7 @@ def level_turn(theirs: np.ndarray, ours: np.ndarray) -> float | None:
     return float(np.angle(np.sum((ours - ours.mean()) * np.conj(theirs - theirs.mean()))))
 
 
-def _turn_of_azimuths(search: Search, frame: Search, level: np.ndarray) -> float | None:
+def _turn_of_azimuths(search: PlacingSearch, frame: PlacingSearch, level: np.ndarray) -> float | None:
     """The same from oriented directions between points of a frame (n,) bool; None without any."""
     r = search.rows
     r = r.only((r.code == BEARING) & np.isin(r.which, list(search.given)) & level[r.origin] & level[r.target])
@@ -93,7 +93,7 @@ def _turn_of_azimuths(search: Search, frame: Search, level: np.ndarray) -> float
     return -float(np.angle(np.mean(np.exp(1j * (azimuth - np.arctan2(along[:, 0], along[:, 1]))))))
 
 
-def _attach_ranges(search: Search) -> bool:
+def _attach_ranges(search: PlacingSearch) -> bool:
     """Places points by figures unfolded from ranges alone; whether any was placed.
 
     Points that range each other all give a figure by classical scaling, stations and targets by unfolding; what the
@@ -109,7 +109,7 @@ def _attach_ranges(search: Search) -> bool:
     part = _parts_tied(rows, len(placed))
     for which in dict.fromkeys(part[~placed].tolist()):
         group = np.flatnonzero(part == which)
-        frame = Search(rows, np.full(search.xyz.shape, np.nan), {}, [])
+        frame = PlacingSearch(rows, np.full(search.xyz.shape, np.nan), {}, [])
         why = _figure(frame, group) or _laid_down(search, frame)
         if not why:
             return True
@@ -127,7 +127,7 @@ def _parts_tied(rows: Sightings, n: int) -> np.ndarray:
     return connected_components(table, directed=False)[1]
 
 
-def _figure(frame: Search, group: np.ndarray) -> str:
+def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
     """Fills a frame from the ranges between a group of points alone; why not, or nothing."""
     rows = frame.rows.only(np.isin(frame.rows.origin, group))
     if not len(rows):
@@ -180,7 +180,7 @@ def _clique(distance: dict[tuple[int, int], float]) -> list[int]:
     return best
 
 
-def _laid_down(search: Search, frame: Search) -> str:
+def _laid_down(search: PlacingSearch, frame: PlacingSearch) -> str:
     """Lays a figure that may be turned and mirrored on the placed points; why not, or nothing."""
     placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
     both = placed & here
@@ -200,7 +200,7 @@ def _laid_down(search: Search, frame: Search) -> str:
     return "a mirror image fits as well; give one more point off the plane of the others, or a zenith angle"
 
 
-def _by_convention(search: Search, frame: Search) -> str:
+def _by_convention(search: PlacingSearch, frame: PlacingSearch) -> str:
     """Lays a figure down as it is, on the one or two placed points or those in line, where they are all."""
     placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
     both, r = placed & here, search.rows
@@ -215,7 +215,7 @@ def _by_convention(search: Search, frame: Search) -> str:
     return why
 
 
-def _taken(search: Search, frame: Search, xyz: np.ndarray) -> str:
+def _taken(search: PlacingSearch, frame: PlacingSearch, xyz: np.ndarray) -> str:
     """Takes a figure that is laid down at xyz; why not, or nothing."""
     search.sides |= frame.sides & set(search.unplaced.tolist())
     return "" if search.fill(xyz) else "nothing new"

@@ -9,7 +9,7 @@ import numpy as np
 
 from catseye.estimation.network.approximate.bodies import rigid_motion
 from catseye.estimation.network.approximate.figures import level_turn, place_all
-from catseye.estimation.network.approximate.search import Search
+from catseye.estimation.network.approximate.search import PlacingSearch
 from catseye.estimation.network.approximate.sightings import LEVEL, RANGE, Sightings
 
 GROSS = 0.05  # misfit over range: of 50 networks 6 m off at 100 m all converge, of those 10 m off a tenth do not
@@ -28,7 +28,7 @@ def disagreeing(rows: Sightings, xyz: np.ndarray, free: np.ndarray) -> np.ndarra
     return poor & free
 
 
-def placed_anew(search: Search, free: np.ndarray, datum: np.ndarray) -> tuple[Search, np.ndarray]:
+def placed_anew(search: PlacingSearch, free: np.ndarray, datum: np.ndarray) -> tuple[PlacingSearch, np.ndarray]:
     """A search with better coordinates where given ones grossly disagree with lengths, and which (n,) those are.
 
     search   with the given coordinates, not yet gone on; it is left as it is
@@ -63,7 +63,7 @@ def _misfit(lengths: Sightings, xyz: np.ndarray) -> np.ndarray:
     return np.abs(lengths.observed - np.linalg.norm(along, axis=1)) / np.abs(lengths.observed)
 
 
-def _without(search: Search, dropped: np.ndarray) -> Search:
+def _without(search: PlacingSearch, dropped: np.ndarray) -> PlacingSearch:
     """A search that has gone on from the given coordinates without those of some points (n,) bool.
 
     What it had to lay down by convention is laid on the given coordinates; a point whose mirror image fits too is put
@@ -71,7 +71,7 @@ def _without(search: Search, dropped: np.ndarray) -> Search:
     """
     given = search.xyz
     orientations = {which: search.orientations[which] for which in search.given}
-    trial = Search(search.rows, np.where(dropped[:, None], np.nan, given), orientations, search.bodies)
+    trial = PlacingSearch(search.rows, np.where(dropped[:, None], np.nan, given), orientations, search.bodies)
     place_all(trial)
     if trial.conventional:
         trial.xyz = _laid_on(trial, given)
@@ -85,7 +85,7 @@ def _without(search: Search, dropped: np.ndarray) -> Search:
     return trial
 
 
-def _laid_on(trial: Search, given: np.ndarray) -> np.ndarray:
+def _laid_on(trial: PlacingSearch, given: np.ndarray) -> np.ndarray:
     """Coordinates (n, 3) of a figure moved, and mirrored if ranges are all it has, to where most points are given."""
     both = np.isfinite(trial.xyz).all(axis=1) & np.isfinite(given).all(axis=1)
     sure = both.copy()
@@ -118,7 +118,7 @@ def _level_motion(local: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np
     return matrix, ground.mean(axis=0) - matrix @ local.mean(axis=0)
 
 
-def _on_side(trial: Search, p: int, given: np.ndarray, *, limit: float) -> np.ndarray:
+def _on_side(trial: PlacingSearch, p: int, given: np.ndarray, *, limit: float) -> np.ndarray:
     """A point, or its image in the plane of those that range it, where that is nearer to where it is given and fits."""
     lengths = _lengths_between(trial.rows.only(trial.touching(p)), trial.xyz)
     anchors = trial.xyz[np.where(lengths.origin == p, lengths.target, lengths.origin)]

@@ -23,7 +23,7 @@ BY_NOISE = 25.0  # ... and by more than five standard uncertainties
 BLOCK = 20_000  # ranges at a time, so that memory stays bounded
 
 
-class Search:
+class PlacingSearch:
     """Points placed so far, orientations found so far, and how to go on.
 
     sides        points put on an assumed side of the plane of those that see them

@@ -8,21 +8,21 @@ from typing import Any, cast
 import numpy as np
 
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.kinds import (
-    Angles,
     Azimuths,
-    Coordinates,
     Directions,
     Distances,
     FixedDistances,
     HeightDifferences,
+    HorizontalAngles,
     HorizontalDistances,
     Inclinations,
     Joint,
     LevelPlanes,
-    Observations,
+    ObservationGroup,
+    ObservedCoordinates,
     Vectors,
     ZenithAngles,
 )
@@ -62,7 +62,7 @@ class Sightings:
         return len(self.code)
 
 
-def parts_of(network: Network) -> Iterator[tuple[Observations, np.ndarray]]:
+def parts_of(network: ObservationNetwork) -> Iterator[tuple[ObservationGroup, np.ndarray]]:
     """Groups with their variances; a joint group part by part."""
     for group in network.groups:
         if not isinstance(group, Joint):
@@ -75,13 +75,13 @@ def parts_of(network: Network) -> Iterator[tuple[Observations, np.ndarray]]:
             cut += m
 
 
-def sightings(network: Network) -> Sightings:
+def sightings(network: ObservationNetwork) -> Sightings:
     """The table of a network's observations."""
     start = np.concatenate([np.zeros(3 * len(network.points.names)), [p.start for p in network.parameters]])
     tables: list[Sightings] = []
     sets = len(start)  # angles make sets of their own, after those whose orientation is a parameter
     for group, variance in parts_of(network):
-        if isinstance(group, Angles):
+        if isinstance(group, HorizontalAngles):
             tables += _of_angles(group, variance, sets)
             sets += 2 * len(group.observed)
         elif isinstance(group, LevelPlanes):
@@ -110,7 +110,7 @@ def _table(
     return Sightings(np.full(m, code), origin, target, observed, wide, np.sqrt(variance), number)
 
 
-def _of_group(group: Observations, variance: np.ndarray, start: np.ndarray) -> Sightings | None:
+def _of_group(group: ObservationGroup, variance: np.ndarray, start: np.ndarray) -> Sightings | None:
     """Rows of all kinds but angles and level planes; None for a kind that cannot place a point by itself."""
     seen: dict[str, Any] = {"observed": group.observed, "variance": variance, "shift": getattr(group, "shift", None)}
     match group:
@@ -135,12 +135,12 @@ def _of_group(group: Observations, variance: np.ndarray, start: np.ndarray) -> S
             wide = np.broadcast_to(np.zeros(3) if group.shift is None else group.shift, (len(group.origin), 3))
             axis = np.tile(np.arange(3), len(group.origin))
             return _table(DIFFERENCE, group.ends, **seen | {"shift": np.repeat(wide, 3, axis=0)}, which=axis)
-        case Coordinates():
+        case ObservedCoordinates():
             return _table(COORDINATE, (group.point, -1), **seen, which=group.axis)
     return None
 
 
-def _of_angles(group: Angles, variance: np.ndarray, sets: int) -> Iterator[Sightings]:
+def _of_angles(group: HorizontalAngles, variance: np.ndarray, sets: int) -> Iterator[Sightings]:
     """Each sight of an angle as a direction of a set, numbered from `sets`."""
     for at, target, reading, row, circle in _circles(group):
         shift = group.foresight_shift if target == group.foresight[row] else group.backsight_shift
@@ -176,7 +176,7 @@ def _length(group: Distances | HorizontalDistances, start: np.ndarray) -> np.nda
     return (group.observed - offset) / (group.scale + factor)
 
 
-def _circles(group: Angles) -> Iterator[tuple[int, int, float, int, int]]:
+def _circles(group: HorizontalAngles) -> Iterator[tuple[int, int, float, int, int]]:
     """Angles as readings of circles, one for those that share sights: (at, target, reading, row, circle)."""
     ties: dict[tuple[int, int], list[tuple[int, float, int]]] = defaultdict(list)
     for row, (at, back, fore) in enumerate(zip(group.at, group.backsight, group.foresight, strict=True)):

@@ -27,9 +27,9 @@ import numpy as np
 from catseye.estimation.network.approximate.bodies import bodies_of, poses
 from catseye.estimation.network.approximate.figures import place_all
 from catseye.estimation.network.approximate.given import disagreeing, placed_anew
-from catseye.estimation.network.approximate.search import Search
+from catseye.estimation.network.approximate.search import PlacingSearch
 from catseye.estimation.network.approximate.sightings import GROUND, parts_of, sightings
-from catseye.estimation.network.model import Network
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.estimation.observations.kinds import (
     Directions,
     Distances,
@@ -60,7 +60,7 @@ class Approximation(NamedTuple):
     replaced: tuple[str, ...] = ()
 
 
-def approximate(network: Network) -> Approximation:
+def approximate(network: ObservationNetwork) -> Approximation:
     """Start values of all points and of the orientations, level heights and poses among the parameters.
 
     network   points may have nan coordinates; every other point counts as known
@@ -72,11 +72,11 @@ def approximate(network: Network) -> Approximation:
 
     Source: [FOERSTNER16] chapter 4, the least squares of each point; the order of placing is ours.
 
-    >>> from catseye.estimation.network.model import Points
+    >>> from catseye.estimation.network.model import NetworkPoints
     >>> from catseye.estimation.observations.kinds import Vectors
-    >>> points = Points(("A", "P"), np.array([[1.0, 2.0, 3.0], [np.nan] * 3]), *np.zeros((2, 2, 3), dtype=bool))
+    >>> points = NetworkPoints(("A", "P"), np.array([[1.0, 2.0, 3.0], [np.nan] * 3]), *np.zeros((2, 2, 3), dtype=bool))
     >>> leg = Vectors("leg", np.array([10.0, 0.0, 1.0]), np.full(3, 1e-6), np.array([0]), np.array([3]))
-    >>> approximate(Network(points, (), (leg,))).xyz[1]
+    >>> approximate(ObservationNetwork(points, (), (leg,))).xyz[1]
     array([11.,  2.,  4.])
     """
     points = network.points
@@ -104,25 +104,25 @@ def approximate(network: Network) -> Approximation:
     return Approximation(search.xyz, values, named[0], missing, named[1], named[2])
 
 
-def _search(network: Network, values: np.ndarray) -> Search:
+def _search(network: ObservationNetwork, values: np.ndarray) -> PlacingSearch:
     """A search from what is given, not yet gone on."""
     bodies = [(point, local) for point, local, _, _ in bodies_of(network, values)]
-    return Search(sightings(network), network.points.xyz.astype(float), _given_orientations(network), bodies)
+    return PlacingSearch(sightings(network), network.points.xyz.astype(float), _given_orientations(network), bodies)
 
 
-def _lengths_and_directions_of(network: Network) -> Network:
+def _lengths_and_directions_of(network: ObservationNetwork) -> ObservationNetwork:
     """The network with lengths and directions alone: all that is wanted of one whose points are given."""
     kinds = Directions | Distances | FixedDistances | HorizontalDistances | Joint
     return replace(network, groups=tuple(g for g in network.groups if isinstance(g, kinds)))
 
 
-def _given_orientations(network: Network) -> dict[int, float]:
+def _given_orientations(network: ObservationNetwork) -> dict[int, float]:
     """Column -> orientation, of those held or with a prior."""
     n = 3 * len(network.points.names)
     return {n + k: p.start for k, p in enumerate(network.parameters) if np.isfinite(p.sigma)} | {GROUND: 0.0}
 
 
-def _levels(network: Network, xyz: np.ndarray) -> Iterator[tuple[int, float]]:
+def _levels(network: ObservationNetwork, xyz: np.ndarray) -> Iterator[tuple[int, float]]:
     """Column and height of each level plane, from its placed points."""
     for group, _ in parts_of(network):
         if isinstance(group, LevelPlanes):

@@ -55,7 +55,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class IterationState:
     """Where the iteration stands: stations (S, 3), targets (T, 3), zero (S,) in metres, scale (S,)."""
 
     stations: np.ndarray
@@ -108,7 +108,7 @@ class Statistics:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class RangeRows:
     """Some ranges, linearised and whitened with `root`: rows, their ends, a (k, 3), g (k, width), misclosure (k,)."""
 
     rows: np.ndarray
@@ -120,7 +120,7 @@ class Rows:
     length: np.ndarray
 
 
-def linearise(problem: Problem, state: State, rows: np.ndarray, root: np.ndarray) -> Rows:
+def linearise(problem: Problem, state: IterationState, rows: np.ndarray, root: np.ndarray) -> RangeRows:
     """The ranges `rows` at a state, whitened with root (k,)."""
     station, target = problem.station[rows], problem.target[rows]
     along = state.targets[target] - state.stations[station]
@@ -129,7 +129,7 @@ def linearise(problem: Problem, state: State, rows: np.ndarray, root: np.ndarray
     a = along * (root * stretch / np.maximum(length, 1e-300))[:, None]
     misclosure = root * (problem.distance[rows] - stretch * length - state.zero[station])
     g = -a if problem.width == 3 else np.concatenate([-a, root[:, None], (root * length)[:, None]], axis=1)
-    return Rows(rows, station, target, a, g, misclosure, length)
+    return RangeRows(rows, station, target, a, g, misclosure, length)
 
 
 def invert_targets(v: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +179,7 @@ class NumpyBlocks:
             high = min(low + step, len(self._first) - 1)
             yield slice(low, high), self._sorted[self._first[low] : self._first[high]]
 
-    def _coupling(self, seen: Rows, part: slice) -> np.ndarray:
+    def _coupling(self, seen: RangeRows, part: slice) -> np.ndarray:
         """W of some targets: (t, n, 3)."""
         w = np.zeros((part.stop - part.start, self._stations, self.problem.width, 3))
         share = seen.g[:, :, None] * seen.a[:, None, :]
@@ -191,7 +191,7 @@ class NumpyBlocks:
             w[at[0][used], at[1][used]] = share[used]
         return w.reshape(len(w), self._size, 3)
 
-    def reduce(self, state: State) -> Reduced:
+    def reduce(self, state: IterationState) -> Reduced:
         """Normal equations at a state, targets eliminated."""
         problem, t = self.problem, len(self.problem.free_targets)
         normal, before, right = np.zeros((self._size, self._size)), np.zeros(self._size), np.zeros(self._size)
@@ -215,7 +215,7 @@ class NumpyBlocks:
                 cost = np.nan
         return Reduced((normal + normal.T) / 2, before, right, inverse, own, condition, cost, gain, moment)
 
-    def follow(self, state: State, old: Reduced) -> Reduced:
+    def follow(self, state: IterationState, old: Reduced) -> Reduced:
         """The right side and cost at a state close to that of `old`, whose matrices are kept."""
         right, own, cost, gain, moment = np.zeros(self._size), np.empty_like(old.own), 0.0, 0.0, 0.0
         for part, rows in self._chunks():
@@ -230,7 +230,7 @@ class NumpyBlocks:
             moment += float(np.sum((self.problem.root[rows] * seen.length) ** 2))
         return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
 
-    def felt(self, at: State, own: np.ndarray) -> np.ndarray:
+    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
         """Steps of the targets alone, own (T, 3, f), as the stations feel them: minus the sum of g a' own, (n, f)."""
         f = own.shape[2]
         out = np.zeros((self._stations, self.problem.width, f))
@@ -242,7 +242,7 @@ class NumpyBlocks:
                     out[:, i, j] -= np.bincount(seen.station, seen.g[:, i] * along[:, j], self._stations)
         return out.reshape(self._size, f)
 
-    def _targets(self, seen: Rows, part: slice, state: State) -> tuple[np.ndarray, np.ndarray]:
+    def _targets(self, seen: RangeRows, part: slice, state: IterationState) -> tuple[np.ndarray, np.ndarray]:
         """V and the right side of some targets, priors included."""
         n, at = part.stop - part.start, seen.target - part.start
         v, b = np.empty((n, 3, 3)), np.empty((n, 3))
@@ -256,7 +256,7 @@ class NumpyBlocks:
             b += np.einsum("tij,tj->ti", weight, self.problem.target_value[part] - state.targets[part])
         return v, b
 
-    def _stations_alone(self, seen: Rows, normal: np.ndarray, before: np.ndarray, right: np.ndarray) -> None:
+    def _stations_alone(self, seen: RangeRows, normal: np.ndarray, before: np.ndarray, right: np.ndarray) -> None:
         """Add the sums of g g' and g misclosure of some ranges."""
         s, p = self._stations, self.problem.width
         first = np.arange(s) * p
@@ -266,7 +266,7 @@ class NumpyBlocks:
                 normal[first + i, first + j] += np.bincount(seen.station, seen.g[:, i] * seen.g[:, j], s)
             before[first + i] += np.bincount(seen.station, seen.g[:, i] ** 2, s)
 
-    def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray:
+    def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """The targets' step (T, 3) that belongs to a step (n,) of the stations' parameters."""
         moved = np.empty_like(reduced.own)
         by_station = step.reshape(self._stations, -1)
@@ -278,7 +278,7 @@ class NumpyBlocks:
             moved[part] = reduced.own[part] - np.einsum("tij,tj->ti", reduced.inverse[part], total)
         return moved
 
-    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
+    def statistics(self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray) -> Statistics:
         """Covariances and tests, from V^-1 of each target and the covariance q (n, n) of the stations' parameters.
 
         Directions are those at `at`, where both were found; residuals are those of the answer, one step further.

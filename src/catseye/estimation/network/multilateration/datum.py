@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from catseye.estimation.network.multilateration.blocks import State
+from catseye.estimation.network.multilateration.blocks import IterationState
 
 GENERATORS = 7
 STILL = 1e-10  # of the network's size: a held coordinate moved by less is not moved
@@ -66,7 +66,7 @@ def free_motions(held: np.ndarray, coordinates: np.ndarray, *, dilation: bool, s
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class InnerConstraints:
     """Inner constraints at a state, linearised.
 
     value        (f,) h
@@ -100,16 +100,18 @@ class Datum:
     marked_stations: np.ndarray
     marked_targets: np.ndarray
 
-    def conditions(self, state: State, motions: np.ndarray, free: tuple[np.ndarray, np.ndarray]) -> Conditions:
+    def conditions(
+        self, state: IterationState, motions: np.ndarray, free: tuple[np.ndarray, np.ndarray]
+    ) -> InnerConstraints:
         """The inner constraints at a state, for free motions (7, f); free: coordinates of stations and of targets."""
         points = self.points
         first = _share(state.stations, self.stations, self.marked_stations, motions, free[0])
         if not len(points):
-            return Conditions(first[0], first[1], points, np.zeros((0, 3, motions.shape[1])), first[2])
+            return InnerConstraints(first[0], first[1], points, np.zeros((0, 3, motions.shape[1])), first[2])
         second = _share(
             state.targets[points], self.targets[points], self.marked_targets[points], motions, free[1][points]
         )
-        return Conditions(first[0] + second[0], first[1], points, second[1], first[2] + second[2])
+        return InnerConstraints(first[0] + second[0], first[1], points, second[1], first[2] + second[2])
 
     @cached_property
     def points(self) -> np.ndarray:

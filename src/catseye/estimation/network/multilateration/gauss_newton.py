@@ -17,8 +17,8 @@ from scipy.linalg import lapack
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, ROUNDING, STEP_IN_SIGMAS, UNDEFINED
 from catseye.estimation.network.multilateration import status as status_of
-from catseye.estimation.network.multilateration.blocks import NumpyBlocks, Reduced, State, Statistics
-from catseye.estimation.network.multilateration.datum import Conditions, displacements, generators
+from catseye.estimation.network.multilateration.blocks import IterationState, NumpyBlocks, Reduced, Statistics
+from catseye.estimation.network.multilateration.datum import InnerConstraints, displacements, generators
 from catseye.estimation.network.multilateration.network import RangingNetwork, Setup, set_up
 from catseye.estimation.network.multilateration.solution import Gauge, RangingSolution
 
@@ -33,11 +33,13 @@ EPS = float(np.finfo(float).eps)
 class Blocks(Protocol):
     """Either engine: `NumpyBlocks`, `KernelBlocks`."""
 
-    def reduce(self, state: State) -> Reduced: ...
-    def follow(self, state: State, old: Reduced) -> Reduced: ...
-    def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray: ...
-    def felt(self, at: State, own: np.ndarray) -> np.ndarray: ...
-    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics: ...
+    def reduce(self, state: IterationState) -> Reduced: ...
+    def follow(self, state: IterationState, old: Reduced) -> Reduced: ...
+    def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray: ...
+    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray: ...
+    def statistics(
+        self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray
+    ) -> Statistics: ...
 
 
 def adjust_ranges(
@@ -165,14 +167,14 @@ class _Iteration:
             reduced, before = descent, step.size
         return self._solution(network, status, reduced, answer, tests)
 
-    def _reduce(self, state: State) -> Reduced:
+    def _reduce(self, state: IterationState) -> Reduced:
         """Normal equations at a state, whose factor is then to be found."""
         reduced = self.blocks.reduce(state)
         cost, moment = self.setup.terms.add(state, reduced.normal, reduced.before, reduced.right, self.problem.width)
         self.cost, self.moment, self.at, self.factor = reduced.cost + cost, reduced.moment + moment, state, None
         return reduced
 
-    def _follow(self, state: State, old: Reduced) -> Reduced:
+    def _follow(self, state: IterationState, old: Reduced) -> Reduced:
         """The right side at a state close to where the normal matrix was built, which is kept with its factor."""
         reduced = self.blocks.follow(state, old)
         aside = np.zeros_like(old.normal), np.zeros_like(old.before)
@@ -180,7 +182,7 @@ class _Iteration:
         self.cost, self.moment = reduced.cost + cost, reduced.moment + moment
         return reduced
 
-    def _moved(self, step: _Step, fraction: float) -> State:
+    def _moved(self, step: _Step, fraction: float) -> IterationState:
         by_station = fraction * step.stations.reshape(self.problem.free_stations.shape)
         old = self.state
         zero, scale = (
@@ -188,7 +190,7 @@ class _Iteration:
             if self.problem.width > 3
             else (old.zero, old.scale)
         )
-        return State(old.stations + by_station[:, :3], old.targets + fraction * step.targets, zero, scale)
+        return IterationState(old.stations + by_station[:, :3], old.targets + fraction * step.targets, zero, scale)
 
     def _descend(self, step: _Step, old: Reduced, *, keep: bool) -> Reduced | None:
         """Take the step, halved while the cost rises, or None; keep: the normal matrix, if the whole step descends."""
@@ -251,7 +253,7 @@ class _Iteration:
             return None
         return status_of.floating_targets(self.problem, self.state, self.setup.names, bad)
 
-    def _null(self, motions: np.ndarray, state: State) -> np.ndarray:
+    def _null(self, motions: np.ndarray, state: IterationState) -> np.ndarray:
         """What the free motions do to the stations' parameters: (n, f)."""
         null = np.zeros((*self.problem.free_stations.shape, motions.shape[1]))
         null[:, :3] = generators(state.stations) @ motions
@@ -291,7 +293,7 @@ class _Iteration:
         joined = (between.first, between.second) if between is not None else (self.free[:0], self.free[:0])
         return status_of.floating_network(self.problem, self.setup.names, joined, full)
 
-    def _conditions(self, motions: np.ndarray, state: State) -> Conditions | str:
+    def _conditions(self, motions: np.ndarray, state: IterationState) -> InnerConstraints | str:
         """Inner constraints at a state, or why they do not hold the free motions."""
         datum = self.setup.datum
         count = motions.shape[1]

@@ -24,9 +24,9 @@ from numba import njit
 from catseye.estimation.network.multilateration.blocks import (
     NONCENTRALITY,
     UNCHECKED,
+    IterationState,
     Problem,
     Reduced,
-    State,
     Statistics,
 )
 from catseye.estimation.network.multilateration.layout_kernel import by_target, fill, gather, slots_of
@@ -59,7 +59,7 @@ class KernelBlocks:
         observed, root, self._index = fill(*ranges, first, rows, order, ends, slots, LANES)
         self._packed = slots, ends, order, observed, root
 
-    def reduce(self, state: State) -> Reduced:
+    def reduce(self, state: IterationState) -> Reduced:
         """See `NumpyBlocks.reduce`."""
         p, n = self.problem.width, len(self.problem.free_stations) * self.problem.width
         t = len(self._free)
@@ -76,28 +76,28 @@ class KernelBlocks:
         )
         return Reduced(normal, before, right, inverse, own, condition, cost, gain, moment)
 
-    def follow(self, state: State, old: Reduced) -> Reduced:
+    def follow(self, state: IterationState, old: Reduced) -> Reduced:
         """See `NumpyBlocks.follow`."""
         right, own = np.zeros_like(old.right), np.empty_like(old.own)
         points = (state.stations, state.targets, state.zero, state.scale)
         cost, gain, moment = _follow(*self._packed, points, *self._priors, old.inverse, self.problem.width, right, own)
         return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
 
-    def back(self, state: State, reduced: Reduced, step: np.ndarray) -> np.ndarray:
+    def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """See `NumpyBlocks.back`."""
         moved = np.empty((len(self._free), 3))
         points = (state.stations, state.targets, state.zero, state.scale)
         _back(*self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
         return moved
 
-    def felt(self, at: State, own: np.ndarray) -> np.ndarray:
+    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
         """See `NumpyBlocks.felt`."""
         out = np.zeros((own.shape[2], self.problem.free_stations.size))
         points = (at.stations, at.targets, at.zero, at.scale)
         _felt(*self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
         return out.T
 
-    def statistics(self, at: State, answer: State, inverse: np.ndarray, q: np.ndarray) -> Statistics:
+    def statistics(self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray) -> Statistics:
         """See `NumpyBlocks.statistics`."""
         m = len(self.problem.distance)
         covariance, out = np.empty((len(self._free), 3, 3)), (np.empty(m), np.empty(m), np.empty(m), np.empty(m))

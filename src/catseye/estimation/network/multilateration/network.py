@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.estimation.network.multilateration.blocks import Problem, State
+from catseye.estimation.network.multilateration.blocks import IterationState, Problem
 from catseye.estimation.network.multilateration.datum import ENOUGH, Datum, free_motions
 from catseye.estimation.network.multilateration.status import Names
-from catseye.estimation.network.multilateration.terms import Gauges, PointPriors, StationRanges, Terms
+from catseye.estimation.network.multilateration.terms import Gauges, PointPriors, PriorTerms, StationRanges
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +75,16 @@ class Setup:
     """
 
     problem: Problem
-    start: State
+    start: IterationState
     datum: Datum
-    terms: Terms
+    terms: PriorTerms
     names: Names
     origin: np.ndarray
     size: float
     dilation: bool
     still: np.ndarray
 
-    def motions(self, state: State) -> np.ndarray:
+    def motions(self, state: IterationState) -> np.ndarray:
         """The free motions (7, f) at a state, see `free_motions`."""
         at, s = self.points, len(state.stations)
         for some in (at[:ENOUGH], at):  # a few held points nearly always hold everything
@@ -126,7 +126,7 @@ def set_up(network: RangingNetwork, inflation: np.ndarray | None) -> Setup:
         target_weight=weight,
         target_value=value,
     )
-    state = State(stations - origin, targets - origin, gauges[0][0], gauges[1][0])
+    state = IterationState(stations - origin, targets - origin, gauges[0][0], gauges[1][0])
     datum = Datum(
         state.stations,
         state.targets,
@@ -222,7 +222,7 @@ def _terms(
     names: Names,
     gauges: tuple[tuple[np.ndarray, np.ndarray], ...],
     origin: np.ndarray,
-) -> Terms:
+) -> PriorTerms:
     priors = []
     for count, called, prior in (
         (counts[0], names.station, network.station_priors),
@@ -234,7 +234,7 @@ def _terms(
         index = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
         if len(index):
             known.append(Gauges(("zero priors", "scale priors")[i], 3 + i, index, start[index], sigma[index]))
-    return Terms(priors[0], priors[1], _between(network.between, counts[0]), tuple(known))
+    return PriorTerms(priors[0], priors[1], _between(network.between, counts[0]), tuple(known))
 
 
 def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointPriors:

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, Fit
-from catseye.estimation.network.multilateration.blocks import UNCHECKED, State, linearise
+from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState, linearise
 from catseye.estimation.network.multilateration.network import RangingNetwork, Setup
 
 
@@ -66,8 +66,8 @@ class RangingSolution:
     standardised: np.ndarray
     detectable: np.ndarray
     _setup: Setup
-    _at: State
-    _answer: State
+    _at: IterationState
+    _answer: IterationState
     _inverse: np.ndarray
     _gauge: Gauge | None
 
@@ -106,10 +106,10 @@ class RangingSolution:
         return np.where(active, self.residual / np.maximum(self.redundancy, UNCHECKED), self.residual)
 
     @cached_property
-    def fits(self) -> tuple[Fit, ...]:
+    def fits(self) -> tuple[GroupFit, ...]:
         """A fit of the ranges, then of what there is: between stations, station, target, zero and scale priors."""
         problem = self._setup.problem
-        ranges = Fit(
+        ranges = GroupFit(
             "ranges",
             problem.root > 0.0,
             self.residual,

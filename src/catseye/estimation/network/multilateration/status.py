@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, RANK_DEFICIENT, UNDEFINED
-from catseye.estimation.network.multilateration.blocks import UNCHECKED, Problem, State, Statistics, linearise
+from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState, Problem, Statistics, linearise
 
 __all__ = ["CONVERGED", "NOT_CONVERGED", "RANK_DEFICIENT", "UNDEFINED", "Names", "contradiction"]
 
@@ -54,7 +54,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def floating_targets(problem: Problem, state: State, names: Names, floating: np.ndarray) -> str:
+def floating_targets(problem: Problem, state: IterationState, names: Names, floating: np.ndarray) -> str:
     """Why the targets `floating` (indices, worst first) cannot be placed by their stations."""
     worst = int(floating[0])
     rows = np.flatnonzero((problem.target == worst) & (problem.root > 0.0))
@@ -120,7 +120,7 @@ def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, n
     return RANK_DEFICIENT.format(names=listed(called))
 
 
-def contradiction(problem: Problem, state: State, names: Names, statistics: Statistics | None) -> str | None:
+def contradiction(problem: Problem, state: IterationState, names: Names, statistics: Statistics | None) -> str | None:
     """The status of a network whose residuals are beyond belief as a whole, or None; without statistics less exact."""
     rows = np.flatnonzero(problem.root > 0.0)
     misclosure = np.abs(linearise(problem, state, rows, problem.root[rows]).misclosure)

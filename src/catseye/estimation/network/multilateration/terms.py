@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
-from catseye.estimation.network.multilateration.blocks import UNCHECKED, State
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
+from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Gauges:
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class PriorTerms:
     """All of them; None where there are none."""
 
     stations: PointPriors | None
@@ -79,7 +79,7 @@ class Terms:
         return points + between + sum(len(g.index) for g in self.gauges)
 
     def add(
-        self, state: State, normal: np.ndarray, before: np.ndarray, right: np.ndarray, width: int
+        self, state: IterationState, normal: np.ndarray, before: np.ndarray, right: np.ndarray, width: int
     ) -> tuple[float, float]:
         """Add to the reduced normal equations, see `Reduced`; returns cost and moment, of target priors too."""
         cost = moment = 0.0
@@ -96,7 +96,7 @@ class Terms:
             moment = float(np.sum((self.between.distance / self.between.sigma) ** 2))
         return cost, moment
 
-    def _dense(self, state: State, width: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def _dense(self, state: IterationState, width: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Columns (k, w), whitened Jacobian (k, r, w) and misclosure (k, r) of each group on stations."""
         if self.stations is not None:
             root = self._station_root
@@ -111,10 +111,12 @@ class Terms:
             yield gauge.index[:, None] * width + gauge.column, root[:, :, None], self._off(gauge, state)[:, None] * root
 
     @staticmethod
-    def _off(gauge: Gauges, state: State) -> np.ndarray:
+    def _off(gauge: Gauges, state: IterationState) -> np.ndarray:
         return gauge.start - (state.zero if gauge.column == 3 else state.scale)[gauge.index]
 
-    def fits(self, state: State, q: np.ndarray, target_covariance: np.ndarray, width: int) -> tuple[Fit, ...]:
+    def fits(
+        self, state: IterationState, q: np.ndarray, target_covariance: np.ndarray, width: int
+    ) -> tuple[GroupFit, ...]:
         """A fit a group, from the covariances of the stations' parameters q (n, n) and of the targets (T, 3, 3)."""
         fits = []
         if self.between is not None:
@@ -143,7 +145,7 @@ def _whitening(priors: PointPriors | None) -> np.ndarray:
     return np.zeros((0, 3, 3)) if priors is None else np.linalg.inv(np.linalg.cholesky(priors.covariance))
 
 
-def _between(between: StationRanges, state: State, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _between(between: StationRanges, state: IterationState, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns (k, 6), Jacobian (k, 6) and residual (k,) of ranges between stations."""
     along = state.stations[between.second] - state.stations[between.first]
     length = np.linalg.norm(along, axis=1)
@@ -154,7 +156,7 @@ def _between(between: StationRanges, state: State, width: int) -> tuple[np.ndarr
     return columns, np.concatenate([-u, u], axis=1), between.distance - length
 
 
-def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> Fit:
+def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> GroupFit:
     """Fit of k direct observations of r values each, correlated inside; q (k, r, r) covariance of the adjusted ones.
 
     With P = C^-1 and P_v = P - P Q P: w = (P v) / sqrt(diag P_v), redundancy diag(P_v C).
@@ -165,7 +167,7 @@ def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> F
     seen = weight @ q
     visible = np.maximum(own - np.einsum("kij,kji->ki", seen, weight), UNCHECKED * own).ravel()
     redundancy = 1.0 - np.einsum("kii->ki", seen)
-    return Fit(
+    return GroupFit(
         name,
         np.ones(off.size, dtype=bool),
         off.ravel(),

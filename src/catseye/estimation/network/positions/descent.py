@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from catseye.estimation.network.positions.start import SIGNIFICANT, Starts
-from catseye.estimation.network.positions.status import Status
+from catseye.estimation.network.positions.status import PositionStatus
 
 ENOUGH = 1e-4  # sigmas: the next step foreseen is smaller, so the answer stands; 1 nm where 10 um are claimed
 SINGULAR = 1e-15  # determinant over cubed trace of a normal matrix that holds no digit
@@ -65,7 +65,7 @@ def least_squares_positions(r: Ranges, start: Starts) -> tuple[Descent, np.ndarr
     good = found.ended & (found.bend < BENT) & (found.pvv <= np.where(r.count > 3, _most(r.count), 1.0))
     good &= start.sign * start.height * _over(found, start) > 0.0  # not over to the other image
     rest = np.flatnonzero(~good)
-    status = np.full(len(r.d), Status.FOUND, dtype=np.int8)
+    status = np.full(len(r.d), PositionStatus.FOUND, dtype=np.int8)
     if len(rest):
         best, status[rest] = _better_image(r.of(rest), start.of(rest))
         found.put(rest, best)
@@ -94,8 +94,8 @@ def _better_image(r: Ranges, start: Starts) -> tuple[Descent, np.ndarray]:
     first = np.where(decided, gap > 0.0, upper == (start.side >= 0.0))
     best, other = one.where(first, two), two.where(first, one)
     status, second = _verdict(r, best), _verdict(r, other)
-    open_ = ~decided & ~same & (start.side == 0.0) & (status <= Status.CONTRADICTING)
-    status = np.where(open_, np.where(second <= Status.CONTRADICTING, Status.AMBIGUOUS, second), status)
+    open_ = ~decided & ~same & (start.side == 0.0) & (status <= PositionStatus.CONTRADICTING)
+    status = np.where(open_, np.where(second <= PositionStatus.CONTRADICTING, PositionStatus.AMBIGUOUS, second), status)
     return best, status
 
 
@@ -112,8 +112,14 @@ def _verdict(r: Ranges, found: Descent) -> np.ndarray:
             ~found.ended,
             (r.count > 3) & (found.pvv > _most(r.count)),
         ],
-        [Status.AT_STATION, Status.DISJOINT, Status.NOT_HELD, Status.NOT_CONVERGED, Status.CONTRADICTING],
-        Status.FOUND,
+        [
+            PositionStatus.AT_STATION,
+            PositionStatus.DISJOINT,
+            PositionStatus.NOT_HELD,
+            PositionStatus.NOT_CONVERGED,
+            PositionStatus.CONTRADICTING,
+        ],
+        PositionStatus.FOUND,
     )
 
 

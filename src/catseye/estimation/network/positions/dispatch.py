@@ -14,7 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.network.positions import descent
 from catseye.estimation.network.positions.start import SIGNIFICANT, Planes, patterns_of, planes_of, starts
-from catseye.estimation.network.positions.status import TEXTS, Status
+from catseye.estimation.network.positions.status import TEXTS, PositionStatus
 from catseye.estimation.network.positions.trilateration import FLAT
 
 LANES = 2**15  # ranges a chunk of the plain form, so that its arrays stay in the cache
@@ -28,7 +28,7 @@ class Positions:
 
     x            (t, 3) m; nan unless the status is FOUND or CONTRADICTING
     covariance   (t, 3, 3) m^2, a priori (variance factor 1), of stations without uncertainty; nan likewise
-    status       (t,) int8 of `Status`; `text` says it in words
+    status       (t,) int8 of `PositionStatus`; `text` says it in words
     ranges       (t,) used for each
     iterations   (t,) Gauss-Newton steps; 0 where none was tried
     pvv          (t,) sum of squared residuals in sigmas; nan where none was tried
@@ -48,14 +48,14 @@ class Positions:
 
     def text(self, target: int) -> str:
         """The status of one target in words: what is wrong and what to do."""
-        status, ranges = Status(self.status[target]), int(self.ranges[target])
-        freedom = ranges - 3 if status == Status.CONTRADICTING else ranges
+        status, ranges = PositionStatus(self.status[target]), int(self.ranges[target])
+        freedom = ranges - 3 if status == PositionStatus.CONTRADICTING else ranges
         ratio = float(np.sqrt(self.pvv[target] / max(freedom, 1)))
         return TEXTS[status].format(ranges=ranges, ratio=ratio, iterations=int(self.iterations[target]))
 
     def require_found(self) -> "Positions":
         """These positions, or EstimationError that names the first target without one, why, and how many there are."""
-        bad = np.flatnonzero(self.status != Status.FOUND)
+        bad = np.flatnonzero(self.status != PositionStatus.FOUND)
         if len(bad):
             raise EstimationError(f"target {bad[0]} ({len(bad)} of {len(self.status)} likewise): {self.text(bad[0])}")
         return self
@@ -164,16 +164,16 @@ def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Ch
     from catseye.estimation.network.positions import kernel
 
     frame = np.concatenate([whole.centre, whole.axes[0], whole.inverse])
-    site = kernel.Site(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)
+    site = kernel.StationPlane(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)
     d = descent
-    limits = kernel.Limits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
+    limits = kernel.PositionLimits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
 
     def fast(chunk: _Chunk, part: Positions) -> np.ndarray:
         good = np.empty(len(chunk.d), dtype=bool)
         near = np.full((1, 3), np.nan) if chunk.near is None else np.ascontiguousarray(chunk.near)
         answers = kernel.Answers(part.x, part.covariance, part.ranges, part.iterations, part.pvv, good)
-        kernel.locate(kernel.Measured(chunk.d, chunk.u, near), site, limits, answers)
-        part.status[:] = Status.FOUND
+        kernel.locate(kernel.MeasuredRanges(chunk.d, chunk.u, near), site, limits, answers)
+        part.status[:] = PositionStatus.FOUND
         return good
 
     return fast
@@ -184,18 +184,18 @@ def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lane
     ranges, planes, which, refused = _sorted_out(s, chunk, whole)
     status = np.select(
         [refused, planes.count[which] < 3, planes.collinear[which]],
-        [Status.REFUSED, Status.TOO_FEW, Status.COLLINEAR],
-        Status.FOUND,
+        [PositionStatus.REFUSED, PositionStatus.TOO_FEW, PositionStatus.COLLINEAR],
+        PositionStatus.FOUND,
     )
     part.status[lanes], part.ranges[lanes], part.iterations[lanes] = status, ranges.count, 0
     part.x[lanes], part.covariance[lanes], part.pvv[lanes] = np.nan, np.nan, np.nan
-    possible = np.flatnonzero(status == Status.FOUND)
+    possible = np.flatnonzero(status == PositionStatus.FOUND)
     if not len(possible):
         return
     ranges, which, lanes = ranges.of(possible), which[possible], lanes[possible]
     start = starts(planes, which, ranges.d, ranges.u, near=chunk.of(possible).near)
     found, status = descent.least_squares_positions(ranges, start)
-    answered = status <= Status.CONTRADICTING
+    answered = status <= PositionStatus.CONTRADICTING
     part.status[lanes], part.pvv[lanes], part.iterations[lanes] = status, found.pvv, found.iterations
     part.x[lanes[answered]], part.covariance[lanes[answered]] = found.x[answered], found.covariance[answered]
 

@@ -19,7 +19,7 @@ _compiled = njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=T
 _inlined = njit(error_model="numpy", fastmath={"contract"})  # kept with their caller
 
 
-class Measured(NamedTuple):
+class MeasuredRanges(NamedTuple):
     """What is known of k targets: ranges d (k, s) m, nan where missing; sigma (1 or k, s) m; near (1 or k, 3) m."""
 
     d: np.ndarray
@@ -27,7 +27,7 @@ class Measured(NamedTuple):
     near: np.ndarray
 
 
-class Site(NamedTuple):
+class StationPlane(NamedTuple):
     """The stations (s, 3) m, and of their own plane: `half_square` (s,), `rows` (3, s), and `frame` (5, 3): its centre,
     three axes and inverse extents, see `start.Planes`; all relative to `origin` (3,) m."""
 
@@ -38,7 +38,7 @@ class Site(NamedTuple):
     origin: np.ndarray
 
 
-class Limits(NamedTuple):
+class PositionLimits(NamedTuple):
     """The thresholds of the same names in `start` and `descent`."""
 
     flat: float

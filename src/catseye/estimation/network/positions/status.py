@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 
-class Status(IntEnum):
+class PositionStatus(IntEnum):
     """What became of one target; only FOUND and CONTRADICTING come with coordinates."""
 
     FOUND = 0
@@ -19,20 +19,22 @@ class Status(IntEnum):
 
 
 TEXTS = {
-    Status.FOUND: "found",
-    Status.CONTRADICTING: "its {ranges} ranges contradict each other: residuals are {ratio:.3g} times their sigma "
-    "(limit 10); one of them or a station is grossly wrong",
-    Status.TOO_FEW: "seen by {ranges} ranges only: three are needed; measure from another station",
-    Status.COLLINEAR: "the stations that see it stand on one line: it may be anywhere on a circle about that line; "
-    "measure from a station off the line",
-    Status.NOT_HELD: "its ranges do not hold it in one direction: it lies in one plane with the stations that see it, "
-    "or too far from them for their spread; measure from a station off that plane",
-    Status.DISJOINT: "its {ranges} ranges do not meet in a point: they miss each other by {ratio:.3g} times their "
-    "sigma (limit 5) or, in closed form, by `misclosure`; a range is too short, or a station or target is confused",
-    Status.AMBIGUOUS: "the stations that see it stand in one plane and its two mirror images fit alike; "
+    PositionStatus.FOUND: "found",
+    PositionStatus.CONTRADICTING: "its {ranges} ranges contradict each other: residuals are {ratio:.3g} times "
+    "their sigma (limit 10); one of them or a station is grossly wrong",
+    PositionStatus.TOO_FEW: "seen by {ranges} ranges only: three are needed; measure from another station",
+    PositionStatus.COLLINEAR: "the stations that see it stand on one line: it may be anywhere on a circle about that "
+    "line; measure from a station off the line",
+    PositionStatus.NOT_HELD: "its ranges do not hold it in one direction: it lies in one plane with the stations that "
+    "see it, or too far from them for their spread; measure from a station off that plane",
+    PositionStatus.DISJOINT: "its {ranges} ranges do not meet in a point: they miss each other by {ratio:.3g} times "
+    "their sigma (limit 5) or, in closed form, by `misclosure`; "
+    "a range is too short, or a station or target is confused",
+    PositionStatus.AMBIGUOUS: "the stations that see it stand in one plane and its two mirror images fit alike; "
     "give a point on its side of the plane (`near`), or a range from off the plane",
-    Status.AT_STATION: "it stands within four sigma of a station, where a range has no direction; leave that range out",
-    Status.NOT_CONVERGED: "not converged after {iterations} steps, residuals {ratio:.3g} times their sigma; "
+    PositionStatus.AT_STATION: "it stands within four sigma of a station, where a range has no direction; "
+    "leave that range out",
+    PositionStatus.NOT_CONVERGED: "not converged after {iterations} steps, residuals {ratio:.3g} times their sigma; "
     "check its ranges and the stations",
-    Status.REFUSED: "a range of it is negative or infinite, or the sigma of a range is not positive and finite",
+    PositionStatus.REFUSED: "a range of it is negative or infinite, or the sigma of a range is not positive and finite",
 }

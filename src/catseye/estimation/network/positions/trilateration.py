@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.estimation.network.positions.status import Status
+from catseye.estimation.network.positions.status import PositionStatus
 
 FLAT = 1e-13  # squared extent over largest squared extent: below it a figure of points is flat to double precision
 
@@ -22,7 +22,7 @@ class Trilateration:
     height       (...) m of the first above that plane; nan without answer
     misclosure   (..., 3) m by which each range is too short to reach the foot, the point of the plane where the three
                  miss by the same power; zero where they meet, nan where the stations stand on one line
-    status       (...) int8 of `Status`: FOUND, COLLINEAR, DISJOINT or REFUSED
+    status       (...) int8 of `PositionStatus`: FOUND, COLLINEAR, DISJOINT or REFUSED
     """
 
     x: np.ndarray
@@ -71,7 +71,11 @@ def trilaterate(stations: np.ndarray, distances: np.ndarray) -> Trilateration:
         short = np.where(lack > 0.0, lack / (np.sqrt(d**2 + lack) + d), 0.0 * lack)
         misclosure = np.where((usable & apart)[..., None], short, np.nan)
     base = corner[..., 0, :] + foot
-    status = np.select([~usable, ~apart, ~meet], [Status.REFUSED, Status.COLLINEAR, Status.DISJOINT], Status.FOUND)
+    status = np.select(
+        [~usable, ~apart, ~meet],
+        [PositionStatus.REFUSED, PositionStatus.COLLINEAR, PositionStatus.DISJOINT],
+        PositionStatus.FOUND,
+    )
     return Trilateration(np.stack([base + up, base - up], axis=-2), height, misclosure, status.astype(np.int8))
 
 
@@ -120,7 +124,8 @@ class AveragedIteration:
     x            (..., 3) m, the last average; nan where singular
     difference   (...) m between the last old and new values
     iterations   (...) solutions of eq. 3.7 taken
-    status       (...) int8 of `Status`: FOUND, NOT_CONVERGED (at the cap; x is then no answer), NOT_HELD (singular)
+    status       (...) int8 of `PositionStatus`: FOUND, NOT_CONVERGED (at the cap; x is then no answer), or
+                 NOT_HELD (singular)
     """
 
     x: np.ndarray
@@ -161,10 +166,10 @@ def trilaterate_by_averaging(
     s, origin = np.broadcast_to(s - origin, (*shape, 3, 3)), np.broadcast_to(origin[..., 0, :], (*shape, 3))
     right = np.broadcast_to(d**2 - np.sum((s * s), axis=-1), (*shape, 3))
     r = start - origin
-    status = np.full(shape, Status.NOT_CONVERGED, dtype=np.int8)
+    status = np.full(shape, PositionStatus.NOT_CONVERGED, dtype=np.int8)
     difference, taken = np.full(shape, np.nan), np.zeros(shape, dtype=int)
     for _ in range(iterations):
-        open_ = status == Status.NOT_CONVERGED
+        open_ = status == PositionStatus.NOT_CONVERGED
         if not open_.any():
             break
         columns, determinant = _cofactors(r[..., None, :] - s)
@@ -175,7 +180,7 @@ def trilaterate_by_averaging(
         singular = open_ & ~np.isfinite(step)
         r = np.where(singular[..., None], np.nan, np.where(open_[..., None], (r + new) / 2, r))
         difference, taken = np.where(open_, step, difference), taken + open_
-        status[singular], status[open_ & (step <= epsilon)] = Status.NOT_HELD, Status.FOUND
+        status[singular], status[open_ & (step <= epsilon)] = PositionStatus.NOT_HELD, PositionStatus.FOUND
     return AveragedIteration(r + origin, difference, taken, status)
 
 

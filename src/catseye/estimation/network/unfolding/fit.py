@@ -11,7 +11,7 @@ FLAT = 0.02  # least over middle extent of points below which they may lie in on
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class FigureFit:
     """A figure (s, d), (t, d) that fits its ranges best, and the rms over the degrees of freedom."""
 
     stations: np.ndarray
@@ -19,7 +19,7 @@ class Fit:
     rms: float
 
 
-def least_squares(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray) -> Fit:
+def least_squares(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray) -> FigureFit:
     """The figure (s, d), (t, d), d = 3 or 2, that fits all ranges (s, t) best from a start.
 
     Levenberg's damping holds the free motions; targets are eliminated one by one.
@@ -41,7 +41,7 @@ def least_squares(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray)
             done, damping = cost < nothing or damping > 1e6, damping * 10.0
         if done:
             break
-    return Fit(stations, targets, (cost / spare) ** 0.5)
+    return FigureFit(stations, targets, (cost / spare) ** 0.5)
 
 
 def _linear(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ def _reduced(v: np.ndarray, unit: np.ndarray, damping: float) -> tuple[np.ndarra
     return reduced, step.reshape(s, d), spread[..., -1] - spread[..., :-1] @ step
 
 
-def flattest(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, sigma: float) -> Fit:
+def flattest(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, sigma: float) -> FigureFit:
     """The figure that fits best; one in a plane where it fits as well."""
     fit = least_squares(stations, targets, ranges)
     everything = np.vstack([fit.stations, fit.targets])
@@ -92,7 +92,7 @@ def flattened(points: np.ndarray, table: np.ndarray, sigma: float) -> np.ndarray
     return flat if np.nansum(number * rms**2) <= (FIT * sigma) ** 2 * number.sum() else None
 
 
-def loose(fit: Fit, ranges: np.ndarray, sigma: float) -> bool:
+def loose(fit: FigureFit, ranges: np.ndarray, sigma: float) -> bool:
     """Whether more than the rigid motions is uncertain by a thirtieth of the figure's size.
 
     Stations and targets that may lie in a plane are judged there: the height that noise gives them holds nothing.

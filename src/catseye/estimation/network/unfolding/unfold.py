@@ -15,7 +15,7 @@ import numpy as np
 
 from catseye.errors import ValidityError
 from catseye.estimation.network.unfolding.factors import Figure, factors, in_plane, in_space, upgraded
-from catseye.estimation.network.unfolding.fit import FIT, Fit, flattest, least_squares, loose
+from catseye.estimation.network.unfolding.fit import FIT, FigureFit, flattest, least_squares, loose
 from catseye.estimation.network.unfolding.sides import extend, settle_sides
 
 UNFOLDED = "unfolded"
@@ -149,7 +149,7 @@ def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> 
         return None, IN_LINE
     spare = s * t - 3 * (s + t) + 6
     dimensions = [3] * (rank == 3 and min(s, t) >= 4 and spare >= 0) + [2] * (rank == 2)
-    fits: list[Fit] = []
+    fits: list[FigureFit] = []
     for search in (0, 60, 400):  # random starts only where the linear ones found nothing
         starts: list[Figure] = []
         for d in dimensions:
@@ -169,7 +169,7 @@ def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> 
     return (in_space(fits[0].stations), in_space(fits[0].targets)), UNFOLDED
 
 
-def _differ(a: Fit, b: Fit, sigma: float) -> bool:
+def _differ(a: FigureFit, b: FigureFit, sigma: float) -> bool:
     """Whether two figures of size about 1 have different stations or targets, beyond what noise can do."""
     return any(
         np.max(np.abs(np.linalg.norm(p[:, None] - p, axis=2) - np.linalg.norm(q[:, None] - q, axis=2)))

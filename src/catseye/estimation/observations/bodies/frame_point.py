@@ -7,12 +7,12 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.estimation.observations.bodies.pose import frame_columns, in_frame, require_rotation
-from catseye.estimation.observations.kind import Kind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, beside, value
 from catseye.estimation.observations.sight import XYZ
 
 
 @dataclass(frozen=True, eq=False)
-class FramePoints(Kind):
+class FramePoints(ObservationKind):
     """observed = R' (X - T) - x[p] + error, in the frame's axes, R = exp([w]x) R0; see `pose`.
 
     With p among the parameters the observed value is 0, or known nominal coordinates from which p departs.

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.sight import triples
 
 
 @dataclass(frozen=True, eq=False)
-class LevelPlanes(Kind):
+class LevelPlanes(ObservationKind):
     """observed = z of point + height - x[level] + error; observed 0 says that the point plus its height is level.
 
     A level that stands anywhere and reads a staff on each point: the reading is the `height`, and its line of sight the

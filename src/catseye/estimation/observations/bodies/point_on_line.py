@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, beside, value
 from catseye.estimation.observations.sight import triples
 from catseye.estimation.observations.unit_direction import direction, require_direction
 
 
 @dataclass(frozen=True, eq=False)
-class PointsOnLine(Kind):
+class PointsOnLine(ObservationKind):
     """observed_i = f_i . (P - centre) - x[shift_i] + error, i = 1, 2: the two components of the distance from a line.
 
     f_1, f_2 are square to the line and to each other. One number, the distance itself, would have no derivative on the

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, beside, value
 from catseye.estimation.observations.sight import triples
 from catseye.estimation.observations.unit_direction import direction, require_direction
 
 
 @dataclass(frozen=True, eq=False)
-class PointsOnPlane(Kind):
+class PointsOnPlane(ObservationKind):
     """observed = u . (P - centre) - x[offset] + error: the distance from the plane, positive where the normal points.
 
     Three parameters are minimal: two tilts of the normal u from its start (see `observations.unit_direction`) and the

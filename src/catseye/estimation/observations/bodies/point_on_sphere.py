@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import Kind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
 from catseye.estimation.observations.sight import both, length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
-class PointsOnSphere(Kind):
+class PointsOnSphere(ObservationKind):
     """observed = |P - C| - radius - x[radius_column] + error: the distance from the sphere, positive outside.
 
     name            what the group is, for reports

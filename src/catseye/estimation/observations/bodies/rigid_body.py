@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.estimation.observations.bodies.pose import frame_columns, in_frame, require_rotation
-from catseye.estimation.observations.kind import Kind
+from catseye.estimation.observations.kind import ObservationKind
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBodies(Kind):
+class RigidBodies(ObservationKind):
     """observed = R' (X - T) + error: the coordinates of ground points X in the body, R = exp([w]x) R0; see `pose`.
 
     What was observed is the body, in its own axes, with the covariance of its calibration; six parameters say where it

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.observations.kind import Kind, optional, value
+from catseye.estimation.observations.kind import ObservationKind, optional, value
 from catseye.estimation.observations.sight import length, triples
 from catseye.estimation.observations.unit_direction import direction, require_direction
 
@@ -16,7 +16,7 @@ EYE = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
-class RigidTriplets(Kind):
+class RigidTriplets(ObservationKind):
     """Five rows a unit, observed = (along, across, height, spacing, squareness) - x[offset] + error.
 
     With e the unit vector from the left to the right prism, u the plate's normal at its tilts, n the part of u that is

@@ -12,11 +12,17 @@ from pydantic import Field, model_validator
 
 from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet, Words
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    provenance,
+    quantities,
+    residuals_by_number,
+    scatter_notes,
+)
 
 BLOCKS, SPACERS = "gauge-blocks", "spacers"
 LENGTH, TEMPERATURE = Within(0.1, 10_000), Within(-40, 60)
@@ -82,11 +88,11 @@ class SpacersSheet(LengthSheet):
 
 OPTIONAL = {"temperature_c": TEMPERATURE}
 READS = Within(-10_000, 10_000)
-BLOCKS_LAYOUT = Layout(BLOCKS, BlocksSheet, required={"blocks": TEXT, "reads_mm": READS}, optional=OPTIONAL)
-SPACERS_LAYOUT = Layout(SPACERS, SpacersSheet, required={"spacer": TEXT, "reads_mm": READS}, optional=OPTIONAL)
+BLOCKS_LAYOUT = SheetLayout(BLOCKS, BlocksSheet, required={"blocks": TEXT, "reads_mm": READS}, optional=OPTIONAL)
+SPACERS_LAYOUT = SheetLayout(SPACERS, SpacersSheet, required={"spacer": TEXT, "reads_mm": READS}, optional=OPTIONAL)
 
 
-def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Zero and scale of an instrument from what it reads on stacks of gauge blocks.
 
     readings   columns blocks ("100+25+1.005", names of the sheet's blocks) and reads_mm; sheet BlocksSheet
@@ -142,7 +148,7 @@ def calibrate_against_blocks(readings: Readings, reject: bool = False) -> Calibr
     )
 
 
-def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Lengths of spacers at 20 °C, with the covariance that the instrument and the thermometer give them in common.
 
     readings   columns spacer (its name) and reads_mm; sheet SpacersSheet
@@ -186,7 +192,7 @@ def calibrate_spacers(readings: Readings, reject: bool = False) -> Calibration:
     )
 
 
-def _stacks(readings: Readings) -> np.ndarray:
+def _stacks(readings: SheetReadings) -> np.ndarray:
     """(m, blocks) how often each block stands in each stack: 0 or 1."""
     known = {block.name: k for k, block in enumerate(readings.sheet.block)}
     used = np.zeros((len(readings), len(known)))
@@ -200,10 +206,10 @@ def _stacks(readings: Readings) -> np.ndarray:
     return used
 
 
-def _scatter(sheet: LengthSheet, m: int) -> Scatter:
+def _scatter(sheet: LengthSheet, m: int) -> ObservedScatter:
     if sheet.u_reading_mm is not None:
-        return Scatter(sheet.u_reading_mm**2 * np.eye(m))
-    return Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+        return ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))
+    return ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
 
 
 def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
@@ -218,7 +224,7 @@ def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> 
     ]
 
 
-def _common(readings: Readings, fit: Fit, length: np.ndarray) -> dict[str, Any]:
+def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> dict[str, Any]:
     """What both kinds tell alike."""
     word = next(iter(readings.words))
     rows = tuple(
@@ -237,5 +243,7 @@ def _common(readings: Readings, fit: Fit, length: np.ndarray) -> dict[str, Any]:
     }
 
 
-BLOCKS_RECIPE = Kind("zero and scale of an instrument against gauge blocks", BLOCKS_LAYOUT, calibrate_against_blocks)
-SPACERS_RECIPE = Kind("lengths of spacers by a calibrated instrument", SPACERS_LAYOUT, calibrate_spacers)
+BLOCKS_RECIPE = CalibrationKind(
+    "zero and scale of an instrument against gauge blocks", BLOCKS_LAYOUT, calibrate_against_blocks
+)
+SPACERS_RECIPE = CalibrationKind("lengths of spacers by a calibrated instrument", SPACERS_LAYOUT, calibrate_spacers)

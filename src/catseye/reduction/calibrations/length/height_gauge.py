@@ -20,13 +20,13 @@ from pydantic import Field, model_validator
 
 from catseye.constants import ARCSECOND, PPM
 from catseye.geometry.catenary import expanded
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within, broken_rule
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.length.gauge_blocks import Block
 
 KIND = "height-gauge"
@@ -82,7 +82,7 @@ class HeightSheet(Sheet):
         return self
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     HeightSheet,
     required={"setup": TEXT, "up": TEXT, "front": TEXT, "feature": TEXT, "touch": TEXT, "height_mm": HEIGHT},
@@ -90,7 +90,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_height_gauge(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Offsets of the scan point from the tooling ball, mount axes, from heights over a surface plate.
 
     readings   columns setup (a word for each), up and front ("+y": the mount's axis that looks there), feature ("ball"
@@ -132,14 +132,14 @@ def calibrate_height_gauge(readings: Readings, reject: bool = False) -> Calibrat
         return true - off - observed * p["scale"]
 
     eye = np.eye(m)
-    scatter = Scatter(np.zeros((m, m)), {"scatter of one reading": eye}, size=float(np.abs(observed).max()))
+    scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": eye}, size=float(np.abs(observed).max()))
     if sheet.u_reading_mm is not None:
-        scatter = Scatter(sheet.u_reading_mm**2 * eye)
+        scatter = ObservedScatter(sheet.u_reading_mm**2 * eye)
     found = fit_curved(observed, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level)
     return _told(readings, found, [name for name in OFFSETS if name in sought])
 
 
-def _placed(readings: Readings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _placed(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(m, 3, 3) plate axes (right, front, up) in mount axes; (m,) whether the mirror is touched; (m,) +1, 0, -1."""
     turned = np.zeros((len(readings), 3, 3))
     seen: dict[str, tuple[str, str]] = {}
@@ -173,7 +173,7 @@ def _placed(readings: Readings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return turned, mirror, np.array([TOUCH[word] for word in readings.words["touch"]])
 
 
-def _stacks(readings: Readings) -> tuple[np.ndarray, np.ndarray]:
+def _stacks(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray]:
     """(m, blocks) 1 where a block stands under the indicator, and (m,) films between them."""
     known = {block.name: k for k, block in enumerate(readings.sheet.block)}
     used = np.zeros((len(readings), len(known)))
@@ -188,38 +188,38 @@ def _stacks(readings: Readings) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parameters(
-    readings: Readings, sought: set[str], setups: list[str], observed: np.ndarray, which: np.ndarray
-) -> list[Parameter]:
+    readings: SheetReadings, sought: set[str], setups: list[str], observed: np.ndarray, which: np.ndarray
+) -> list[ModelParameter]:
     """Those that all set-ups share, three of each set-up, one of each block."""
     sheet = readings.sheet
     offsets = []
     for name in OFFSETS:
         value = getattr(sheet, f"{name}_mm")
         if name in sought:
-            offsets.append(Parameter(name, value or 0.0, 1e-2))
+            offsets.append(ModelParameter(name, value or 0.0, 1e-2))
         elif value is None:
             raise refusal(
                 readings.sheet_file,
                 f"{name}_mm is missing (expected with u_offset_mm, as no set-up of {readings.file} has {name[1]} up)",
             )
         else:
-            offsets.append(Parameter(name, value, 1e-2, sheet.u_offset_mm))
+            offsets.append(ModelParameter(name, value, 1e-2, sheet.u_offset_mm))
     lean, seating = sheet.u_lean_arcsec * ARCSECOND, sheet.u_seating_arcsec * ARCSECOND
     shared = [
         *offsets,
-        Parameter("ball diameter", sheet.ball_diameter_mm or 0.0, 1e-2, sheet.u_ball_diameter_mm),
-        Parameter("mirror diameter", sheet.mirror_diameter_mm or 0.0, 1e-2, sheet.u_mirror_diameter_mm),
-        *(Parameter(f"{axis} set-ups lean {way}", 0.0, 1e-4, lean) for axis in AXES for way in WAYS),
-        Parameter("film", 0.0, 1e-3, sheet.u_film_um * 1e-3),
-        Parameter("scale", 0.0, 1e-4, sheet.u_scale_ppm * PPM),
+        ModelParameter("ball diameter", sheet.ball_diameter_mm or 0.0, 1e-2, sheet.u_ball_diameter_mm),
+        ModelParameter("mirror diameter", sheet.mirror_diameter_mm or 0.0, 1e-2, sheet.u_mirror_diameter_mm),
+        *(ModelParameter(f"{axis} set-ups lean {way}", 0.0, 1e-4, lean) for axis in AXES for way in WAYS),
+        ModelParameter("film", 0.0, 1e-3, sheet.u_film_um * 1e-3),
+        ModelParameter("scale", 0.0, 1e-4, sheet.u_scale_ppm * PPM),
     ]
     for k, setup in enumerate(setups):
-        shared.append(Parameter(f"zero of {setup}", float(np.mean(observed[which == k])), 1e-2))
-        shared += [Parameter(f"{setup} leans {way}", 0.0, 1e-4, seating) for way in WAYS]
-    return shared + [Parameter(f"block {block.name}", 0.0, 1e-3, block.u_mm) for block in sheet.block]
+        shared.append(ModelParameter(f"zero of {setup}", float(np.mean(observed[which == k])), 1e-2))
+        shared += [ModelParameter(f"{setup} leans {way}", 0.0, 1e-4, seating) for way in WAYS]
+    return shared + [ModelParameter(f"block {block.name}", 0.0, 1e-3, block.u_mm) for block in sheet.block]
 
 
-def _told(readings: Readings, found: CurvedFit, sought: list[str]) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, sought: list[str]) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     given, covariance = found.quantities(
         [
@@ -263,4 +263,6 @@ def _told(readings: Readings, found: CurvedFit, sought: list[str]) -> Calibratio
     )  # fmt: skip
 
 
-RECIPE = Kind("offsets of the mirror from the tooling ball, by a height gauge", LAYOUT, calibrate_height_gauge)
+RECIPE = CalibrationKind(
+    "offsets of the mirror from the tooling ball, by a height gauge", LAYOUT, calibrate_height_gauge
+)

@@ -11,11 +11,17 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.geometry.catenary import expanded, span, unstretched
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    provenance,
+    quantities,
+    residuals_by_number,
+    scatter_notes,
+)
 
 KIND = "invar-wire"
 TENSION, TEMPERATURE, HEIGHT, SCALE = Within(5, 2000), Within(-40, 60), Within(-20_000, 20_000), Within(-1000, 1000)
@@ -79,7 +85,7 @@ class WireSheet(Sheet):
     u_reading_mm: Uncertainty | None = None
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     WireSheet,
     required={},
@@ -92,7 +98,7 @@ LAYOUT = Layout(
 )
 
 
-def measure_with_wire(readings: Readings, reject: bool = False) -> Calibration:
+def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibration:
     """The distance between two marks by a wire; or, where the sheet knows the distance, the wire's length.
 
     readings   columns tension_n, temperature_c, height_difference_mm, scale_sum_mm where they changed; sheet WireSheet
@@ -117,9 +123,9 @@ def measure_with_wire(readings: Readings, reject: bool = False) -> Calibration:
         observed, design = known - seen, _slope(values, "certified_mm", sheet.hanging)[:, None]
         effects = [Effect(e.name, -e.column, e.u) for e in effects]
         effects.append(Effect("known distance, mm", np.ones(m), sheet.u_known_distance_mm))
-    scatter = Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+    scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
     if sheet.u_reading_mm is not None:
-        scatter = Scatter(sheet.u_reading_mm**2 * np.eye(m))
+        scatter = ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))
     fit = fit_readings(
         observed,
         design,
@@ -169,7 +175,7 @@ def _slope(values: dict[str, np.ndarray], name: str, hanging: bool) -> np.ndarra
     return (moved(step) - moved(-step)) / (2.0 * step)
 
 
-def _told(readings: Readings, fit: Fit, seen: np.ndarray) -> Calibration:
+def _told(readings: SheetReadings, fit: CalibrationFit, seen: np.ndarray) -> Calibration:
     sheet = readings.sheet
     known = sheet.known_distance_mm
     if known is None:
@@ -216,4 +222,4 @@ def _told(readings: Readings, fit: Fit, seen: np.ndarray) -> Calibration:
     )
 
 
-RECIPE = Kind("distance by a hanging Invar wire, or the wire by a distance", LAYOUT, measure_with_wire)
+RECIPE = CalibrationKind("distance by a hanging Invar wire, or the wire by a distance", LAYOUT, measure_with_wire)

@@ -24,13 +24,13 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle
 from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts, imperfect_ray
 from catseye.geometry.mirror.mount import gamma
-from catseye.geometry.mirror.pointing import Station, aim
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.geometry.mirror.pointing import MirrorStation, aim
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "alignment"
 COUNTS, SPOT, PATH = Within(-1_000_000, 1_000_000), Within(-1000, 1000), Within(-10, 500)
@@ -66,14 +66,14 @@ class AlignmentSheet(Sheet):
     effect_distance_m: Annotated[float, Within(1, 1000)] = 100.0
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     AlignmentSheet,
     required={"screen": TEXT, "path_m": PATH, "azimuth_counts": COUNTS, "p_mm": SPOT, "q_mm": SPOT},
 )
 
 
-def calibrate_alignment(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Place and tilt of the laser beam against the azimuth axis, with what they do to range and pointing.
 
     readings   columns screen (a word for each), path_m (past the mirror along the beam, below zero before it; one for
@@ -95,15 +95,15 @@ def calibrate_alignment(readings: Readings, reject: bool = False) -> Calibration
     theta = azimuth_angle(readings.get("azimuth_counts"), sheet.na0)
     cosine, sine = np.cos(theta), np.sin(theta)
     observed = np.column_stack([readings.get("p_mm"), readings.get("q_mm")])
-    parameters = [Parameter(name, 0.0, 1e-2) for name in ("beam x", "beam y")]
-    parameters += [Parameter(name, 0.0, 1e-5) for name in ("tilt x", "tilt y")]
+    parameters = [ModelParameter(name, 0.0, 1e-2) for name in ("beam x", "beam y")]
+    parameters += [ModelParameter(name, 0.0, 1e-5) for name in ("tilt x", "tilt y")]
     for k, name in enumerate(names):
         middle = observed[which == k].mean(axis=0)
         parameters += [
-            Parameter(f"{axis} of screen {name}", float(v), 1e-2) for axis, v in zip("pq", middle, strict=True)
+            ModelParameter(f"{axis} of screen {name}", float(v), 1e-2) for axis, v in zip("pq", middle, strict=True)
         ]
-        parameters.append(Parameter(f"turn of screen {name}", 0.0, 1e-4, sheet.u_screen_turn_deg * DEGREE))
-        parameters.append(Parameter(f"path of screen {name}", 0.0, 1e-2, sheet.u_path_mm))
+        parameters.append(ModelParameter(f"turn of screen {name}", 0.0, 1e-4, sheet.u_screen_turn_deg * DEGREE))
+        parameters.append(ModelParameter(f"path of screen {name}", 0.0, 1e-2, sheet.u_path_mm))
 
     def predict(values: np.ndarray) -> np.ndarray:
         zero_p, zero_q, turn, further = values[4:].reshape(-1, 4)[which].T
@@ -115,9 +115,9 @@ def calibrate_alignment(readings: Readings, reject: bool = False) -> Calibration
         ).ravel()
 
     eye = np.eye(2 * m)
-    scatter = Scatter(np.zeros_like(eye), {"scatter of a spot": eye})
+    scatter = ObservedScatter(np.zeros_like(eye), {"scatter of a spot": eye})
     if sheet.u_spot_mm is not None:
-        scatter = Scatter(sheet.u_spot_mm**2 * eye)
+        scatter = ObservedScatter(sheet.u_spot_mm**2 * eye)
     found = fit_curved(
         observed.ravel(),
         predict,
@@ -149,7 +149,7 @@ def effect(
     (-0.0, [[0.0, 0.796]])
     """
     imperfections = Imperfections(np.array([0.0, 0.0, *beam_mm]) * MILLIMETRE, tilts, NONE, NONE)
-    station = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+    station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     u = np.stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.full(len(theta), np.cos(phi))], axis=-1)
     target = distance * u @ gamma(0.0, 0.0, 0.0)
     counts = imperfect_counts(station, imperfections, target)
@@ -160,7 +160,7 @@ def effect(
     return way - distance, counts - np.stack([ideal.azimuth_counts, ideal.elevation_counts], axis=-1)
 
 
-def _told(readings: Readings, found: CurvedFit) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     wanted = [
         (f"beam {axis}", f"beam_{axis}_mm", "mm", f"laser beam from the azimuth axis at the mirror, along {axis}", 1.0)
@@ -228,7 +228,7 @@ def _effects(sheet: AlignmentSheet, found: CurvedFit) -> list[str]:
     return told
 
 
-def _circles(readings: Readings, found: CurvedFit) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _circles(readings: SheetReadings, found: CurvedFit) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Spots about the middle of their screens, and the circles."""
     names = list(dict.fromkeys(readings.words["screen"]))
     which = np.array([names.index(word) for word in readings.words["screen"]])
@@ -248,6 +248,6 @@ def _circles(readings: Readings, found: CurvedFit) -> dict[str, tuple[np.ndarray
     }
 
 
-RECIPE = Kind(
+RECIPE = CalibrationKind(
     "the laser beam against the azimuth axis, with its effect on range and pointing", LAYOUT, calibrate_alignment
 )

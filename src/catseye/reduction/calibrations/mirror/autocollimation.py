@@ -20,13 +20,13 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.mirror.autocollimator import face_normal, flat_reading, mirror_reading
 from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "autocollimation"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -72,7 +72,7 @@ class AutocollimationSheet(Sheet):
     u_count: Annotated[float, Within(0, 10)] = 0.29
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     AutocollimationSheet,
     required={"azimuth_counts": COUNTS, "elevation_counts": COUNTS, "x_arcsec": ARC, "y_arcsec": ARC},
@@ -80,7 +80,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_autocollimation(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Turn of the mirror's axes in the mount, encoder zeros and face tilt, from autocollimator readings.
 
     readings   columns azimuth_counts, elevation_counts, x_arcsec, y_arcsec, perhaps into ("mirror" or "flat"); sheet
@@ -129,7 +129,7 @@ def calibrate_autocollimation(readings: Readings, reject: bool = False) -> Calib
     return _told(readings, found, flat, shown)
 
 
-def _flat(readings: Readings) -> np.ndarray:
+def _flat(readings: SheetReadings) -> np.ndarray:
     """(m,) bool: into the flat. Refuses other words, and counts that do not look there."""
     sheet, words = readings.sheet, readings.words.get("into", ("mirror",) * len(readings))
     for row, word in enumerate(words):
@@ -156,33 +156,33 @@ def _flat(readings: Readings) -> np.ndarray:
     return flat
 
 
-def _parameters(readings: Readings, flat: bool) -> list[Parameter]:
+def _parameters(readings: SheetReadings, flat: bool) -> list[ModelParameter]:
     sheet = readings.sheet
 
-    def arcseconds(name: str, u: float | None) -> Parameter:
-        return Parameter(name, 0.0, STEP, np.inf if u is None else u * ARCSECOND)
+    def arcseconds(name: str, u: float | None) -> ModelParameter:
+        return ModelParameter(name, 0.0, STEP, np.inf if u is None else u * ARCSECOND)
 
     return [
-        Parameter("beta1", 0.0, STEP),
-        Parameter("beta2", 0.0, STEP),
-        Parameter("N_a0", sheet.na0_nominal, 0.1, np.inf if flat else sheet.u_na0_counts),
-        Parameter("N_e0", sheet.ne0_nominal, 0.1),
+        ModelParameter("beta1", 0.0, STEP),
+        ModelParameter("beta2", 0.0, STEP),
+        ModelParameter("N_a0", sheet.na0_nominal, 0.1, np.inf if flat else sheet.u_na0_counts),
+        ModelParameter("N_e0", sheet.ne0_nominal, 0.1),
         arcseconds("face tilt", sheet.u_face_tilt_arcsec),
         arcseconds("axis tilt", sheet.u_axis_tilt_arcsec),
         arcseconds("lean x", sheet.u_lean_x_arcsec),
         arcseconds("lean y", sheet.u_lean_y_arcsec),
         arcseconds("roll", sheet.u_roll_arcsec),
-        Parameter("scale", 0.0, 1e-3, sheet.u_scale_percent / 100.0),
+        ModelParameter("scale", 0.0, 1e-3, sheet.u_scale_percent / 100.0),
         arcseconds("flat up", sheet.u_flat_arcsec if flat else 0.0),
         arcseconds("flat along", sheet.u_flat_turn_arcsec if flat else 0.0),
     ]
 
 
-def _scatter(readings: Readings, shaking: np.ndarray) -> Scatter:
+def _scatter(readings: SheetReadings, shaking: np.ndarray) -> ObservedScatter:
     if readings.has("u_reading_arcsec"):
         u = np.repeat(readings.get("u_reading_arcsec") * ARCSECOND, 2)
-        return Scatter(shaking + np.diag(u**2))
-    return Scatter(shaking, {"scatter of one reading": np.eye(len(shaking))})
+        return ObservedScatter(shaking + np.diag(u**2))
+    return ObservedScatter(shaking, {"scatter of one reading": np.eye(len(shaking))})
 
 
 WANTED = (
@@ -194,7 +194,7 @@ WANTED = (
 )
 
 
-def _told(readings: Readings, found: CurvedFit, flat: np.ndarray, shown: float) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: float) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     sought = {p.name for p in found.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
@@ -235,13 +235,13 @@ def _told(readings: Readings, found: CurvedFit, flat: np.ndarray, shown: float) 
     )  # fmt: skip
 
 
-def _tilt_decision(found: CurvedFit, limit: float | None) -> Decision:
+def _tilt_decision(found: CurvedFit, limit: float | None) -> TestOutcome:
     name, nan = "face parallel to the elevation shaft: |tilt|, arcsec", float("nan")
     if not np.isinf(found.parameters[found.index("face tilt")].u):
-        return Decision(name, nan, nan, None, "the readings were not asked for the tilt; it has a prior")
+        return TestOutcome(name, nan, nan, None, "the readings were not asked for the tilt; it has a prior")
     tilt, u = found.value("face tilt") / ARCSECOND, found.u("face tilt") / ARCSECOND
     text = f'the face leans {tilt:+.2f}" (u {u:.2g}"); the record corrects for it'
-    return Decision(name, abs(tilt), limit or nan, None if limit is None else abs(tilt) <= limit, text)
+    return TestOutcome(name, abs(tilt), limit or nan, None if limit is None else abs(tilt) <= limit, text)
 
 
 def _notes(found: CurvedFit, flat: bool) -> tuple[str, ...]:
@@ -268,7 +268,7 @@ def _notes(found: CurvedFit, flat: bool) -> tuple[str, ...]:
 
 
 def _circles(
-    readings: Readings, found: CurvedFit, flat: np.ndarray, shown: float
+    readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: float
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Readings into the mirror, and the circle that each elevation setting gives, arcsec of mirror angles."""
     sheet, scale = readings.sheet, 0.5 / shown
@@ -291,4 +291,6 @@ def _circles(
     }
 
 
-RECIPE = Kind("mirror axes, encoder zeros and face tilt from an autocollimator", LAYOUT, calibrate_autocollimation)
+RECIPE = CalibrationKind(
+    "mirror axes, encoder zeros and face tilt from an autocollimator", LAYOUT, calibrate_autocollimation
+)

@@ -16,13 +16,13 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.mirror.mirror_path import path_change
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 
 KIND = "both-faces"
 DISTANCE = Within(0.1, 10_000)
@@ -44,7 +44,7 @@ class BothFacesSheet(Sheet):
     u_zero_mm: Annotated[float, Within(0, 100)] | None = None
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     BothFacesSheet,
     required={"line": TEXT, "to": TEXT, "pointing": TEXT, "phi_deg": Within(1, 179), "distance_m": DISTANCE},
@@ -52,7 +52,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_both_faces(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Axis offset, and where distances are known mirror offset, from distances in both pointings.
 
     readings   columns line (a word for each line of sight), to ("face", "back", "target"), pointing ("direct",
@@ -86,16 +86,16 @@ def calibrate_both_faces(readings: Readings, reject: bool = False) -> Calibratio
         return answer
 
     eye = np.eye(len(readings))
-    scatter = Scatter(np.zeros_like(eye), {"scatter of one distance": eye}, size=float(measured.max()))
+    scatter = ObservedScatter(np.zeros_like(eye), {"scatter of one distance": eye}, size=float(measured.max()))
     if readings.sheet.u_distance_mm is not None:
-        scatter = Scatter((readings.sheet.u_distance_mm * MILLIMETRE) ** 2 * eye)
+        scatter = ObservedScatter((readings.sheet.u_distance_mm * MILLIMETRE) ** 2 * eye)
     found = fit_curved(
         measured, predict, parameters, scatter, active=readings.active, reject=reject, level=readings.sheet.level
     )
     return _told(readings, found, words, known)
 
 
-def _checked(readings: Readings) -> dict[str, tuple[str, ...]]:
+def _checked(readings: SheetReadings) -> dict[str, tuple[str, ...]]:
     """The columns of words, each of them one of those expected."""
     expected = {"to": (FACE, BACK, TARGET), "pointing": POINTINGS}
     for name, allowed in expected.items():
@@ -105,7 +105,7 @@ def _checked(readings: Readings) -> dict[str, tuple[str, ...]]:
     return {name: readings.words[name] for name in ("line", *expected)}
 
 
-def _lines(readings: Readings, words: dict[str, tuple[str, ...]]) -> list[str]:
+def _lines(readings: SheetReadings, words: dict[str, tuple[str, ...]]) -> list[str]:
     """A name for what each reading's unknown length is: of the line, or of the line to one of its ends."""
     if "known_distance_m" not in readings.numbers:
         return [f"{line} ({to})" for line, to in zip(words["line"], words["to"], strict=True)]
@@ -123,21 +123,23 @@ def _lines(readings: Readings, words: dict[str, tuple[str, ...]]) -> list[str]:
     return list(words["line"])
 
 
-def _parameters(readings: Readings, keys: list[str], which: np.ndarray, to: dict[str, np.ndarray]) -> list[Parameter]:
+def _parameters(
+    readings: SheetReadings, keys: list[str], which: np.ndarray, to: dict[str, np.ndarray]
+) -> list[ModelParameter]:
     sheet = readings.sheet
     known = "known_distance_m" in readings.numbers
     seen = readings.get("known_distance_m" if known else "distance_m")
     u = sheet.u_known_distance_mm * MILLIMETRE if known else np.inf
     return [
-        Parameter("axis offset", 0.0, 1e-2),
-        Parameter("mirror offset", 0.0, 1e-2, np.inf if known and (to[FACE] | to[TARGET]).any() else 0.0),
-        Parameter("back retroreflector", 0.0, 1e-2, np.inf if known and to[BACK].any() else 0.0),
-        Parameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if known and to[TARGET].any() else 0.0),
-        *(Parameter(f"line {key}", float(seen[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
+        ModelParameter("axis offset", 0.0, 1e-2),
+        ModelParameter("mirror offset", 0.0, 1e-2, np.inf if known and (to[FACE] | to[TARGET]).any() else 0.0),
+        ModelParameter("back retroreflector", 0.0, 1e-2, np.inf if known and to[BACK].any() else 0.0),
+        ModelParameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if known and to[TARGET].any() else 0.0),
+        *(ModelParameter(f"line {key}", float(seen[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
     ]
 
 
-def _told(readings: Readings, found: CurvedFit, words: dict[str, tuple[str, ...]], known: bool) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, words: dict[str, tuple[str, ...]], known: bool) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     wanted = [
         ("axis offset", "axis_offset_mm", "mm", "elevation axis off the azimuth axis, along the beam's azimuth", 1.0)
@@ -189,4 +191,6 @@ def _told(readings: Readings, found: CurvedFit, words: dict[str, tuple[str, ...]
     )
 
 
-RECIPE = Kind("axis and mirror offset from distances in direct and prime pointing", LAYOUT, calibrate_both_faces)
+RECIPE = CalibrationKind(
+    "axis and mirror offset from distances in direct and prime pointing", LAYOUT, calibrate_both_faces
+)

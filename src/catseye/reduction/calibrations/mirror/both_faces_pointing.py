@@ -20,14 +20,14 @@ from catseye.geometry.frames.rotation import from_vector
 from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, HALF_TURN, azimuth_angle, elevation_angle
 from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
 from catseye.geometry.mirror.mount import gamma
-from catseye.geometry.mirror.pointing import Station
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.geometry.mirror.pointing import MirrorStation
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 
 KIND = "both-faces-pointing"
@@ -65,7 +65,7 @@ class PointingSheet(Sheet):
     u_counts: Annotated[float, Within(0, 1000, above=True)] | None = None
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     PointingSheet,
     required={
@@ -79,7 +79,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_both_faces_pointing(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Face tilt and N_e0, with known directions beam tilt and N_a0 too, from counts in both pointings.
 
     readings   columns target (its name), pointing ("direct", "prime"), azimuth_counts, elevation_counts, distance_m
@@ -108,7 +108,7 @@ def calibrate_both_faces_pointing(readings: Readings, reject: bool = False) -> C
         u = np.column_stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.cos(phi)])
         points = distance[:, None] * (u @ from_vector(np.array([frame_x, frame_y, 0.0])).T)
         offsets = np.array([e, s, beam_x, beam_y]) * MILLIMETRE
-        station = Station(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([na0, ne0]))
+        station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([na0, ne0]))
         seen = imperfect_counts(
             station, Imperfections(offsets, np.array([face, tilt_x, tilt_y]), NONE, NONE), points @ AXES, prime=prime
         )
@@ -119,9 +119,9 @@ def calibrate_both_faces_pointing(readings: Readings, reject: bool = False) -> C
     start = predict(np.array([p.start for p in parameters])).reshape(m, 2)
     back[:, 0] = 2.0 * HALF_TURN * np.round((observed[:, 0] - start[:, 0]) / (2.0 * HALF_TURN))
     eye = np.eye(2 * m)
-    scatter = Scatter(np.zeros_like(eye), {"scatter of a count": eye}, size=float(np.abs(observed).max()))
+    scatter = ObservedScatter(np.zeros_like(eye), {"scatter of a count": eye}, size=float(np.abs(observed).max()))
     if readings.sheet.u_counts is not None:
-        scatter = Scatter(readings.sheet.u_counts**2 * eye)
+        scatter = ObservedScatter(readings.sheet.u_counts**2 * eye)
     found = fit_curved(
         observed.ravel(),
         predict,
@@ -135,7 +135,9 @@ def calibrate_both_faces_pointing(readings: Readings, reject: bool = False) -> C
     return _told(readings, found)
 
 
-def _parameters(readings: Readings, names: list[str], which: np.ndarray, prime: np.ndarray) -> list[Parameter]:
+def _parameters(
+    readings: SheetReadings, names: list[str], which: np.ndarray, prime: np.ndarray
+) -> list[ModelParameter]:
     """Twelve of the mirror, two of each target; directions that nobody knows begin where the counts point."""
     sheet = readings.sheet
     known = "theta_deg" in readings.numbers and "phi_deg" in readings.numbers
@@ -151,14 +153,17 @@ def _parameters(readings: Readings, names: list[str], which: np.ndarray, prime: 
                 )
     free = np.inf if known else 0.0
     mirror = [
-        Parameter("N_a0", sheet.na0_nominal, 0.1, free),
-        Parameter("N_e0", sheet.ne0_nominal, 0.1),
-        Parameter("face tilt", 0.0, STEP),
-        Parameter("beam tilt x", 0.0, STEP, free),
-        Parameter("beam tilt y", 0.0, STEP, free),
-        *(Parameter(key, getattr(sheet, key), 1e-2, sheet.u_axis_mm) for key in OFFSETS),
-        Parameter("axis tilt", 0.0, STEP, sheet.u_axis_tilt_arcsec * ARCSECOND),
-        *(Parameter(f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if known else 0.0) * ARCSECOND) for axis in "xy"),
+        ModelParameter("N_a0", sheet.na0_nominal, 0.1, free),
+        ModelParameter("N_e0", sheet.ne0_nominal, 0.1),
+        ModelParameter("face tilt", 0.0, STEP),
+        ModelParameter("beam tilt x", 0.0, STEP, free),
+        ModelParameter("beam tilt y", 0.0, STEP, free),
+        *(ModelParameter(key, getattr(sheet, key), 1e-2, sheet.u_axis_mm) for key in OFFSETS),
+        ModelParameter("axis tilt", 0.0, STEP, sheet.u_axis_tilt_arcsec * ARCSECOND),
+        *(
+            ModelParameter(f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if known else 0.0) * ARCSECOND)
+            for axis in "xy"
+        ),
     ]
     theta = azimuth_angle(readings.get("azimuth_counts"), sheet.na0_nominal) - np.where(prime, np.pi, 0.0)
     phi = np.abs(elevation_angle(readings.get("elevation_counts"), sheet.ne0_nominal))
@@ -173,12 +178,12 @@ def _parameters(readings: Readings, names: list[str], which: np.ndarray, prime: 
     for k, name in enumerate(names):
         first = int(np.argmax(which == k))
         across = np.sin(phi[first])  # u is across the sight
-        mirror.append(Parameter(f"theta of {name}", float(theta[first]), STEP, u / across))
-        mirror.append(Parameter(f"phi of {name}", float(phi[first]), STEP, u))
+        mirror.append(ModelParameter(f"theta of {name}", float(theta[first]), STEP, u / across))
+        mirror.append(ModelParameter(f"phi of {name}", float(phi[first]), STEP, u))
     return mirror
 
 
-def _one_direction_each(readings: Readings, which: np.ndarray) -> None:
+def _one_direction_each(readings: SheetReadings, which: np.ndarray) -> None:
     """The known direction of a target is one; another one is another target."""
     for name in ("theta_deg", "phi_deg"):
         given = readings.get(name)
@@ -207,7 +212,7 @@ WANTED = (
 )
 
 
-def _told(readings: Readings, found: CurvedFit) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
     fit, sought = found.fit, {p.name for p in found.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
     given, covariance = found.quantities(wanted)
@@ -251,6 +256,6 @@ def _told(readings: Readings, found: CurvedFit) -> Calibration:
     )  # fmt: skip
 
 
-RECIPE = Kind(
+RECIPE = CalibrationKind(
     "face tilt, beam tilt and encoder zeros from counts in both pointings", LAYOUT, calibrate_both_faces_pointing
 )

@@ -18,13 +18,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes, student
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
 
 KIND = "detector-focus"
 PLACE, VOLTS = Within(-100, 100), Within(0, 20, above=True)
@@ -59,10 +59,10 @@ class FocusSheet(Sheet):
     half_wavelength_mm: Annotated[float, Within(1, 10_000)] = 99.93
 
 
-LAYOUT = Layout(KIND, FocusSheet, required={"position_mm": PLACE, "amplitude_volt": VOLTS})
+LAYOUT = SheetLayout(KIND, FocusSheet, required={"position_mm": PLACE, "amplitude_volt": VOLTS})
 
 
-def calibrate_detector_focus(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_detector_focus(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Best focus and depth of focus of the detector, and its defocus as installed.
 
     readings   columns position_mm (growing one way along the optical axis) and amplitude_volt, leakage taken out; sheet
@@ -86,7 +86,7 @@ def calibrate_detector_focus(readings: Readings, reject: bool = False) -> Calibr
     found = _fitted(readings, observed, model, _parameters(sheet, place, observed), reject)
     longer = None
     if sheet.model == BEAM and found.fit.active.sum() > LEAST:
-        parameters = [*found.parameters, Parameter("skew", 0.0, 1e-3)]
+        parameters = [*found.parameters, ModelParameter("skew", 0.0, 1e-3)]
         longer = _fitted(readings, observed, model, parameters, False, found.fit.active)
     return _told(readings, found, model, longer)
 
@@ -113,7 +113,7 @@ def _steepness(fill: float) -> float:
     return 1.0 if fill < SMALL else fill / np.expm1(fill)
 
 
-def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> list[Parameter]:
+def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> list[ModelParameter]:
     """Top, place and depth; then what changes nothing of the readings and only enters what they mean."""
     best = place[np.argmax(observed)]
     falls = observed.max() - observed
@@ -124,28 +124,32 @@ def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> l
         else float(np.ptp(place))
     )
     start = [
-        Parameter("top", float(observed.max()), 1e-3),
-        Parameter("best focus", float(best), 1e-4),
-        Parameter("depth", max(depth, 1e-3), 1e-4),
-        Parameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm),
-        Parameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad),
-        Parameter("half wavelength", sheet.half_wavelength_mm, 1e-3, 0.0),
+        ModelParameter("top", float(observed.max()), 1e-3),
+        ModelParameter("best focus", float(best), 1e-4),
+        ModelParameter("depth", max(depth, 1e-3), 1e-4),
+        ModelParameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm),
+        ModelParameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad),
+        ModelParameter("half wavelength", sheet.half_wavelength_mm, 1e-3, 0.0),
     ]
     if sheet.model == CURVE:
-        start += [Parameter(f"order {k}", 0.0, 1e-3) for k in range(3, sheet.degree + 1)]
+        start += [ModelParameter(f"order {k}", 0.0, 1e-3) for k in range(3, sheet.degree + 1)]
     return start
 
 
 def _fitted(
-    readings: Readings,
+    readings: SheetReadings,
     observed: np.ndarray,
     model: Model,
-    parameters: Sequence[Parameter],
+    parameters: Sequence[ModelParameter],
     reject: bool,
     active: np.ndarray | None = None,
 ) -> CurvedFit:
     eye, u = np.eye(len(readings)), readings.sheet.u_amplitude_share
-    scatter = Scatter(np.zeros_like(eye), {"scatter of an amplitude": eye}) if u is None else Scatter(u**2 * eye)
+    scatter = (
+        ObservedScatter(np.zeros_like(eye), {"scatter of an amplitude": eye})
+        if u is None
+        else ObservedScatter(u**2 * eye)
+    )
     on = readings.active if active is None else active
     return fit_curved(observed, model, parameters, scatter, active=on, reject=reject, level=readings.sheet.level)
 
@@ -181,7 +185,7 @@ def _results(found: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Quant
     return quantities(keys, values, covariance, fit=found.fit, turn=turn[:, sought]), covariance
 
 
-def _told(readings: Readings, found: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     place = readings.get("position_mm")
     given, covariance = _results(found, model, sheet.amplitude_to_phase_rad is not None)
@@ -226,7 +230,7 @@ def _told(readings: Readings, found: CurvedFit, model: Model, longer: CurvedFit 
     )  # fmt: skip
 
 
-def _within_the_run(found: CurvedFit, place: np.ndarray) -> Decision:
+def _within_the_run(found: CurvedFit, place: np.ndarray) -> TestOutcome:
     """Best focus must lie among the readings: beyond them it is a guess of the model."""
     on = place[found.fit.active]
     middle, low, high = found.value("best focus"), float(on.min()), float(on.max())
@@ -234,19 +238,19 @@ def _within_the_run(found: CurvedFit, place: np.ndarray) -> Decision:
     text = (
         "amplitudes fall on both sides" if nearer > 0.0 else "the top lies outside of the readings: go on with the run"
     )
-    return Decision("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text)
+    return TestOutcome("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text)
 
 
-def _symmetry(longer: CurvedFit | None) -> tuple[Decision, ...]:
+def _symmetry(longer: CurvedFit | None) -> tuple[TestOutcome, ...]:
     """Whether the fall is alike on both sides, by an odd term; spherical aberration makes it differ."""
     if longer is None:
         return ()
     ratio = abs(longer.value("skew")) / longer.u("skew")
     limit = float(student(longer.fit.effective[-1], ODD))  # the skew is the last that is sought
     text = "both sides fall alike" if ratio <= limit else "the sides differ (aberration): take model = 'curve'"
-    return (Decision("odd term: |skew| / u", ratio, limit, bool(ratio <= limit), text),)
+    return (TestOutcome("odd term: |skew| / u", ratio, limit, bool(ratio <= limit), text),)
 
 
-RECIPE = Kind(
+RECIPE = CalibrationKind(
     "best focus and depth of the detector, with its effect on amplitude and range", LAYOUT, calibrate_detector_focus
 )

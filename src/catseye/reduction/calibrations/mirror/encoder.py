@@ -17,13 +17,13 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, TWO_PI
 from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "encoder"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -58,7 +58,7 @@ class EncoderSheet(Sheet):
     u_counts: Annotated[float, Within(0, 100)] = 0.29
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     EncoderSheet,
     required={"angle_deg": ANGLE, "counts": COUNTS},
@@ -66,7 +66,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_encoder(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Waves of an encoder, counts, from true turns of its axis.
 
     readings   columns angle_deg (true turn from the run's first direction, growing as the counts grow) and counts;
@@ -99,7 +99,7 @@ def calibrate_encoder(readings: Readings, reject: bool = False) -> Calibration:
     parameters = _parameters(sheet, runs, which, off)
     if "face" in readings.words:
         u = sheet.u_face_arcsec * ARCSECOND
-        parameters += [Parameter(f"face {name}", 0.0, 1e-5, u) for name in faces]
+        parameters += [ModelParameter(f"face {name}", 0.0, 1e-5, u) for name in faces]
     waves, n = 2 * sheet.orders, len(runs)
 
     def predict(values: np.ndarray) -> np.ndarray:
@@ -109,22 +109,22 @@ def calibrate_encoder(readings: Readings, reject: bool = False) -> Calibration:
         return sheet.zero_counts + COUNTS_PER_RADIAN * psi + _wave(psi, values[:waves], order)
 
     eye = np.eye(m)
-    scatter = Scatter(sheet.u_counts**2 * eye, {"scatter of an angle, as counts": eye}, size=COUNTS_PER_TURN)
+    scatter = ObservedScatter(sheet.u_counts**2 * eye, {"scatter of an angle, as counts": eye}, size=COUNTS_PER_TURN)
     if sheet.u_reading_arcsec is not None:
         u = sheet.u_reading_arcsec * ARCSECOND * COUNTS_PER_RADIAN
-        scatter = Scatter((sheet.u_counts**2 + u**2) * eye)
+        scatter = ObservedScatter((sheet.u_counts**2 + u**2) * eye)
     found = fit_curved(counts, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level)
     return _told(readings, found, turn + found.values[waves : waves + n][which])
 
 
-def _labels(readings: Readings, name: str) -> tuple[list[str], np.ndarray]:
+def _labels(readings: SheetReadings, name: str) -> tuple[list[str], np.ndarray]:
     """The different words of a column and (m,) which; one for all where there is no such column."""
     words = readings.words.get(name, ("",) * len(readings))
     names = list(dict.fromkeys(words))
     return names, np.array([names.index(word) for word in words])
 
 
-def _refuse_far(readings: Readings, which: np.ndarray, off: np.ndarray) -> None:
+def _refuse_far(readings: SheetReadings, which: np.ndarray, off: np.ndarray) -> None:
     """Counts that do not go with the angles are no waves: another unit, sense or axis."""
     for row in np.flatnonzero(readings.active):
         run = (which == which[row]) & readings.active
@@ -142,16 +142,16 @@ def _wave(psi: np.ndarray, terms: np.ndarray, order: np.ndarray) -> np.ndarray:
     return np.cos(angle) @ terms[: len(order)] + np.sin(angle) @ terms[len(order) :]
 
 
-def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np.ndarray) -> list[Parameter]:
+def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np.ndarray) -> list[ModelParameter]:
     """Cosines, sines, then how each run stands to the zero."""
     waves = [f"{part} {k}" for part in ("cosine", "sine") for k in range(1, sheet.orders + 1)]
-    return [Parameter(name, 0.0, 0.1) for name in waves] + [
-        Parameter(f"start of run {name}".rstrip(), float(np.median(off[which == k])), 1e-5)
+    return [ModelParameter(name, 0.0, 0.1) for name in waves] + [
+        ModelParameter(f"start of run {name}".rstrip(), float(np.median(off[which == k])), 1e-5)
         for k, name in enumerate(runs)
     ]
 
 
-def _told(readings: Readings, found: CurvedFit, psi: np.ndarray) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, psi: np.ndarray) -> Calibration:
     sheet, fit, n = readings.sheet, found.fit, readings.sheet.orders
     wanted = [
         (f"{part} {k}", f"{sheet.axis}_encoder_{part}_{k}_counts", "counts", "term of what it reads too high", 1.0)
@@ -202,7 +202,7 @@ def _told(readings: Readings, found: CurvedFit, psi: np.ndarray) -> Calibration:
     )
 
 
-def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[Decision, ...]:
+def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[TestOutcome, ...]:
     """Whether each order is there at all: its squared Mahalanobis distance from zero.
 
     Chi-square of two degrees where the scatter is claimed, else twice Fisher's F with the scatter's own degrees.
@@ -222,8 +222,8 @@ def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[Decision, 
         limit = 2.0 * fdtri(2.0, degrees, 1.0 - level / n) if degrees < MANY else -2.0 * np.log(level / n)
         size = float(np.hypot(*pair))
         text = f"{size:.3g} counts, {'more than chance makes' if statistic > limit else 'which chance makes as well'}"
-        told.append(Decision(f"order {k}: squared distance from none", statistic, float(limit), None, text))
+        told.append(TestOutcome(f"order {k}: squared distance from none", statistic, float(limit), None, text))
     return tuple(told)
 
 
-RECIPE = Kind("an encoder's waves, once and twice a turn, from true angles", LAYOUT, calibrate_encoder)
+RECIPE = CalibrationKind("an encoder's waves, once and twice a turn, from true angles", LAYOUT, calibrate_encoder)

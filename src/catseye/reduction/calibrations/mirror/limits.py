@@ -10,13 +10,13 @@ from typing import Annotated
 import numpy as np
 
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes, student
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes, student
 
 KIND = "limits"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -37,10 +37,10 @@ class LimitsSheet(Sheet):
     na0: Annotated[float, COUNTS] | None = None
 
 
-LAYOUT = Layout(KIND, LimitsSheet, required={"stop": TEXT, "azimuth_counts": COUNTS})
+LAYOUT = SheetLayout(KIND, LimitsSheet, required={"stop": TEXT, "azimuth_counts": COUNTS})
 
 
-def calibrate_limits(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Azimuth limits from touches of both stops.
 
     readings   columns stop ("low" where the counts end downwards, "high") and azimuth_counts; sheet LimitsSheet
@@ -61,12 +61,16 @@ def calibrate_limits(readings: Readings, reject: bool = False) -> Calibration:
             raise refusal(readings.file, f"column 'stop': {name!r} was never touched (expected touches of both stops)")
     eye = np.eye(len(counts))
     claimed = sheet.u_touch_counts
-    scatter = Scatter(np.zeros_like(eye), {"scatter of a touch": eye}) if claimed is None else Scatter(claimed**2 * eye)
+    scatter = (
+        ObservedScatter(np.zeros_like(eye), {"scatter of a touch": eye})
+        if claimed is None
+        else ObservedScatter(claimed**2 * eye)
+    )
     found = fit_curved(
         counts,
         lambda values: np.where(high, values[1], values[0]),
         [
-            Parameter(f"{name} stop", float(np.median(counts[there])), 0.1)
+            ModelParameter(f"{name} stop", float(np.median(counts[there])), 0.1)
             for name, there in (("low", ~high), ("high", high))
         ],
         scatter,
@@ -78,7 +82,7 @@ def calibrate_limits(readings: Readings, reject: bool = False) -> Calibration:
     return _told(readings, found, single)
 
 
-def _told(readings: Readings, found: CurvedFit, single: float) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, single: float) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     wide = [float(times) for times in student(fit.effective, WIDE)]
     inwards = [
@@ -130,12 +134,12 @@ def _told(readings: Readings, found: CurvedFit, single: float) -> Calibration:
     )
 
 
-def _reach(low: int, high: int) -> Decision:
+def _reach(low: int, high: int) -> TestOutcome:
     """Whether every direction is reached, direct or prime: the pointings lie half a turn apart."""
     travel = float(high - low)
     reached = "every direction is reached" if travel >= HALF_TURN else "some directions are not reached"
     text = f"{reached}, in the direct or the prime pointing"
-    return Decision("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text)
+    return TestOutcome("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text)
 
 
 def _unreached(low: int, high: int, na0: float | None) -> tuple[str, ...]:
@@ -148,4 +152,4 @@ def _unreached(low: int, high: int, na0: float | None) -> tuple[str, ...]:
     return (f"Theta from {first:.2f} to {last:.2f} degrees is not reached in the direct pointing, {size:.2f} degrees",)
 
 
-RECIPE = Kind("azimuth limits from touches of both mechanical stops", LAYOUT, calibrate_limits)
+RECIPE = CalibrationKind("azimuth limits from touches of both mechanical stops", LAYOUT, calibrate_limits)

@@ -20,16 +20,16 @@ from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import global_test, single_level, w_critical
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
 from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
-from catseye.geometry.mirror.pointing import PARAMETERS, Station
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.geometry.mirror.pointing import PARAMETERS, MirrorStation
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.curved import CurvedFit, Parameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import Scatter
-from catseye.reduction.calibrations.kind import Kind, provenance, residuals_by_number
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
+from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 from catseye.reduction.site.stations import imperfections_of, station_covariance, station_of
 
@@ -71,7 +71,7 @@ class SearchSheet(Sheet):
         return record.model_dump(exclude_unset=True)
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     SearchSheet,
     required={
@@ -86,7 +86,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> Calibration:
     """A station's parameters from targets found in the field, compared with the laboratory's.
 
     readings   columns target (its name), x_m, y_m, z_m (ground frame), azimuth_counts, elevation_counts, perhaps
@@ -117,13 +117,13 @@ def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibr
     turns = np.zeros((m, 2))
     start = station_of(sheet.monument, sheet.mirror).parameters
     u = np.sqrt(np.diag(covariance))
-    parameters = [Parameter(*each) for each in zip(PARAMETERS, start, STEPS, u, strict=True)]
+    parameters = [ModelParameter(*each) for each in zip(PARAMETERS, start, STEPS, u, strict=True)]
     parameters += [
-        Parameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE) for name in names for axis in "xyz"
+        ModelParameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE) for name in names for axis in "xyz"
     ]
 
     def predict(values: np.ndarray) -> np.ndarray:
-        station = Station.of_parameters(values[:P])
+        station = MirrorStation.of_parameters(values[:P])
         return (
             imperfect_counts(station, imperfections, place + values[P:].reshape(-1, 3)[which], prime=prime) + turns
         ).ravel()
@@ -140,7 +140,7 @@ def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibr
         observed.ravel(),
         predict,
         parameters,
-        Scatter(np.diag(_u_counts(readings).ravel() ** 2)),
+        ObservedScatter(np.diag(_u_counts(readings).ravel() ** 2)),
         active=np.repeat(readings.active, 2),
         together=np.repeat(np.arange(m), 2),
         reject=reject,
@@ -149,7 +149,7 @@ def calibrate_search_results(readings: Readings, reject: bool = False) -> Calibr
     return _told(readings, found, predict)
 
 
-def _u_counts(readings: Readings) -> np.ndarray:
+def _u_counts(readings: SheetReadings) -> np.ndarray:
     """(m, 2) of azimuth and elevation: the columns', else the sheet's."""
     columns = []
     for name in ("u_azimuth_counts", "u_elevation_counts"):
@@ -162,7 +162,7 @@ def _u_counts(readings: Readings) -> np.ndarray:
     return np.column_stack(columns)
 
 
-def _prime(readings: Readings) -> np.ndarray:
+def _prime(readings: SheetReadings) -> np.ndarray:
     words = readings.words.get("pointing", ("direct",) * len(readings))
     for row, word in enumerate(words):
         if word not in POINTINGS:
@@ -170,7 +170,7 @@ def _prime(readings: Readings) -> np.ndarray:
     return np.array([word == "prime" for word in words])
 
 
-def _refuse_far(readings: Readings, off: np.ndarray) -> None:
+def _refuse_far(readings: SheetReadings, off: np.ndarray) -> None:
     """Counts a quarter turn from where the records point are another target, pointing or station."""
     far = np.any(np.abs(off) > 0.5 * HALF_TURN, axis=1) & readings.active
     if far.any():
@@ -196,7 +196,7 @@ class _Compared:
         self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
         self.decided = int(np.count_nonzero(self.share > TOLD))
 
-    def whole(self, level: float) -> Decision:
+    def whole(self, level: float) -> TestOutcome:
         """Whether laboratory and field agree in all that the counts say something of."""
         told = self.share > INFORMED
         along = self.vectors[:, told].T @ self.change
@@ -208,7 +208,7 @@ class _Compared:
             if passed
             else "the field contradicts the laboratory: look at the single changes"
         )
-        return Decision(
+        return TestOutcome(
             f"laboratory against field: chi-square, {degrees} combinations",
             statistic,
             test.upper * degrees,
@@ -216,7 +216,7 @@ class _Compared:
             text,
         )
 
-    def single(self, level: float) -> list[Decision]:
+    def single(self, level: float) -> list[TestOutcome]:
         """Each parameter's change over its own standard uncertainty."""
         limit = w_critical(single_level(level, len(self.free)))
         told = []
@@ -224,7 +224,7 @@ class _Compared:
             share, name = 1.0 - self.left[k, k], PARAMETERS[j]
             if share <= INFORMED:
                 told.append(
-                    Decision(
+                    TestOutcome(
                         f"{name}: change over its u", float("nan"), float("nan"), None, "the counts say nothing of it"
                     )
                 )
@@ -232,7 +232,7 @@ class _Compared:
             ratio = float(self.change[k] / np.sqrt(share))
             left = np.sqrt(self.left[k, k])
             text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {left:.2f} is left"
-            told.append(Decision(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
+            told.append(TestOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
         return told
 
     def combination(self, k: int) -> str:
@@ -258,7 +258,7 @@ def _inseparable(found: CurvedFit, predict: Any) -> tuple[int, list[str]]:
     return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > NOTHING]
 
 
-def _told(readings: Readings, found: CurvedFit, predict: Any) -> Calibration:
+def _told(readings: SheetReadings, found: CurvedFit, predict: Any) -> Calibration:
     sheet, fit = readings.sheet, found.fit
     compared = _Compared(found)
     if not len(compared.free) or compared.share[0] <= INFORMED:
@@ -329,7 +329,7 @@ def _records(found: CurvedFit, free: list[str]) -> dict[str, Any]:
     return told
 
 
-RECIPE = Kind(
+RECIPE = CalibrationKind(
     "a station's angles and zeros from targets found in the field, against the laboratory",
     LAYOUT,
     calibrate_search_results,

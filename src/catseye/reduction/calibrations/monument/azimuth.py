@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.azimuth_sheet import KIND, LAYOUT, AzimuthSheet
 from catseye.reduction.calibrations.monument.directions import (
     AFTER,
     BEFORE,
     FIELD,
-    Conditions,
-    Sights,
+    DirectionSights,
+    SightConditions,
     geometry_of,
     leaning,
     sights_of,
@@ -33,7 +33,7 @@ CLOSURE_FACTOR = 3.0  # of its standard uncertainty, beyond which a closure is n
 STEPS = {"angle": ARCSECOND, "length": 1e-4, "time": 1.0}
 
 
-def calibrate_azimuth(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Azimuth of a mount's line fixed point to v-block in the ground frame, and alpha1.
 
     readings   columns target, direction_deg, perhaps face, place, set, zenith_deg, mjd_utc; sheet AzimuthSheet
@@ -62,7 +62,7 @@ def calibrate_azimuth(readings: Readings, reject: bool = False) -> Calibration:
     return _told(sights, fit, linear)
 
 
-def _tied(sights: Sights) -> bool:
+def _tied(sights: DirectionSights) -> bool:
     """The circle's zero is known from the plate; else each set of circle readings must see a reference."""
     readings = sights.readings
     sheet, on = readings.sheet, readings.active
@@ -84,10 +84,10 @@ def _tied(sights: Sights) -> bool:
     return sheet.plate_zero_deg is not None
 
 
-def _start(sights: Sights, tied: bool) -> np.ndarray:
+def _start(sights: DirectionSights, tied: bool) -> np.ndarray:
     """Azimuth of z^ and the circle's zeros, from one reading each."""
     sheet, on = sights.readings.sheet, sights.readings.active
-    plain, _ = geometry_of(sights, 0.0, Conditions())
+    plain, _ = geometry_of(sights, 0.0, SightConditions())
     zeros = []
     for k in range(len(sights.sets)):
         rows = on & (sights.of_set == k) & sights.are("reference")
@@ -98,7 +98,7 @@ def _start(sights: Sights, tied: bool) -> np.ndarray:
     return np.array([azimuth, *([] if tied else zeros)])
 
 
-def _linear(sights: Sights, at: np.ndarray, tied: bool) -> dict[str, Any]:
+def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> dict[str, Any]:
     """Observed values, design and effects about (azimuth, zeros): observed = design x + effects.
 
     The parameters themselves, not their changes, are sought, so that the priors of the effects stay about zero.
@@ -106,15 +106,15 @@ def _linear(sights: Sights, at: np.ndarray, tied: bool) -> dict[str, Any]:
     sheet = sights.readings.sheet
     m = len(sights.observed)
 
-    def predicted(azimuth: float, given: Conditions) -> np.ndarray:
+    def predicted(azimuth: float, given: SightConditions) -> np.ndarray:
         turned, zenith = geometry_of(sights, azimuth, given)
         lean = leaning(sights, turned, zenith, sheet.lean_x_arcsec * ARCSECOND, sheet.lean_z_arcsec * ARCSECOND)
         return turned + lean
 
-    def slope(step: float, up: tuple[float, Conditions], down: tuple[float, Conditions]) -> np.ndarray:
+    def slope(step: float, up: tuple[float, SightConditions], down: tuple[float, SightConditions]) -> np.ndarray:
         return wrapped(predicted(*up) - predicted(*down)) / (2.0 * step)
 
-    base = Conditions()
+    base = SightConditions()
     column = slope(STEPS["angle"], (at[0] + STEPS["angle"], base), (at[0] - STEPS["angle"], base))
     sets = np.eye(len(sights.sets))[sights.of_set]
     zeros = sets @ (np.full(len(sights.sets), sheet.plate_zero_deg * DEGREE) if tied else at[1:])
@@ -130,7 +130,7 @@ def _linear(sights: Sights, at: np.ndarray, tied: bool) -> dict[str, Any]:
     return {"observed": off + design @ at, "design": design, "effects": effects, "off": off}
 
 
-def _instrument_effects(sights: Sights, turned: np.ndarray, zenith: np.ndarray) -> list[Effect]:
+def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray) -> list[Effect]:
     """Collimation, trunnion axis, lean of the vertical axis, the known directions of references, the transport."""
     sheet = sights.readings.sheet
     per = ARCSECOND
@@ -157,30 +157,37 @@ def _instrument_effects(sights: Sights, turned: np.ndarray, zenith: np.ndarray) 
     return effects
 
 
-def _changes(sights: Sights) -> list[tuple[str, float, float, Any]]:
+def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
     """(name, u, step, change of a step -> Conditions) of what the geometry hangs on; u in the unit of the step."""
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
     told: list[tuple[str, float, float, Any]] = [
-        ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: Conditions(xi=s)),
-        ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: Conditions(eta=s)),
+        ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
+        ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
     ]
     if sights.are("star").any():
         late = float(np.hypot(sheet.u_ut1_utc_s, sheet.u_clock_s))
         u_pole = sheet.u_pole_arcsec * ARCSECOND
         told += [
-            ("time and UT1, s", late, STEPS["time"], lambda s: Conditions(time=s)),
-            ("pole x, rad", u_pole, angle, lambda s: Conditions(pole=(s, 0.0))),
-            ("pole y, rad", u_pole, angle, lambda s: Conditions(pole=(0.0, s))),
+            ("time and UT1, s", late, STEPS["time"], lambda s: SightConditions(time=s)),
+            ("pole x, rad", u_pole, angle, lambda s: SightConditions(pole=(s, 0.0))),
+            ("pole y, rad", u_pole, angle, lambda s: SightConditions(pole=(0.0, s))),
         ]
     u_offset = sheet.u_instrument_mm * MILLIMETRE
     for k, axis in enumerate(("x", "y", "z")):
-        told.append((f"instrument d{axis}, m", u_offset, length, lambda s, k=k: Conditions(offset=s * np.eye(3)[k])))
+        told.append(
+            (f"instrument d{axis}, m", u_offset, length, lambda s, k=k: SightConditions(offset=s * np.eye(3)[k]))
+        )
     for number, column in enumerate(_coordinate_columns(sheet)):
         size = float(np.abs(column).max())
         shape = column.reshape(-1, 3) / size
         told.append(
-            (f"coordinates, component {number + 1}", size, length, lambda s, shape=shape: Conditions(points=s * shape))
+            (
+                f"coordinates, component {number + 1}",
+                size,
+                length,
+                lambda s, shape=shape: SightConditions(points=s * shape),
+            )
         )
     return told
 
@@ -196,11 +203,11 @@ def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
     return [column * MILLIMETRE for column in root.T if np.abs(column).max() > 1e-9]
 
 
-def _fitted(sights: Sights, linear: dict[str, Any], active: np.ndarray, *, reject: bool) -> Fit:
+def _fitted(sights: DirectionSights, linear: dict[str, Any], active: np.ndarray, *, reject: bool) -> CalibrationFit:
     sheet, m = sights.readings.sheet, len(sights.observed)
-    scatter = Scatter(np.zeros((m, m)), {"scatter of one direction": np.eye(m)}, size=TWO_PI)
+    scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one direction": np.eye(m)}, size=TWO_PI)
     if sheet.u_direction_arcsec is not None:
-        scatter = Scatter((sheet.u_direction_arcsec * ARCSECOND) ** 2 * np.eye(m))
+        scatter = ObservedScatter((sheet.u_direction_arcsec * ARCSECOND) ** 2 * np.eye(m))
     names = ["azimuth of z^", *(f"circle's zero, set {name}" for name in sights.sets)]
     return fit_readings(
         linear["observed"],
@@ -214,10 +221,10 @@ def _fitted(sights: Sights, linear: dict[str, Any], active: np.ndarray, *, rejec
     )
 
 
-def _closures(sights: Sights, fit: Fit, effects: list[Effect]) -> list[tuple[str, float, float]]:
+def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[tuple[str, float, float]]:
     """Set, lab after less before (rad), its u: scatter of readings, transport, what both visits do not share."""
     told = []
-    plain = sights.observed - geometry_of(sights, float(fit.x[0]), Conditions())[0]
+    plain = sights.observed - geometry_of(sights, float(fit.x[0]), SightConditions())[0]
     for k, name in enumerate(sights.sets):
         rows = [fit.active & (sights.of_set == k) & (sights.place == end) for end in (BEFORE, AFTER)]
         if not (rows[0].any() and rows[1].any()):
@@ -234,7 +241,7 @@ def _closures(sights: Sights, fit: Fit, effects: list[Effect]) -> list[tuple[str
     return told
 
 
-def _told(sights: Sights, fit: Fit, linear: dict[str, Any]) -> Calibration:
+def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
     alpha1 = float(wrapped(np.array(np.pi - azimuth)))
@@ -246,7 +253,7 @@ def _told(sights: Sights, fit: Fit, linear: dict[str, Any]) -> Calibration:
         ("alpha1_rad", "rad", "pi - azimuth, turn of the mount about y^"),
     ]
     decisions = [
-        Decision(
+        TestOutcome(
             f"closure of set {name}, arcsec",
             closure / ARCSECOND,
             CLOSURE_FACTOR * u / ARCSECOND,
@@ -256,7 +263,7 @@ def _told(sights: Sights, fit: Fit, linear: dict[str, Any]) -> Calibration:
         for name, closure, u in _closures(sights, fit, linear["effects"])
     ]
     residual = fit.residual / ARCSECOND
-    turned, zenith = geometry_of(sights, float(fit.x[0]), Conditions())
+    turned, zenith = geometry_of(sights, float(fit.x[0]), SightConditions())
     bearing = np.degrees(np.mod(turned + azimuth, TWO_PI))
     number = np.arange(1, len(readings) + 1)
     on = fit.active
@@ -315,7 +322,7 @@ def _told(sights: Sights, fit: Fit, linear: dict[str, Any]) -> Calibration:
     )  # fmt: skip
 
 
-def _largest(fit: Fit, linear: dict[str, Any]) -> str:
+def _largest(fit: CalibrationFit, linear: dict[str, Any]) -> str:
     """The three effects that the azimuth owes most of its u to, in arcseconds: gain times column times u."""
     on, acting = fit.active, [e for e in linear["effects"] if e.u > 0.0]
     columns = np.column_stack([np.zeros(int(on.sum())), *(e.column[on] * e.u for e in acting)])
@@ -339,5 +346,5 @@ def _dms(angle: float) -> str:
     return f"{degrees}° {minutes:02d}' {seconds / 10:04.1f}\""
 
 
-RECIPE = Kind("azimuth of a Kelvin mount from directions to known points, stars and references", LAYOUT,
+RECIPE = CalibrationKind("azimuth of a Kelvin mount from directions to known points, stars and references", LAYOUT,
               calibrate_azimuth)  # fmt: skip

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from catseye.records.files.readings import TEXT, Layout
+from catseye.records.files.readings import TEXT, SheetLayout
 from catseye.records.files.record import Coordinate, Name, Record, Within, broken_rule
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle
 
@@ -112,7 +112,7 @@ class AzimuthSheet(MonumentSheet):
         return self
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     AzimuthSheet,
     required={"target": TEXT, "direction_deg": Within(-360, 720)},

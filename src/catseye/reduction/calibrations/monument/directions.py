@@ -19,7 +19,7 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.geometry.frames.plumb import astronomic, axis_lean_error, azimuth, plumb_from_ground, zenith_angle
 from catseye.geometry.mirror.mount import gamma
 from catseye.geometry.sky.star import POLARIS, Star, star_place
-from catseye.records.files.readings import TIME, Readings
+from catseye.records.files.readings import TIME, SheetReadings
 from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.monument.frame_sheet import frame_of
 
@@ -28,7 +28,7 @@ FACES = {"left": 1.0, "right": -1.0}
 
 
 @dataclass(frozen=True)
-class Conditions:
+class SightConditions:
     """What the predicted readings hang on besides azimuth and circle zeros; zero is what the sheet states.
 
     xi, eta      rad, change of the deflection
@@ -47,7 +47,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, eq=False)
-class Sights:
+class DirectionSights:
     """The rows of a table as sights.
 
     readings   the table, with sheet AzimuthSheet
@@ -59,7 +59,7 @@ class Sights:
     share      (m,) of the transport, 0 in the lab before, 1 after
     """
 
-    readings: Readings
+    readings: SheetReadings
     observed: np.ndarray
     face: np.ndarray
     sets: tuple[str, ...]
@@ -74,7 +74,7 @@ class Sights:
         return self.kind == kind
 
 
-def sights_of(readings: Readings) -> Sights:
+def sights_of(readings: SheetReadings) -> DirectionSights:
     """The sights of a table; InputError for a target, face or place that is not known, or a star without a time."""
     m = len(readings)
     known = _known(readings)
@@ -99,7 +99,7 @@ def sights_of(readings: Readings) -> Sights:
     observed = readings.get("direction_deg") * DEGREE - np.where(face < 0.0, np.pi, 0.0)
     sets = tuple(dict.fromkeys(set_words))
     place = np.array(places)
-    return Sights(
+    return DirectionSights(
         readings=readings,
         observed=observed,
         face=face,
@@ -112,7 +112,7 @@ def sights_of(readings: Readings) -> Sights:
     )
 
 
-def _known(readings: Readings) -> dict[str, tuple[str, int]]:
+def _known(readings: SheetReadings) -> dict[str, tuple[str, int]]:
     """Name -> (kind, index) of everything that the sheet knows; Polaris is always there."""
     sheet = readings.sheet
     named = [(r.name, ("reference", k)) for k, r in enumerate(sheet.reference)]
@@ -125,7 +125,7 @@ def _known(readings: Readings) -> dict[str, tuple[str, int]]:
     return {POLARIS.name: ("star", -1), **dict(named)}
 
 
-def _share(readings: Readings, place: np.ndarray, sets: tuple[str, ...]) -> np.ndarray:
+def _share(readings: SheetReadings, place: np.ndarray, sets: tuple[str, ...]) -> np.ndarray:
     """How far the transport of each set has come: by time where it is known, else half-way in the field."""
     share = np.where(place == BEFORE, 0.0, np.where(place == AFTER, 1.0, 0.5))
     if TIME not in readings.numbers:
@@ -147,7 +147,7 @@ def _share(readings: Readings, place: np.ndarray, sets: tuple[str, ...]) -> np.n
     return share
 
 
-def geometry_of(sights: Sights, azimuth_z: float, given: Conditions) -> tuple[np.ndarray, np.ndarray]:
+def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightConditions) -> tuple[np.ndarray, np.ndarray]:
     """Direction from z^ about the plumb line, and zenith angle, of each sight: (m,), (m,).
 
     sights       the table
@@ -202,7 +202,9 @@ def star_of(entry: Any) -> Star:
     )
 
 
-def leaning(sights: Sights, turned: np.ndarray, zenith: np.ndarray, lean_x: float, lean_z: float) -> np.ndarray:
+def leaning(
+    sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray, lean_x: float, lean_z: float
+) -> np.ndarray:
     """What the lean of the vertical axis adds to each reading in the field, rad.
 
     turned, zenith   (m,) from `geometry_of`

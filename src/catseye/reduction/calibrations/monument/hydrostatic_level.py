@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import ValidityError
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 
 KIND = "hydrostatic-level"
 CLOSURE_FACTOR = 3.0  # of its standard uncertainty, beyond which a loop is named
@@ -57,7 +57,7 @@ class LevelSheet(Sheet):
 
 
 READING = Within(-1000, 1000)
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     LevelSheet,
     required={
@@ -90,7 +90,7 @@ def water_density(temperature_c: ArrayLike) -> np.ndarray:
     return 999.974950 * (1.0 - (t - 3.983035) ** 2 * (t + 301.797) / (522528.9 * (t + 69.34881)))
 
 
-def calibrate_level(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Heights of marks from a run, the instrument's constant, and how the loops close.
 
     readings   columns from, to, vessel_from, reading_from_mm, reading_to_mm, perhaps temperatures and depth_m
@@ -128,9 +128,9 @@ def calibrate_level(readings: Readings, reject: bool = False) -> Calibration:
     else:
         design, names = np.column_stack([design, -side]), [*names, "constant (exchange the vessels)"]
     claimed = np.diag((sheet.u_tube_c * by_warmth) ** 2)
-    scatter = Scatter(claimed, {"scatter of one difference": np.eye(m)}, size=float(np.max(np.abs(observed))))
+    scatter = ObservedScatter(claimed, {"scatter of one difference": np.eye(m)}, size=float(np.max(np.abs(observed))))
     if sheet.u_reading_mm is not None:
-        scatter = Scatter(claimed + (sheet.u_reading_mm * MILLIMETRE) ** 2 * np.eye(m))
+        scatter = ObservedScatter(claimed + (sheet.u_reading_mm * MILLIMETRE) ** 2 * np.eye(m))
     fit = fit_readings(
         observed,
         design,
@@ -145,7 +145,7 @@ def calibrate_level(readings: Readings, reject: bool = False) -> Calibration:
     return _told(readings, fit, marks, density, loops)
 
 
-def _refuse(readings: Readings, ends: list[tuple[str, ...]], marks: tuple[str, ...]) -> None:
+def _refuse(readings: SheetReadings, ends: list[tuple[str, ...]], marks: tuple[str, ...]) -> None:
     """InputError for a mark without a name, a set-up from a mark to itself, or a part of the run that hangs alone."""
     for row, (first, last) in enumerate(zip(*ends, strict=True)):
         if not first or not last:
@@ -164,7 +164,7 @@ def _refuse(readings: Readings, ends: list[tuple[str, ...]], marks: tuple[str, .
         raise refusal(readings.file, f"{shown(alone[0])} does not hang together with held = {shown(marks[0])}")
 
 
-def _density(readings: Readings) -> tuple[np.ndarray, np.ndarray]:
+def _density(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray]:
     """What is added for the density, m; and its derivative by the temperature of `to`, m/°C: (m,), (m,)."""
     nothing = np.zeros(len(readings))
     given = [name in readings.numbers for name in ("temperature_from_c", "temperature_to_c")]
@@ -186,7 +186,9 @@ def _density(readings: Readings) -> tuple[np.ndarray, np.ndarray]:
     return added(0.0), (added(step) - added(-step)) / (high - low)
 
 
-def _loops(fit: Fit, design: np.ndarray, effects: list[Effect], climb: np.ndarray) -> list[tuple[str, float, float]]:
+def _loops(
+    fit: CalibrationFit, design: np.ndarray, effects: list[Effect], climb: np.ndarray
+) -> list[tuple[str, float, float]]:
     """Set-ups (by number) of each closed loop of the run, its misclosure and the u of that, m.
 
     Residuals of all readings add up along a loop; the heights drop out, constant and effects are as adjusted. Loops are
@@ -213,14 +215,18 @@ def _loops(fit: Fit, design: np.ndarray, effects: list[Effect], climb: np.ndarra
     return told
 
 
-def _acted(fit: Fit, effects: list[Effect]) -> np.ndarray:
+def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
     """What the effects were found to do to each reading, m: residuals have it taken off."""
     parts = (e.column * fit.effects[e.name][0] for e in effects if e.u > 0.0)
     return sum(parts, np.zeros(len(fit.residual)))
 
 
 def _told(
-    readings: Readings, fit: Fit, marks: tuple[str, ...], density: np.ndarray, loops: list[tuple[str, float, float]]
+    readings: SheetReadings,
+    fit: CalibrationFit,
+    marks: tuple[str, ...],
+    density: np.ndarray,
+    loops: list[tuple[str, float, float]],
 ) -> Calibration:
     sheet = readings.sheet
     values, covariance = fit.x / MILLIMETRE, fit.covariance / MILLIMETRE**2
@@ -238,9 +244,9 @@ def _told(
     found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
     worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
     decisions = [
-        Decision("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
+        TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
         if worst is None
-        else Decision(
+        else TestOutcome(
             f"loops: misclosure of {len(loops)}, the worst, mm",
             worst[1] / MILLIMETRE,
             CLOSURE_FACTOR * worst[2] / MILLIMETRE,
@@ -303,4 +309,6 @@ def _told(
     )  # fmt: skip
 
 
-RECIPE = Kind("heights of marks and the instrument's constant by a hydrostatic level", LAYOUT, calibrate_level)
+RECIPE = CalibrationKind(
+    "heights of marks and the instrument's constant by a hydrostatic level", LAYOUT, calibrate_level
+)

@@ -20,12 +20,12 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError, ValidityError
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import UAngle
 
 KIND = "inclinometer"
@@ -61,7 +61,7 @@ class InclinometerSheet(Sheet):
 
 
 VOLT, TILT = Within(-100, 100), Within(-36_000, 36_000)
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     InclinometerSheet,
     required={"x_volt": VOLT, "y_volt": VOLT},
@@ -128,7 +128,7 @@ class Inclinometer:
         return np.linalg.solve(rows, along[..., None])[..., 0]
 
 
-def calibrate_inclinometer(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Scales, zeros, misalignments and, where asked, cubic terms, temperature coefficients and the table's own tilt.
 
     readings   columns x_volt, y_volt; tilt_x_arcsec, tilt_y_arcsec, azimuth_deg, temperature_c; InclinometerSheet
@@ -170,7 +170,7 @@ class _Table:
     themselves, below the readings' own rows through effects on x.
     """
 
-    def __init__(self, readings: Readings) -> None:
+    def __init__(self, readings: SheetReadings) -> None:
         sheet = readings.sheet
         self.readings, self.sheet, self.m = readings, sheet, len(readings)
         given = [name in readings.numbers for name in ("tilt_x_arcsec", "tilt_y_arcsec")]
@@ -278,7 +278,7 @@ class _Table:
             effects.append(Effect("turn of the case, arcsec", ARCSECOND * both, self.sheet.u_case_arcsec))
         return design, effects, self.predicted(whole)
 
-    def scatter(self, at: np.ndarray) -> Scatter:
+    def scatter(self, at: np.ndarray) -> ObservedScatter:
         """Of the readings, with that of the applied tilts: they turn up in both axes of a reading together."""
         whole, m, sheet = self.full(at), self.m, self.sheet
         claimed = np.zeros((2 * m, 2 * m))
@@ -288,8 +288,10 @@ class _Table:
             pairs = np.einsum("mat,mbt->abm", rows, rows) * (sheet.u_tilt_arcsec * ARCSECOND) ** 2
             claimed = np.block([[np.diag(pairs[a, b]) for b in range(2)] for a in range(2)])
         if sheet.u_volt is not None:
-            return Scatter(claimed + sheet.u_volt**2 * np.eye(2 * m))
-        return Scatter(claimed, {"scatter of one reading": np.eye(2 * m)}, size=float(np.abs(self.observed).max()))
+            return ObservedScatter(claimed + sheet.u_volt**2 * np.eye(2 * m))
+        return ObservedScatter(
+            claimed, {"scatter of one reading": np.eye(2 * m)}, size=float(np.abs(self.observed).max())
+        )
 
 
 def _model(whole: np.ndarray) -> Inclinometer:
@@ -306,7 +308,7 @@ MEANINGS = (
 )
 
 
-def _told(table: _Table, fit: Fit) -> Calibration:
+def _told(table: _Table, fit: CalibrationFit) -> Calibration:
     readings, sheet, m = table.readings, table.sheet, table.m
     all_keys = [
         (key.format(axis), unit, meaning.format(axis), size) for key, unit, meaning, size in MEANINGS for axis in "xy"
@@ -369,5 +371,5 @@ def _notes(table: _Table) -> tuple[str, ...]:
     )
 
 
-RECIPE = Kind("scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier", LAYOUT,
+RECIPE = CalibrationKind("scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier", LAYOUT,
               calibrate_inclinometer)  # fmt: skip

@@ -14,11 +14,11 @@ from pydantic import Field
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, grid
-from catseye.records.files.readings import TEXT, Layout, Readings
+from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
 KIND = "monument-place"
@@ -45,7 +45,7 @@ class PlaceSheet(FrameSheet):
 
 
 METRES, COVARIANCE = Within(-1e7, 1e7), Within(-1e8, 1e8)
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     PlaceSheet,
     required={
@@ -71,7 +71,7 @@ KEYS = (
 )
 
 
-def measure_place(readings: Readings, reject: bool = False) -> Calibration:
+def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
     """A fixed point's place in every system of the monument's report.
 
     readings   `coordinates.csv` of an adjustment; sheet PlaceSheet
@@ -132,7 +132,7 @@ def monument_place(
     return every(given), 0.5 * (full + full.T)
 
 
-def _covariance(readings: Readings, row: int) -> np.ndarray:
+def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
     """(3, 3), m², of one row; InputError where it is no covariance."""
     cells = {pair: float(readings.get(f"cov_{pair}_mm2")[row]) for pair in SYMMETRIC}
     matrix = np.array([[cells["".join(sorted(a + b))] for b in NAMES] for a in NAMES])
@@ -156,7 +156,9 @@ def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
     return total
 
 
-def _told(readings: Readings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray) -> Calibration:
+def _told(
+    readings: SheetReadings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray
+) -> Calibration:
     sheet = readings.sheet
     found = quantities(KEYS, values, covariance)
     latitude, longitude = values[3] * DEGREE, values[4] * DEGREE
@@ -184,7 +186,7 @@ def _told(readings: Readings, row: int, frame: LocalFrame, values: np.ndarray, c
             (readings.words["point"][k], *(float(readings.get(f"{c}_m")[k]) for c in NAMES)) for k in range(len(plan))
         ),
         decisions=(
-            Decision(
+            TestOutcome(
                 "to the state plane and back, mm",
                 closure,
                 ROUNDING_MM,
@@ -215,4 +217,6 @@ def _told(readings: Readings, row: int, frame: LocalFrame, values: np.ndarray, c
     )  # fmt: skip
 
 
-RECIPE = Kind("place of a fixed point from a survey adjustment, in all systems of its report", LAYOUT, measure_place)
+RECIPE = CalibrationKind(
+    "place of a fixed point from a survey adjustment, in all systems of its report", LAYOUT, measure_place
+)

@@ -18,11 +18,11 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.geometry.frames.plumb import lean, mount_angles, plumb_from_ground
 from catseye.geometry.mirror.mount import gamma
-from catseye.records.files.readings import Layout, Readings
+from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle, frame_of
 
 KIND = "plate-levels"
@@ -47,7 +47,7 @@ class PlateSheet(MonumentSheet):
 
 
 TURN = Within(-720, 720)
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     PlateSheet,
     required={"orientation_deg": TURN, "reading_arcsec": Within(-36_000, 36_000)},
@@ -55,7 +55,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_plate(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibration:
     """alpha2 and alpha3 of a mount, against the ground frame.
 
     readings   columns orientation_deg, reading_arcsec, perhaps plate_deg; sheet PlateSheet
@@ -70,11 +70,13 @@ def calibrate_plate(readings: Readings, reject: bool = False) -> Calibration:
     turned = readings.get("orientation_deg") * DEGREE
     design = np.column_stack([np.cos(turned), np.sin(turned), np.ones(m)])
     effects = _effects(readings, turned)
-    scatter = Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)}, size=float(np.max(np.abs(observed))))
+    scatter = ObservedScatter(
+        np.zeros((m, m)), {"scatter of one reading": np.eye(m)}, size=float(np.max(np.abs(observed)))
+    )
     if sheet.u_level_arcsec is not None:
-        scatter = Scatter((sheet.u_level_arcsec * ARCSECOND) ** 2 * np.eye(m))
+        scatter = ObservedScatter((sheet.u_level_arcsec * ARCSECOND) ** 2 * np.eye(m))
 
-    def fitted(acting: list[Effect], active: np.ndarray, leave: bool) -> Fit:
+    def fitted(acting: list[Effect], active: np.ndarray, leave: bool) -> CalibrationFit:
         names = ["tilt of x^", "tilt of z^", "level's zero"]
         return fit_readings(
             observed, design, scatter, names=names, effects=acting, active=active, reject=leave, level=sheet.level
@@ -86,7 +88,7 @@ def calibrate_plate(readings: Readings, reject: bool = False) -> Calibration:
     return _told(readings, fitted([*effects, scale], first.active, False))
 
 
-def _effects(readings: Readings, turned: np.ndarray) -> list[Effect]:
+def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
     """Wedge of the plate, turning with the plate where it was turned, and unequal balls in the mount's axes."""
     sheet = readings.sheet
     plate = readings.get("plate_deg") * DEGREE if "plate_deg" in readings.numbers else np.zeros(len(readings))
@@ -110,7 +112,7 @@ def _in_ground(sheet: Any, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0
     return mount_angles(local @ plumb)[1:]
 
 
-def _told(readings: Readings, fit: Fit) -> Calibration:
+def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
     sheet = readings.sheet
     tilts = np.sin(fit.x[:2])
     found = _in_ground(sheet, tilts)
@@ -186,4 +188,6 @@ def _told(readings: Readings, fit: Fit) -> Calibration:
     )  # fmt: skip
 
 
-RECIPE = Kind("turns of a Kelvin mount about z^ and x^ by a level on a three-ball plate", LAYOUT, calibrate_plate)
+RECIPE = CalibrationKind(
+    "turns of a Kelvin mount about z^ and x^ by a level on a three-ball plate", LAYOUT, calibrate_plate
+)

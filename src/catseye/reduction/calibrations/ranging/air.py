@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.atmosphere.index.air import air
 from catseye.constants import PPM, SPEED_OF_LIGHT
-from catseye.records.files.readings import Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.fit import Effect
 
@@ -43,7 +43,7 @@ class AirSheet(Sheet):
 
 
 @dataclass(frozen=True, eq=False)
-class Air:
+class CalibrationAir:
     """The index along each path, and how an offset of a sensor changes it.
 
     index    (m,)
@@ -56,7 +56,7 @@ class Air:
     u_model: float
 
 
-def group_air(readings: Readings) -> Air:
+def group_air(readings: SheetReadings) -> CalibrationAir:
     """Group index of the ranger's light for every reading."""
     sheet = readings.sheet
     state = air(
@@ -65,27 +65,27 @@ def group_air(readings: Readings) -> Air:
         model=sheet.air_model,
         modulation_hz=sheet.modulation_hz,
     )
-    return Air(
+    return CalibrationAir(
         np.asarray(state.group_index),
         np.array([*state.sensitivity[: len(SENSORS)]]),
         float(np.max(state.standard_uncertainty)),
     )
 
 
-def phase_air(readings: Readings, wavelength_um: float) -> Air:
+def phase_air(readings: SheetReadings, wavelength_um: float) -> CalibrationAir:
     """Phase index of an interferometer's light in the same air."""
     sheet = readings.sheet
     state = air(*(readings.get(name) for name in SENSORS), wavelength_um=wavelength_um, model=sheet.air_model)
     slopes = np.array([*state.phase_sensitivity[: len(SENSORS)]])
-    return Air(np.asarray(state.phase_index), slopes, float(np.max(state.standard_uncertainty)))
+    return CalibrationAir(np.asarray(state.phase_index), slopes, float(np.max(state.standard_uncertainty)))
 
 
-def half_wavelength(readings: Readings, state: Air) -> np.ndarray:
+def half_wavelength(readings: SheetReadings, state: CalibrationAir) -> np.ndarray:
     """(m,) m, half the modulation's group wavelength in the air of each reading. Source: [PARKER04] eq. 5.16."""
     return 0.5 * SPEED_OF_LIGHT / (state.index * readings.sheet.modulation_hz)
 
 
-def sensor_effects(readings: Readings, columns: np.ndarray) -> list[Effect]:
+def sensor_effects(readings: SheetReadings, columns: np.ndarray) -> list[Effect]:
     """Offsets of the three sensors, `columns` (3, m) being the change of the observed values per °C, hPa, %."""
     sheet = readings.sheet
     return [
@@ -94,7 +94,7 @@ def sensor_effects(readings: Readings, columns: np.ndarray) -> list[Effect]:
     ]
 
 
-def ranger_effects(readings: Readings, state: Air, path: np.ndarray) -> list[Effect]:
+def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndarray) -> list[Effect]:
     """What stretches the ranger's path (m,) m: a reading too long for each unit of frequency, formula and sensors.
 
     A true index above the one computed with shortens the true path against the computed one, so the computed is too

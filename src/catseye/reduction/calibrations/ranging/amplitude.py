@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient
 
@@ -43,7 +43,7 @@ class AmplitudeSheet(Sheet):
     quadratic: bool = False
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     AmplitudeSheet,
     required={"amplitude_target_volt": VOLTS, "phase_target_rad": PHASE},
@@ -55,7 +55,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_amplitude(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibration:
     """The coupling coefficient, rad a factor e of amplitude, with a test whether a line suffices.
 
     readings   columns amplitude_target_volt, phase_target_rad, perhaps phase_reference_rad; sheet AmplitudeSheet
@@ -94,7 +94,7 @@ def calibrate_amplitude(readings: Readings, reject: bool = False) -> Calibration
     return _told(readings, fit, observed, levels[:, 0], longer)
 
 
-def _scatter(readings: Readings) -> Scatter:
+def _scatter(readings: SheetReadings) -> ObservedScatter:
     """Noise of a phase goes with one over its amplitude; the walk of the electronics besides."""
     sheet, m = readings.sheet, len(readings)
     claimed = np.zeros((m, m))
@@ -103,16 +103,16 @@ def _scatter(readings: Readings) -> Scatter:
         claimed += sheet.random_walk_rad_per_sqrt_hour**2 * np.minimum(hours[:, None], hours)
     amplitude = readings.get("amplitude_target_volt")
     if readings.has("u_phase_rad"):
-        return Scatter(claimed + np.diag(readings.get("u_phase_rad") ** 2))
+        return ObservedScatter(claimed + np.diag(readings.get("u_phase_rad") ** 2))
     relative = 1.0 / amplitude**2
     if "amplitude_reference_volt" in readings.numbers:
         relative = relative + 1.0 / readings.get("amplitude_reference_volt") ** 2
     if sheet.u_phasor_volt is not None:
-        return Scatter(claimed + np.diag(sheet.u_phasor_volt**2 * relative))
-    return Scatter(claimed, {SCATTER: np.diag(sheet.reference_amplitude_volt**2 * relative)})
+        return ObservedScatter(claimed + np.diag(sheet.u_phasor_volt**2 * relative))
+    return ObservedScatter(claimed, {SCATTER: np.diag(sheet.reference_amplitude_volt**2 * relative)})
 
 
-def _line_decision(longer: Fit | None) -> Decision:
+def _line_decision(longer: CalibrationFit | None) -> TestOutcome:
     """Does the line suffice? t of the quadratic term against Student's, or the normal where the scatter is claimed."""
     from scipy.stats import norm
     from scipy.stats import t as student
@@ -120,16 +120,18 @@ def _line_decision(longer: Fit | None) -> Decision:
     name = "line in the logarithm: |t| of a quadratic term"
     if longer is None:
         text = "too few different amplitudes to test it, or the term is in the model"
-        return Decision(name, float("nan"), float("nan"), None, text)
+        return TestOutcome(name, float("nan"), float("nan"), None, text)
     statistic = abs(float(longer.x[2]) / float(np.sqrt(longer.covariance[2, 2])))
     half = 1.0 - 0.5 * LINE_LEVEL
     limit = float(student.ppf(half, longer.degrees_of_freedom) if longer.components else norm.ppf(half))
     passed = statistic <= limit
     text = "a line suffices" if passed else "a line does not suffice: set quadratic = true, or use fewer attenuations"
-    return Decision(name, statistic, limit, passed, text)
+    return TestOutcome(name, statistic, limit, passed, text)
 
 
-def _told(readings: Readings, fit: Fit, observed: np.ndarray, level: np.ndarray, longer: Fit | None) -> Calibration:
+def _told(
+    readings: SheetReadings, fit: CalibrationFit, observed: np.ndarray, level: np.ndarray, longer: CalibrationFit | None
+) -> Calibration:
     sheet, on = readings.sheet, fit.active
     keep = [0, 2] if sheet.quadratic else [0]
     keys = [
@@ -189,4 +191,6 @@ def _told(readings: Readings, fit: Fit, observed: np.ndarray, level: np.ndarray,
     )
 
 
-RECIPE = Kind("coupling from amplitude to phase, one target at several attenuations", LAYOUT, calibrate_amplitude)
+RECIPE = CalibrationKind(
+    "coupling from amplitude to phase, one target at several attenuations", LAYOUT, calibrate_amplitude
+)

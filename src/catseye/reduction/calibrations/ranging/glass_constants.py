@@ -12,11 +12,17 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.optics.retroreflector import cats_eye, prism
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    provenance,
+    quantities,
+    residuals_by_number,
+    scatter_notes,
+)
 
 PRISM, BALL = "prism-constant", "ball-constant"
 PARTS = ("r1", "r2")
@@ -43,10 +49,10 @@ class GlassSheet(Sheet):
     u_reading_mm: Uncertainty | None = None
 
 
-PRISM_LAYOUT = Layout(
+PRISM_LAYOUT = SheetLayout(
     PRISM, GlassSheet, required={"height_mm": Within(5, 500)}, optional={"temperature_c": TEMPERATURE}
 )
-BALL_LAYOUT = Layout(
+BALL_LAYOUT = SheetLayout(
     BALL,
     GlassSheet,
     required={"part": TEXT, "radius_mm": Within(5, 1000)},
@@ -54,7 +60,7 @@ BALL_LAYOUT = Layout(
 )
 
 
-def calibrate_prism(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_prism(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Height, reference depth and range constant of a cube-corner prism.
 
     readings   column height_mm, entry face to corner; sheet GlassSheet
@@ -79,7 +85,7 @@ def calibrate_prism(readings: Readings, reject: bool = False) -> Calibration:
     )  # fmt: skip
 
 
-def calibrate_ball(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Radii and range constant of a cat's-eye made of a small ball and a large shell about one centre.
 
     readings   columns part ("r1" small ball, "r2" silvered shell) and radius_mm; sheet GlassSheet
@@ -110,16 +116,16 @@ def calibrate_ball(readings: Readings, reject: bool = False) -> Calibration:
 
 
 def _dimensions(
-    readings: Readings, seen: np.ndarray, design: np.ndarray, names: list[str], reject: bool
-) -> tuple[Fit, np.ndarray]:
+    readings: SheetReadings, seen: np.ndarray, design: np.ndarray, names: list[str], reject: bool
+) -> tuple[CalibrationFit, np.ndarray]:
     """Sizes at 20 °C, mm, from readings at their temperature."""
     sheet, m = readings.sheet, len(readings)
     temperature = readings.get("temperature_c")
     expansion = sheet.expansion_ppm_per_c * PPM
     observed = seen / expanded(1.0, temperature, expansion)
-    scatter = Scatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
+    scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
     if sheet.u_reading_mm is not None:
-        scatter = Scatter(sheet.u_reading_mm**2 * np.eye(m))
+        scatter = ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))
     fit = fit_readings(
         observed,
         design,
@@ -138,8 +144,8 @@ def _dimensions(
 
 
 def _told(
-    readings: Readings,
-    fit: Fit,
+    readings: SheetReadings,
+    fit: CalibrationFit,
     kind: str,
     what: str,
     keys: list[tuple[str, str, str]],
@@ -182,5 +188,5 @@ def _told(
     )
 
 
-PRISM_RECIPE = Kind("constants of a glass prism from its measured height", PRISM_LAYOUT, calibrate_prism)
-BALL_RECIPE = Kind("constants of a ball cat's-eye from its measured radii", BALL_LAYOUT, calibrate_ball)
+PRISM_RECIPE = CalibrationKind("constants of a glass prism from its measured height", PRISM_LAYOUT, calibrate_prism)
+BALL_RECIPE = CalibrationKind("constants of a ball cat's-eye from its measured radii", BALL_LAYOUT, calibrate_ball)

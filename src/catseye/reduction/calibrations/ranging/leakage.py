@@ -9,11 +9,11 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 
 KIND = "leakage"
@@ -33,10 +33,10 @@ class LeakageSheet(Sheet):
     u_session_volt: Volts | None = None
 
 
-LAYOUT = Layout(KIND, LeakageSheet, required={}, optional={"session": TEXT, **COLUMNS})
+LAYOUT = SheetLayout(KIND, LeakageSheet, required={}, optional={"session": TEXT, **COLUMNS})
 
 
-def calibrate_leakage(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibration:
     """The leakage phasor, its uncertainty, and that of the leakage in a session to come.
 
     readings   columns real_volt, imaginary_volt (or amplitude_volt, phase_rad) and session; sheet LeakageSheet
@@ -62,7 +62,7 @@ def calibrate_leakage(readings: Readings, reject: bool = False) -> Calibration:
     return _told(readings, fit, z, names, len(sessions))
 
 
-def _scatter(readings: Readings, names: tuple[str, ...], sessions: int) -> Scatter:
+def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> ObservedScatter:
     """Of real parts, then imaginary parts: each buffer's own, and one shift a session."""
     m, sheet = len(readings), readings.sheet
     same = np.kron(np.eye(2), np.array(names)[:, None] == np.array(names)).astype(float)
@@ -75,14 +75,14 @@ def _scatter(readings: Readings, names: tuple[str, ...], sessions: int) -> Scatt
         claimed += sheet.u_session_volt**2 * same
     elif sessions > 1:
         unknown[SESSION] = same
-    return Scatter(claimed, unknown)
+    return ObservedScatter(claimed, unknown)
 
 
-def _sessions_decision(sheet: LeakageSheet, sessions: int) -> Decision:
+def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
     """Whether the sessions tell how the leakage differs from one to the next."""
     name = "sessions"
     if sheet.u_session_volt is not None:
-        return Decision(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
+        return TestOutcome(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
     enough = sessions >= FEWEST_SESSIONS
     text = "they tell how the leakage differs from one to the next"
     if not enough:
@@ -90,10 +90,12 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> Decision:
             "too few to tell how the leakage differs from one to the next: u_leakage_volt may be far too small; "
             "measure more, or state u_session_volt"
         )
-    return Decision(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
+    return TestOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
 
 
-def _told(readings: Readings, fit: Fit, z: np.ndarray, names: tuple[str, ...], sessions: int) -> Calibration:
+def _told(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
+) -> Calibration:
     sheet, m = readings.sheet, len(z)
     leakage = complex(*fit.x)
     found, polar = polar_quantities(leakage, fit.covariance, fit)
@@ -164,4 +166,4 @@ def _told(readings: Readings, fit: Fit, z: np.ndarray, names: tuple[str, ...], s
     )
 
 
-RECIPE = Kind("leakage from buffers with the beam blocked", LAYOUT, calibrate_leakage)
+RECIPE = CalibrationKind("leakage from buffers with the beam blocked", LAYOUT, calibrate_leakage)

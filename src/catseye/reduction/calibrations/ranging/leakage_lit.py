@@ -11,12 +11,12 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 from catseye.signal.systematics.leakage import circle_leakage
 
@@ -41,10 +41,10 @@ class LitLeakageSheet(Sheet):
     u_session_volt: Annotated[float, Within(0, 1)]
 
 
-LAYOUT = Layout(KIND, LitLeakageSheet, required={}, optional={"distance_m": Within(0.05, 10_000), **COLUMNS})
+LAYOUT = SheetLayout(KIND, LitLeakageSheet, required={}, optional={"distance_m": Within(0.05, 10_000), **COLUMNS})
 
 
-def calibrate_lit_leakage(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_lit_leakage(readings: SheetReadings, reject: bool = False) -> Calibration:
     """The leakage as the point about which a moving retroreflector's phasors turn.
 
     readings   columns real_volt, imaginary_volt (or amplitude_volt, phase_rad), perhaps distance_m; LitLeakageSheet
@@ -62,7 +62,7 @@ def calibrate_lit_leakage(readings: Readings, reject: bool = False) -> Calibrati
     return _told(readings, fit, z, fit.statistic, known=False)
 
 
-def _along(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
+def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
     """Known positions: real and imaginary parts are linear in leakage, light and its fading."""
     sheet, distance = readings.sheet, readings.get("distance_m")
     if sheet.group_index is None:
@@ -92,7 +92,7 @@ def _along(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
     )
 
 
-def _circle(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
+def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
     """Unknown positions: distances from a circle, linearised where the fit settles."""
     on = readings.active
     found = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
@@ -118,11 +118,11 @@ def _circle(readings: Readings, z: np.ndarray, reject: bool) -> Fit:
     return replace(fit, x=point)
 
 
-def _scatter(readings: Readings, quadratures: int) -> Scatter:
+def _scatter(readings: SheetReadings, quadratures: int) -> ObservedScatter:
     m = len(readings)
     if readings.has("u_volt"):
-        return Scatter(np.diag(np.tile(readings.get("u_volt"), quadratures) ** 2))
-    return Scatter(np.zeros((quadratures * m,) * 2), {SCATTER: np.eye(quadratures * m)})
+        return ObservedScatter(np.diag(np.tile(readings.get("u_volt"), quadratures) ** 2))
+    return ObservedScatter(np.zeros((quadratures * m,) * 2), {SCATTER: np.eye(quadratures * m)})
 
 
 def _arc(arm: np.ndarray) -> float:
@@ -132,7 +132,9 @@ def _arc(arm: np.ndarray) -> float:
     return float(TWO_PI - gaps.max())
 
 
-def _told(readings: Readings, fit: Fit, z: np.ndarray, statistic: np.ndarray, *, known: bool) -> Calibration:
+def _told(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
+) -> Calibration:
     sheet, m = readings.sheet, len(z)
     leakage = complex(fit.x[0], fit.x[1])
     centre = fit.covariance[:2, :2]
@@ -157,7 +159,7 @@ def _told(readings: Readings, fit: Fit, z: np.ndarray, statistic: np.ndarray, *,
         )
         for k in range(m)
     )
-    covered = Decision(
+    covered = TestOutcome(
         "arc of the circle, rad",
         arc,
         SHORTEST_ARC,
@@ -200,4 +202,4 @@ def _told(readings: Readings, fit: Fit, z: np.ndarray, statistic: np.ndarray, *,
     )
 
 
-RECIPE = Kind("leakage from a retroreflector moved along a rail", LAYOUT, calibrate_lit_leakage)
+RECIPE = CalibrationKind("leakage from a retroreflector moved along a rail", LAYOUT, calibrate_lit_leakage)

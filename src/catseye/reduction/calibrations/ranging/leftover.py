@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.fit import Effect
 from catseye.signal.systematics.leakage import phase_by_leakage
@@ -10,7 +10,7 @@ from catseye.signal.systematics.leakage import phase_by_leakage
 NAMES = ("leakage left over, real part, V", "leakage left over, imaginary part, V")
 
 
-def leakage_effects(readings: Readings, u_leakage_volt: float) -> list[Effect]:
+def leakage_effects(readings: SheetReadings, u_leakage_volt: float) -> list[Effect]:
     """What a leakage left over adds to the phase of the target, less that of the reference where there is one.
 
     readings         columns phase_target_rad and amplitude_target_volt; phase_reference_rad needs

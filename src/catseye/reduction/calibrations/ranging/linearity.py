@@ -12,10 +12,10 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
-from catseye.records.files.readings import Readings
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Effect, Fit, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.records.files.readings import SheetReadings
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.rail import KIND, LAYOUT, LinearitySheet, Rail, rail_of
 from catseye.reduction.calibrations.ranging.spectrum import spectrum
@@ -24,7 +24,7 @@ from catseye.signal.systematics.cyclic import cyclic_design, separable_orders
 ORDER_LEVEL = 0.05  # chance that any order is taken where there is none
 
 
-def calibrate_linearity(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Zero (or offset), scale and cyclic terms of a ranger.
 
     readings   columns range_m and interferometer_m or interferometer_vacuum_m, see LAYOUT; sheet LinearitySheet
@@ -64,7 +64,7 @@ def _fit(
     active: np.ndarray,
     level: float,
     reject: bool = False,
-) -> Fit:
+) -> CalibrationFit:
     names = ["offset", "scale", *(f"cyclic {part} {k}" for part in ("cosine", "sine") for k in orders)]
     return fit_readings(
         rail.observed,
@@ -78,7 +78,7 @@ def _fit(
     )
 
 
-def _separable(rail: Rail, readings: Readings) -> tuple[tuple[int, ...], str]:
+def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], str]:
     """Cyclic orders that the positions tell from offset and scale, and why others are not tried."""
     sheet = readings.sheet
     wanted = sheet.max_order if sheet.orders is None else sheet.orders
@@ -111,7 +111,7 @@ def _separable(rail: Rail, readings: Readings) -> tuple[tuple[int, ...], str]:
 
 def _chosen(
     rail: Rail, kept: tuple[int, ...], effects: list[Effect], active: np.ndarray, sheet: LinearitySheet
-) -> tuple[tuple[int, ...], tuple[Decision, ...]]:
+) -> tuple[tuple[int, ...], tuple[TestOutcome, ...]]:
     """The orders to keep: up to the highest whose pair of terms is significant, by the F test against one order less.
 
     Each order is tested with the scatter of the longest series; [FOERSTNER16] chapter 4 (tests of hypotheses). The
@@ -140,11 +140,11 @@ def _chosen(
         significant = bool(statistic > limit)
         highest = k if significant else highest
         text = f"F test of its two terms at the level {single:.2g}: {'' if significant else 'not '}significant"
-        told.append(Decision(f"cyclic order {k}: F", float(statistic), limit, None, text))
+        told.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
     return kept[:highest], tuple(told)
 
 
-def _covariance(rail: Rail, fit: Fit) -> np.ndarray:
+def _covariance(rail: Rail, fit: CalibrationFit) -> np.ndarray:
     """Of the observed values with the scatter as a fit found it."""
     return rail.scatter.claimed + sum(
         (fit.components[name] ** 2 * matrix for name, matrix in rail.scatter.unknown.items()),
@@ -181,11 +181,11 @@ def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[li
 
 
 def _told(
-    readings: Readings,
+    readings: SheetReadings,
     rail: Rail,
-    fit: Fit,
+    fit: CalibrationFit,
     orders: tuple[int, ...],
-    decisions: tuple[Decision, ...],
+    decisions: tuple[TestOutcome, ...],
     reason: str,
 ) -> Calibration:
     sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
@@ -205,7 +205,7 @@ def _told(
     noise = _covariance(rail, fit)[np.ix_(on, on)]
     period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, rail.half)
     top = int(np.argmin(chance))
-    line = Decision(
+    line = TestOutcome(
         "spectrum of residuals: chance of the highest line",
         float(chance[top]),
         0.05,
@@ -273,7 +273,7 @@ def _told(
     )
 
 
-def _amplitude(found: tuple, fit: Fit, k: int, count: int) -> str:
+def _amplitude(found: tuple, fit: CalibrationFit, k: int, count: int) -> str:
     """Amplitude of one order with its u, in micrometres."""
     cosine, sine = found[2 + k].value, found[2 + count + k].value
     size = float(np.hypot(cosine, sine))
@@ -283,7 +283,7 @@ def _amplitude(found: tuple, fit: Fit, k: int, count: int) -> str:
     return f"order {k + 1}: {size * 1e3:.2f} µm, u {u * 1e3:.2f} µm"
 
 
-def _curve(rail: Rail, fit: Fit, orders: tuple[int, ...], at: np.ndarray, shift: float) -> np.ndarray:
+def _curve(rail: Rail, fit: CalibrationFit, orders: tuple[int, ...], at: np.ndarray, shift: float) -> np.ndarray:
     """The fitted line in micrometres at lengths; `shift` is the mean effect of the systematic parameters."""
     phase = np.interp(at, np.sort(rail.length), np.sort(rail.path))
     x = -TWO_PI * phase / rail.half
@@ -291,4 +291,6 @@ def _curve(rail: Rail, fit: Fit, orders: tuple[int, ...], at: np.ndarray, shift:
     return (design @ fit.x + shift) / (1e-3 * MILLIMETRE)
 
 
-RECIPE = Kind("zero, scale and cyclic terms against an interferometer along a rail", LAYOUT, calibrate_linearity)
+RECIPE = CalibrationKind(
+    "zero, scale and cyclic terms against an interferometer along a rail", LAYOUT, calibrate_linearity
+)

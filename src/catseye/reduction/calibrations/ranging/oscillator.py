@@ -8,10 +8,10 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.files.readings import Layout, Readings, Sheet
+from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Decision, Quantity
-from catseye.reduction.calibrations.kind import Kind, provenance
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance
 from catseye.signal.drift.allan import allan_deviation
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
@@ -35,10 +35,10 @@ class OscillatorSheet(Sheet):
     false_alarm: Annotated[float, Within(0, 0.5, above=True)] = 0.001
 
 
-LAYOUT = Layout(KIND, OscillatorSheet, required={"phase_rad": Within(-1e6, 1e6)})
+LAYOUT = SheetLayout(KIND, OscillatorSheet, required={"phase_rad": Within(-1e6, 1e6)})
 
 
-def measure_oscillator(readings: Readings, reject: bool = False) -> Calibration:
+def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibration:
     """White, flicker and random-walk noise of the phase, its spurs, and the noise of one range that they make.
 
     readings   column phase_rad at equal intervals; sheet OscillatorSheet
@@ -76,7 +76,7 @@ def measure_oscillator(readings: Readings, reject: bool = False) -> Calibration:
         columns=("averaged", "averaged_s", "allan_deviation_rad", "low_95_rad", "high_95_rad", "kind", "range_um"),
         rows=rows,
         decisions=(
-            Decision(
+            TestOutcome(
                 "spurs: lines in the spectrum",
                 float(len(found.spurs)),
                 0.0,
@@ -131,4 +131,4 @@ def _lines(found: NoiseSpectrum) -> str:
     return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in found.spurs[:SHOWN])
 
 
-RECIPE = Kind("phase noise of the oscillator against averaging, with spurs", LAYOUT, measure_oscillator)
+RECIPE = CalibrationKind("phase noise of the oscillator against averaging, with spurs", LAYOUT, measure_oscillator)

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import TWO_PI
-from catseye.records.files.readings import Readings
+from catseye.records.files.readings import SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Quantity
-from catseye.reduction.calibrations.fit import Fit
+from catseye.reduction.calibrations.fit import CalibrationFit
 from catseye.reduction.calibrations.kind import quantities
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.systematics.leakage import polar_covariance
@@ -26,7 +26,7 @@ COLUMNS = {
 MILLIVOLT = 1e-3  # V
 
 
-def phasors(readings: Readings) -> np.ndarray:
+def phasors(readings: SheetReadings) -> np.ndarray:
     """(m,) V, complex; InputError unless exactly one pair of columns is there."""
     pairs = [pair for pair in (CARTESIAN, POLAR) if all(name in readings.numbers for name in pair)]
     given = [name for name in (*CARTESIAN, *POLAR) if name in readings.numbers]
@@ -40,7 +40,9 @@ def phasors(readings: Readings) -> np.ndarray:
     return first + 1j * second if pairs[0] == CARTESIAN else first * np.exp(1j * second)
 
 
-def polar_quantities(phasor: complex, covariance: np.ndarray, fit: Fit) -> tuple[tuple[Quantity, ...], np.ndarray]:
+def polar_quantities(
+    phasor: complex, covariance: np.ndarray, fit: CalibrationFit
+) -> tuple[tuple[Quantity, ...], np.ndarray]:
     """A leakage as amplitude and phase with their covariance, from its real and imaginary part."""
     polar = polar_covariance(phasor, covariance)
     keys = [

@@ -6,10 +6,10 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.records.files.readings import TIME, Layout, Readings
+from catseye.records.files.readings import TIME, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.fit import Effect, Scatter
+from catseye.reduction.calibrations.fit import Effect, ObservedScatter
 from catseye.reduction.calibrations.ranging.air import (
     WEATHER,
     AirSheet,
@@ -55,7 +55,7 @@ class LinearitySheet(AirSheet):
     u_cyclic_mm: Annotated[float, Within(0, 1)] = 0.0
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     LinearitySheet,
     required={"range_m": Within(0.05, 10_000)},
@@ -86,11 +86,11 @@ class Rail:
     phase: np.ndarray
     path: np.ndarray
     half: float
-    scatter: Scatter
+    scatter: ObservedScatter
     effects: list[Effect]
 
 
-def rail_of(readings: Readings) -> Rail:
+def rail_of(readings: SheetReadings) -> Rail:
     """The rail of a table; InputError where table and sheet do not go together."""
     sheet = readings.sheet
     group = group_air(readings)
@@ -125,7 +125,7 @@ def rail_of(readings: Readings) -> Rail:
     )
 
 
-def _in_air(readings: Readings) -> tuple[np.ndarray, np.ndarray, Effect]:
+def _in_air(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, Effect]:
     """Length in air of a vacuum length V; what the sensors do to it, (3, m) m; and the formula's own effect.
 
     V = n (L + d) - n_0 d with the dead path d and the index n_0 at the first reading: L = V/n + d (n_0/n - 1).
@@ -149,7 +149,7 @@ def _in_air(readings: Readings) -> tuple[np.ndarray, np.ndarray, Effect]:
     return length, sensed, Effect("formula for the phase index", -(by_index - by_start), air.u_model)
 
 
-def _scatter(readings: Readings) -> Scatter:
+def _scatter(readings: SheetReadings) -> ObservedScatter:
     """Noise of one range and of one position, if known, and the walk of the ranger's drift in time."""
     sheet, m = readings.sheet, len(readings)
     claimed = np.zeros((m, m))
@@ -158,5 +158,5 @@ def _scatter(readings: Readings) -> Scatter:
         claimed += (sheet.random_walk_mm_per_sqrt_hour * MILLIMETRE) ** 2 * np.minimum(hours[:, None], hours)
     if readings.has("u_range_mm"):
         variance = (np.hypot(readings.get("u_range_mm"), sheet.u_abbe_mm) * MILLIMETRE) ** 2
-        return Scatter(claimed + np.diag(variance))
-    return Scatter(claimed, {SCATTER: np.eye(m)}, size=float(np.max(readings.get("range_m"))))
+        return ObservedScatter(claimed + np.diag(variance))
+    return ObservedScatter(claimed, {SCATTER: np.eye(m)}, size=float(np.max(readings.get("range_m"))))

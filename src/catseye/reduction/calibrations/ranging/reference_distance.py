@@ -11,11 +11,11 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.records.files.readings import Layout, Readings
+from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Effect, Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.air import WEATHER, AirSheet, group_air, half_wavelength, ranger_effects
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
@@ -54,7 +54,7 @@ class ReferenceDistanceSheet(AirSheet):
     estimate_scale: bool = False
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     ReferenceDistanceSheet,
     required={"distance_m": DISTANCE, "phase_target_rad": PHASE, "phase_reference_rad": PHASE},
@@ -69,7 +69,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_reference_distance(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) -> Calibration:
     """D0 with its standard uncertainty, and the ranger's scale where the sheet asks for it.
 
     readings   columns distance_m, phase_target_rad, phase_reference_rad, see LAYOUT; sheet ReferenceDistanceSheet
@@ -106,7 +106,7 @@ def _design(scale: bool, length: np.ndarray) -> np.ndarray:
     return np.column_stack([np.ones(len(length)), -length][: 1 + scale])
 
 
-def _scatter(readings: Readings, half: np.ndarray) -> Scatter:
+def _scatter(readings: SheetReadings, half: np.ndarray) -> ObservedScatter:
     """Of y: setting of the target and noise of the phases, as far as they are known; estimated if neither is."""
     m = len(readings)
     variance = np.zeros(m)
@@ -115,14 +115,14 @@ def _scatter(readings: Readings, half: np.ndarray) -> Scatter:
     if readings.has("u_phase_rad"):
         variance = variance + (readings.get("u_phase_rad") * half / TWO_PI) ** 2
     if variance.any():
-        return Scatter(np.diag(variance))
-    return Scatter(
+        return ObservedScatter(np.diag(variance))
+    return ObservedScatter(
         np.zeros((m, m)), {"scatter of one reading": np.eye(m)}, size=float(np.max(readings.get("distance_m")))
     )
 
 
 def _effects(
-    readings: Readings, length: np.ndarray, phase: np.ndarray, half: np.ndarray, ranger: list[Effect]
+    readings: SheetReadings, length: np.ndarray, phase: np.ndarray, half: np.ndarray, ranger: list[Effect]
 ) -> list[Effect]:
     """Everything that shifts y for all readings together; what makes the ranger read long makes y small."""
     sheet = readings.sheet
@@ -140,7 +140,9 @@ def _effects(
     return effects
 
 
-def _told(readings: Readings, fit: Fit, *, observed: np.ndarray, cycles: np.ndarray, margin: np.ndarray) -> Calibration:
+def _told(
+    readings: SheetReadings, fit: CalibrationFit, *, observed: np.ndarray, cycles: np.ndarray, margin: np.ndarray
+) -> Calibration:
     sheet, distance = readings.sheet, readings.get("distance_m")
     scale = np.array([1.0 / MILLIMETRE, 1.0 / PPM])[: len(fit.x)]
     keys = [
@@ -194,7 +196,7 @@ def _told(readings: Readings, fit: Fit, *, observed: np.ndarray, cycles: np.ndar
     )
 
 
-def _cycles_decision(readings: Readings, margin: np.ndarray, on: np.ndarray) -> Decision:
+def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray) -> TestOutcome:
     """Is the whole number of cycles of every reading used safe? The margin against the doubt of the coarse length."""
     sheet = readings.sheet
     common = np.hypot(np.hypot(sheet.u_d0_nominal_mm, sheet.u_distance_common_mm), sheet.u_pc_mm)
@@ -204,7 +206,7 @@ def _cycles_decision(readings: Readings, margin: np.ndarray, on: np.ndarray) -> 
     least = int(np.argmin(np.where(on, margin / doubt, np.inf)))
     limit = SAFE * float(doubt[least])
     worst = float(margin[least]) / MILLIMETRE
-    return Decision(
+    return TestOutcome(
         "whole cycles: smallest margin, mm",
         worst,
         limit,
@@ -213,4 +215,4 @@ def _cycles_decision(readings: Readings, margin: np.ndarray, on: np.ndarray) -> 
     )
 
 
-RECIPE = Kind("reference distance D0 from targets at known distances", LAYOUT, calibrate_reference_distance)
+RECIPE = CalibrationKind("reference distance D0 from targets at known distances", LAYOUT, calibrate_reference_distance)

@@ -7,10 +7,10 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.estimation.quality.repeatability import Repeatability
 from catseye.estimation.quality.repeatability import repeatability as analysed
-from catseye.records.files.readings import TEXT, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 
 KIND = "repeatability"
 MICROMETRE = 1e-3 * MILLIMETRE
@@ -25,10 +25,10 @@ class RepeatabilitySheet(Sheet):
     test_level: Annotated[float, Within(0, 0.5, above=True)] = 0.05
 
 
-LAYOUT = Layout(KIND, RepeatabilitySheet, required={"set": TEXT, "range_m": Within(-1e5, 1e5)})
+LAYOUT = SheetLayout(KIND, RepeatabilitySheet, required={"set": TEXT, "range_m": Within(-1e5, 1e5)})
 
 
-def measure_repeatability(readings: Readings, reject: bool = False) -> Calibration:
+def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Standard deviations of a range within and between sets, and whether the sets differ.
 
     readings   columns set (a day, a pointing, an operator) and range_m, all of one target; sheet RepeatabilitySheet
@@ -70,7 +70,7 @@ def measure_repeatability(readings: Readings, reject: bool = False) -> Calibrati
         columns=("set", "range_m", "within_um", "set_um", "state"),
         rows=rows,
         decisions=(
-            Decision(
+            TestOutcome(
                 "sets agree: F",
                 found.f,
                 found.f_limit,
@@ -113,4 +113,4 @@ def _deviations(found: Repeatability) -> tuple[np.ndarray, np.ndarray]:
     return values, covariance * np.outer(slope, slope)
 
 
-RECIPE = Kind("scatter of ranges within and between sets", LAYOUT, measure_repeatability)
+RECIPE = CalibrationKind("scatter of ranges within and between sets", LAYOUT, measure_repeatability)

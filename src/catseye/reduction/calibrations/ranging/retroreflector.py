@@ -10,12 +10,12 @@ from typing import Annotated
 import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
-from catseye.records.files.readings import TEXT, TIME, Layout, Readings, Sheet
+from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Decision
-from catseye.reduction.calibrations.fit import Fit, Scatter, fit_readings
-from catseye.reduction.calibrations.kind import Kind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 
 KIND = "retroreflector"
@@ -44,7 +44,7 @@ class RetroreflectorSheet(Sheet):
     u_cyclic_mm: Annotated[float, Within(0, 1)]
 
 
-LAYOUT = Layout(
+LAYOUT = SheetLayout(
     KIND,
     RetroreflectorSheet,
     required={TIME: Within(EARLIEST_MJD, LATEST_MJD), "retroreflector": TEXT, "range_m": Within(0.05, 10_000)},
@@ -52,7 +52,7 @@ LAYOUT = Layout(
 )
 
 
-def calibrate_retroreflector(readings: Readings, reject: bool = False) -> Calibration:
+def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> Calibration:
     """Range constants of unknown retroreflectors against a known one.
 
     readings   columns mjd_utc, retroreflector, range_m (without any constant of a retroreflector), perhaps position
@@ -89,20 +89,20 @@ def calibrate_retroreflector(readings: Readings, reject: bool = False) -> Calibr
     return _told(readings, fit, unknown)
 
 
-def _positions(readings: Readings) -> tuple[np.ndarray, list[str]]:
+def _positions(readings: SheetReadings) -> tuple[np.ndarray, list[str]]:
     """Number of each reading's position, and their names."""
     given = readings.words.get("position", ("",) * len(readings))
     names = sorted(set(given))
     return np.array([names.index(p) for p in given]), names
 
 
-def _parameters(readings: Readings, unknown: list[str]) -> list[str]:
+def _parameters(readings: SheetReadings, unknown: list[str]) -> list[str]:
     _, names = _positions(readings)
     per = ["range", "drift"][: 1 + readings.sheet.drift]
     return [*unknown, *(f"{what} at position {name or 'of the seat'}" for name in names for what in per)]
 
 
-def _design(readings: Readings, unknown: list[str]) -> np.ndarray:
+def _design(readings: SheetReadings, unknown: list[str]) -> np.ndarray:
     """Columns: one a retroreflector, 1 where it was read; then level and drift (m/h) of each position."""
     which, hours = np.array(readings.words["retroreflector"]), readings.hours()
     position, names = _positions(readings)
@@ -115,7 +115,7 @@ def _design(readings: Readings, unknown: list[str]) -> np.ndarray:
     return np.column_stack(columns)
 
 
-def _seatings(readings: Readings) -> np.ndarray:
+def _seatings(readings: SheetReadings) -> np.ndarray:
     """Number of each reading's seating: runs in time of one retroreflector at one position."""
     position, _ = _positions(readings)
     order = np.lexsort((readings.hours(), position))
@@ -126,7 +126,7 @@ def _seatings(readings: Readings) -> np.ndarray:
     return numbers
 
 
-def _scatter(readings: Readings) -> Scatter:
+def _scatter(readings: SheetReadings) -> ObservedScatter:
     """Each reading's own, and one shift a seating; estimated where the sheet does not claim them."""
     m, sheet = len(readings), readings.sheet
     seating = _seatings(readings)
@@ -140,10 +140,10 @@ def _scatter(readings: Readings) -> Scatter:
         claimed += (sheet.u_seating_mm * MILLIMETRE) ** 2 * same
     elif np.count_nonzero(same) > m or readings.has("u_range_mm"):
         unknown[SEATING] = same
-    return Scatter(claimed, unknown)
+    return ObservedScatter(claimed, unknown)
 
 
-def _told(readings: Readings, fit: Fit, unknown: list[str]) -> Calibration:
+def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
     values = sheet.pc_mm - difference
@@ -186,7 +186,7 @@ def _told(readings: Readings, fit: Fit, unknown: list[str]) -> Calibration:
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
         rows=rows,
         decisions=(
-            Decision(
+            TestOutcome(
                 "seatings",
                 float(alternations),
                 float(2 * (count + 1)),
@@ -221,4 +221,4 @@ def _told(readings: Readings, fit: Fit, unknown: list[str]) -> Calibration:
     )
 
 
-RECIPE = Kind("range constants of retroreflectors against a known one", LAYOUT, calibrate_retroreflector)
+RECIPE = CalibrationKind("range constants of retroreflectors against a known one", LAYOUT, calibrate_retroreflector)
