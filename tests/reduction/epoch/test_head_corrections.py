@@ -17,6 +17,7 @@ from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.head import _axes, head_unknowns
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import shot_group
@@ -29,7 +30,9 @@ from catseye.simulator.night.world import kelvin_from_ground
 from mirror_scene import START, sent, traced_change
 
 KAPPA = 4 * np.pi * 1.5e9 / SPEED_OF_LIGHT  # rad a metre of range, in vacuum
+HEAD_KINDS = (ParameterKind.AXES, ParameterKind.AMPLITUDE, ParameterKind.CYCLIC)
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
+KEYS = {ParameterKind.AXES: AXES, ParameterKind.AMPLITUDE: ("amplitude_to_phase_rad",)}
 TIGHT = {"u_axis_mm": 5e-4, "u_amplitude_to_phase_rad": 1e-5, "u_cyclic_mm": 5e-4}
 LOOSE = {"u_axis_mm": 0.1, "u_amplitude_to_phase_rad": 4e-3, "u_cyclic_mm": 0.02}
 NARROW = {"ZY104": (-24_000, 27_000), "ZY109": (25_000, 75_000)}  # azimuth limits after na0: some need the prime
@@ -199,7 +202,7 @@ def test_each_effect_unknown_or_of_the_wrong_sign_spoils_the_coordinates(
 
 
 def test_night_01_knows_of_no_effect_and_gets_no_parameter(network_01, reduced_night_01):
-    assert not any(name.startswith(("axes ", "amplitude ", "cyclic ")) for name in network_01.layout.at)
+    assert not any(quantity.kind in HEAD_KINDS for quantity in network_01.layout.at)
     for name in network_01.rangers:
         _, parts = shot_group(network_01, name, np.array(network_01.layout.start))
         assert parts.head.slopes.shape == (len(parts.target), 0)
@@ -253,11 +256,11 @@ def test_what_is_planted_within_the_priors_comes_back_but_for_what_the_covarianc
     for name in before.rangers:
         for unknown in head_unknowns(campaign, name):
             count = len(unknown.parts)
-            keys = {"axes": AXES, "amplitude": ("amplitude_to_phase_rad",)}.get(unknown.name.split()[0])
+            keys = KEYS.get(unknown.quantity.kind)
             keys = keys or ("cyclic_cosine_mm", "cyclic_sine_mm")
             unit = 1.0 if keys == ("amplitude_to_phase_rad",) else 1e-3
             p.extend(np.ravel([within[name][key] for key in keys]) * unit)
-            columns.extend(before.layout.columns(unknown.name, count))
+            columns.extend(before.layout.columns(unknown.quantity, count))
             u.extend([unknown.u] * count)
     p, u, columns = np.array(p), np.array(u), np.array(columns)
     assert len(p) == 12 * 4 + 18 + 18 * 4
@@ -297,9 +300,9 @@ def test_every_derivative_by_a_heads_parameter_is_a_finite_difference(night_01, 
     plain = shot_group(network, name, x)[1].head
     for unknown in head_unknowns(campaign, name):
         for i in range(len(unknown.parts)):
-            column = network.layout.at[unknown.name] + i
+            column = network.layout.at[unknown.quantity] + i
             # the sheet says more by h, instead of the parameter
-            keys = {"axes": AXES, "amplitude": ("amplitude_to_phase_rad",)}.get(unknown.name.split()[0])
+            keys = KEYS.get(unknown.quantity.kind)
             keys = keys or ("cyclic_cosine_mm", "cyclic_sine_mm")
             unit, per = (1.0, 1) if keys[0].startswith("amp") else (1e3, len(unknown.parts) // len(keys))
             key, part, h = keys[i // per], i % per, 1e-6
@@ -324,7 +327,7 @@ def test_a_parameter_shifts_the_prediction_as_the_same_number_on_the_sheet(night
     ]
     x = np.array(networks[0].layout.start)
     shifted = x.copy()
-    shifted[networks[0].layout.at["cyclic ZY115"] + 2] += 1e-5  # cosine 1, cosine 2, sine 1
+    shifted[networks[0].layout.at[Parameter(ParameterKind.CYCLIC, "ZY115")] + 2] += 1e-5  # cosine 1, cosine 2, sine 1
     by_sheet = shot_group(networks[1], "ZY115", x)[0].predict(x)[0]
     by_parameter = shot_group(networks[0], "ZY115", x)[0].predict(shifted)[0]
     np.testing.assert_allclose(by_parameter, by_sheet, atol=1e-12, rtol=0)
@@ -384,7 +387,7 @@ def test_axes_on_the_feed_arm_are_applied_where_the_record_says_how_the_mount_is
     campaign = changed(dataclasses.replace(night_01, feedarm=arm), "ZY115", mirror_offset_mm=0.2, u_axis_mm=0.01)
     network = build_network(campaign, r.phases, r.electronics, r.settings)
     mirror = campaign.mirror_of("ZY115")
-    assert "axes ZY115" in {unknown.name for unknown in head_unknowns(campaign, "ZY115")}
+    assert Parameter(ParameterKind.AXES, "ZY115") in {unknown.quantity for unknown in head_unknowns(campaign, "ZY115")}
     station = station_in(campaign, "ZY115")
     a, e = np.radians([145.3, 30.0])
     down = -np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])  # against the antenna's axis
@@ -461,7 +464,7 @@ def test_coordinates_of_nights_whose_heads_are_off_their_sheets_scatter_as_claim
         for key, known in (("admitted", admitting), ("denied", campaign)):
             network, answer = linear(known, phases, plain.coordinates)
             for point, true in night.truth.points.items():
-                if point in network.layout.at and plain.coordinates.shots[plain.coordinates.index(point)] >= 3:
+                if point in network.layout.points and plain.coordinates.shots[plain.coordinates.index(point)] >= 3:
                     at = network.layout.columns(point)
                     ratios[key].append((answer.x[at] - true) / np.sqrt(np.diag(answer.covariance)[at]))
     rms = {key: np.sqrt(np.mean(np.square(found))) for key, found in ratios.items()}

@@ -8,9 +8,9 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_correction
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.shots import _obliquity, _tilted, shot_group
-from catseye.reduction.epoch.unknowns import AIR
 
 F = 1.5e9
 N_GLASS = 1.527077
@@ -24,14 +24,14 @@ def state(network_01, reduced_night_01):
     for row, name in enumerate(c.points):
         x[layout.columns(name)] = c.x[row]
     rng = np.random.default_rng(7)
-    for name in layout.at:
-        if name.startswith("normal "):
-            x[layout.columns(name, 2)] = rng.normal(0, 2e-3, 2)
-        elif name.startswith("zero "):
-            x[layout.at[name]] = rng.normal(0, 1e-5)
-        elif name.startswith("leakage "):
-            x[layout.columns(name, 2)] = rng.normal(0, 8e-4, 2)
-    x[layout.columns(AIR, 3)] = [0.2, -0.1, 0.02]
+    for quantity in layout.at:
+        if quantity.kind is ParameterKind.NORMAL:
+            x[layout.columns(quantity, 2)] = rng.normal(0, 2e-3, 2)
+        elif quantity.kind is ParameterKind.ZERO:
+            x[layout.at[quantity]] = rng.normal(0, 1e-5)
+        elif quantity.kind is ParameterKind.LEAKAGE:
+            x[layout.columns(quantity, 2)] = rng.normal(0, 8e-4, 2)
+    x[layout.air] = [0.2, -0.1, 0.02]
     return x
 
 
@@ -88,7 +88,7 @@ def test_the_slope_of_obliquity_by_tilt_is_a_finite_difference(network_01, state
 def test_a_prism_seen_straight_has_no_obliquity_and_from_behind_a_finite_one(network_01, state):
     name = "DP001"
     x = np.array(state)
-    x[network_01.layout.columns(f"normal {name}", 2)] = 0.0
+    x[network_01.layout.columns(Parameter(ParameterKind.NORMAL, name), 2)] = 0.0
     normal = network_01.places[name].normal
     for towards, cosine in ((normal, 1.0), (-normal, 0.0)):
         incidence, correction, _, slopes = _obliquity(network_01, [name], towards[None], x)
@@ -178,10 +178,12 @@ def test_a_sheet_with_other_leakage_changes_the_ranges_as_the_derivative_says(ni
 def test_the_rest_of_a_glass_constant_acts_as_a_change_of_the_constant(network_01, state):
     """A parameter of 5 um on a prism and a sheet that says 5 um more predict the same ranges, and shorter ones."""
     rest = 5e-6
-    target = next(t for t in shot_group(network_01, "ZY113", state)[1].target if f"glass {t}" in network_01.layout.at)
+    at = network_01.layout.at
+    seen = shot_group(network_01, "ZY113", state)[1].target
+    target = next(t for t in seen if Parameter(ParameterKind.GLASS, t) in at)
     mine = np.array([t == target for t in shot_group(network_01, "ZY113", state)[1].target])
     moved = state.copy()
-    moved[network_01.layout.at[f"glass {target}"]] += rest
+    moved[at[Parameter(ParameterKind.GLASS, target)]] += rest
     place = network_01.places[target]
     places = {**network_01.places, target: dataclasses.replace(place, constant=place.constant + rest)}
     plain = shot_group(network_01, "ZY113", state)[0]

@@ -7,9 +7,11 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
+from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
 from catseye.reduction.live.epoch import _lasts, campaign_of
 from catseye.reduction.site.motion import ground_from
 from live_scene import START, begun, site
+from parameter_scene import parameter, parameters
 
 POSTURE = {"azimuth": np.radians(370.0), "elevation": np.radians(45.0), "mjd": START}
 RANGERS = ("ZY102", "ZY105", "ZY108", "ZY110", "ZY113", "ZY116")
@@ -61,7 +63,7 @@ def test_only_stations_that_speak_take_part():
     ],
 )
 def test_what_lasts_is_known_by_its_name(name, stays):
-    assert _lasts(name, ("ZY101", "ZY113", "TR01-L", "TR01-R", "TR01-B")) is stays
+    assert _lasts(parameter(name), ("ZY101", "ZY113", "TR01-L", "TR01-R", "TR01-B"), site().triplets) is stays
 
 
 def test_shots_only_add_to_what_was_known(second_epoch):
@@ -70,7 +72,7 @@ def test_shots_only_add_to_what_was_known(second_epoch):
     job = live.begin(second_epoch[1])
     epoch = job.solve()
     before, after = job.carried, epoch.carried
-    shared = [n for n in before.names if n in set(after.names)]
+    shared = [p for p in before.parameters if p in set(after.parameters)]
     p, q = (s.covariance[np.ix_(s.columns(shared), s.columns(shared))] for s in (before, after))
     size = np.sqrt(np.diag(p))
     gained = np.linalg.eigvalsh((p - q) / np.outer(size, size))
@@ -88,12 +90,12 @@ def test_what_the_records_say_is_counted_once(second_epoch):
     before, after = job.carried, job.solve().carried
     mirror = np.zeros((3, len(before.names)))  # scan point less fixed point: the sheet's mirror offset
     for i, axis in enumerate("xyz"):
-        mirror[i, before.columns([f"ZY101 {axis}", f"ZY101-F {axis}"])] = 1.0, -1.0
-    order = after.columns(before.names)
+        mirror[i, before.columns(parameters([f"ZY101 {axis}", f"ZY101-F {axis}"]))] = 1.0, -1.0
+    order = after.columns(before.parameters)
     now = after.covariance[np.ix_(order, order)]
     u, v = (np.sqrt(np.diag(mirror @ p @ mirror.T)) for p in (before.covariance, now))
     np.testing.assert_allclose(v, u, rtol=1e-3)  # heard twice it would be 0.7 of it
-    zero = before.columns(["zero ZY101"])[0]
+    zero = before.columns([parameter("zero ZY101")])[0]
     assert now[zero, zero] == pytest.approx(before.covariance[zero, zero], rel=1e-3)
 
 
@@ -104,10 +106,11 @@ def test_an_epoch_is_carried_in_the_frames_of_its_points(second_epoch):
     for name in ("ZY102", "ZY113", "TR05-B", "ZEG41040L"):
         ground, covariance = found.point(name)
         np.testing.assert_allclose(live.place(name, found.ticks / TICKS_PER_DAY), ground, rtol=0, atol=1e-9)
-        own, own_covariance = live.carried.block([name])
+        at = live.carried.columns(point_parameters(ParameterKind.POINT, [name]))
+        own, own_covariance = live.carried.x[at], live.carried.covariance[np.ix_(at, at)]
         np.testing.assert_allclose(np.trace(own_covariance), np.trace(covariance), rtol=1e-9)
         moves = live.frames[name] != "ground"
-        assert (np.linalg.norm(own[0] - ground) > 1.0) == moves
+        assert (np.linalg.norm(own - ground) > 1.0) == moves
         latest = live.track.latest
         axes = ground_from(site(), live.frames[name], latest.azimuth, latest.elevation).single.rotation
         turned = axes @ own_covariance @ axes.T

@@ -462,7 +462,7 @@ def test_prisms_of_the_dish_are_solved_but_not_carried(settled):
     feed.into(live)
     answer = live.solve(night.ticks(3))
     assert "DP20C" in answer.names
-    assert live.carried.point("DP20C") is None
+    assert "DP20C" not in live.carried.points()
     assert "DP20C" not in live.uncertainty()
 
 

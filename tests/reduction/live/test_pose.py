@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
 from catseye.reduction.live.pose import beam_per_feed_shift, live_pose
-from catseye.reduction.live.state import REFERENCE_EPOCH, Carried, with_reference
+from catseye.reduction.live.state import Carried, with_reference
 from catseye.simulator.twin.beam import TracedDish
 from draws import draws, same_sigmas
 from live_scene import site
+from parameter_scene import parameter
 
 F = 60.0  # m
 FOCUS = np.array([0.0, 0.0, F])
@@ -45,8 +47,7 @@ def moved(dish=STAYS, feed=STAYS, *, covariance=None, only=None):
                 now.append(pivot + shift + Rotation.from_rotvec(turn).apply(x - pivot))
     n = 3 * len(names)
     covariance = np.diag(np.repeat([1e-8, 1e-9], n)) if covariance is None else covariance
-    columns = [f"{name} {a}" for name in names for a in "xyz"]
-    columns += [f"{name}{REFERENCE_EPOCH} {a}" for name in names for a in "xyz"]
+    columns = [*point_parameters(ParameterKind.POINT, names), *point_parameters(ParameterKind.REFERENCE_PLACE, names)]
     return Carried(tuple(columns), np.concatenate([*now, *then]), covariance, 0, 0.5)
 
 
@@ -130,7 +131,7 @@ def test_claimed_covariances_are_those_of_many_draws(count):
     calm = moved(covariance=covariance)
     claimed = live_pose(calm, BODIES, site())
     draws = calm.x + rng.multivariate_normal(np.zeros(n), covariance, count)
-    poses = [live_pose(Carried(calm.names, x, covariance, 0, 0.5), BODIES, site()) for x in draws]
+    poses = [live_pose(Carried(calm.parameters, x, covariance, 0, 0.5), BODIES, site()) for x in draws]
     bodies = {"dish": [p.dish for p in poses], "feed": [p.feed for p in poses]}
     samples = {k: np.array([np.concatenate([b.translation, b.rotation]) for b in v]) for k, v in bodies.items()}
     samples["offset"] = np.array([p.offset for p in poses])
@@ -148,8 +149,8 @@ def test_claimed_covariances_are_those_of_many_draws(count):
 def test_points_that_no_longer_fit_a_rigid_body_show_in_chi2():
     bent = moved()
     x = bent.x.copy()
-    x[bent.columns(["D1 z"])] += 2e-3
-    pose = live_pose(Carried(bent.names, x, bent.covariance, 0, 0.5), BODIES, site())
+    x[bent.columns([parameter("D1 z")])] += 2e-3
+    pose = live_pose(Carried(bent.parameters, x, bent.covariance, 0, 0.5), BODIES, site())
     assert pose.dish.chi2 > 100.0
     assert pose.feed.chi2 < 1e-3
 
@@ -157,14 +158,14 @@ def test_points_that_no_longer_fit_a_rigid_body_show_in_chi2():
 @pytest.mark.parametrize("seed", range(8))
 def test_in_the_reference_epoch_nothing_has_moved_and_no_variance_is_negative(seed):
     rng = np.random.default_rng(seed)
-    names = [f"{name} {a}" for name in (*DISH, *ARM) for a in "xyz"]
+    names = point_parameters(ParameterKind.POINT, (*DISH, *ARM))
     a = rng.normal(size=(len(names), len(names) + 3))
     places = np.concatenate([*DISH.values(), *ARM.values()])
     state = with_reference(Carried(tuple(names), places, 1e-8 * a @ a.T, 0, 0.5), [*DISH, *ARM])
     # the journey of an epoch: the blocks are no longer the very same numbers, but rounded apart
     noise = rng.normal(size=state.covariance.shape)
     rounded = state.covariance * (1.0 + 2e-16 * (noise + noise.T))
-    pose = live_pose(Carried(state.names, state.x, rounded, 0, 0.5), BODIES, site())
+    pose = live_pose(Carried(state.parameters, state.x, rounded, 0, 0.5), BODIES, site())
     np.testing.assert_allclose(pose.offset, 0.0, rtol=0, atol=1e-15)
     for covariance in (pose.covariance, pose.dish.covariance, pose.feed.covariance):
         assert np.diag(covariance).min() >= 0.0, "a display takes its root"
@@ -182,9 +183,9 @@ def test_with_too_few_points_it_says_of_which_body():
 def test_points_on_a_line_do_not_hold_a_turn():
     state, x = moved(), moved().x.copy()
     for k in range(4):
-        for copy in ("", REFERENCE_EPOCH):
-            x[state.columns([f"A{k}{copy} {a}" for a in "xyz"])] = [0.0, 0.0, 50.0 + 3 * k]
-    pose = live_pose(Carried(state.names, x, state.covariance, 0, 0.5), BODIES, site())
+        for kind in (ParameterKind.POINT, ParameterKind.REFERENCE_PLACE):
+            x[state.columns(point_parameters(kind, [f"A{k}"]))] = [0.0, 0.0, 50.0 + 3 * k]
+    pose = live_pose(Carried(state.parameters, x, state.covariance, 0, 0.5), BODIES, site())
     assert "arm" in pose.missing
     assert "line" in pose.missing
 
@@ -192,7 +193,7 @@ def test_points_on_a_line_do_not_hold_a_turn():
 def test_only_points_with_a_reference_count():
     state = moved()
     bodies = {**BODIES, "NEW": "dish"}
-    names = (*state.names, "NEW x", "NEW y", "NEW z")
+    names = (*state.parameters, *point_parameters(ParameterKind.POINT, ["NEW"]))
     n = len(names)
     covariance = np.eye(n)
     covariance[: n - 3, : n - 3] = state.covariance
@@ -215,8 +216,7 @@ def test_a_body_that_bends_claims_no_more_than_its_points_show():
     places = {f"D{k}": rng.uniform([-50, 4, 0], [50, 104, 40]) for k in range(20)}
     names, bodies = [*places, *ARM], dict.fromkeys(places, "dish") | dict.fromkeys(ARM, "arm")
     then = np.concatenate([*places.values(), *ARM.values()])
-    columns = [f"{name} {a}" for name in names for a in "xyz"]
-    columns += [f"{name}{REFERENCE_EPOCH} {a}" for name in names for a in "xyz"]
+    columns = [*point_parameters(ParameterKind.POINT, names), *point_parameters(ParameterKind.REFERENCE_PLACE, names)]
     for _ in range(60):
         now = then + rng.normal(0.0, 1e-5, len(then))
         now[:60] += rng.normal(0.0, 3e-4, 60)

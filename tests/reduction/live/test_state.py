@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.geometry.frames.frame import Transform
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.live.state import (
     USUAL,
     Carried,
@@ -17,6 +18,7 @@ from catseye.reduction.live.state import (
     with_velocities,
     without,
 )
+from parameter_scene import parameter, parameters
 
 seeds = st.integers(0, 2**32 - 1)
 BODIES = {"A": "arm", "B": "arm", "C": "arm", "D": "dish", "E": "alidade"}
@@ -31,6 +33,10 @@ NAMES = (
 )
 
 
+def zero(name):
+    return Parameter(ParameterKind.ZERO, name)
+
+
 def spd(rng, n, size=1.0):
     a = rng.normal(size=(n, n + 2))
     return size * (a @ a.T) / n
@@ -38,22 +44,22 @@ def spd(rng, n, size=1.0):
 
 def state(seed=0, names=NAMES):
     rng = np.random.default_rng(seed)
-    return Carried(tuple(names), 10.0 * rng.normal(size=len(names)), spd(rng, len(names), 1e-6), 1000, 0.7)
+    return Carried(parameters(names), 10.0 * rng.normal(size=len(names)), spd(rng, len(names), 1e-6), 1000, 0.7)
 
 
 @settings(max_examples=60)
 @given(seed=seeds, shared=st.integers(1, 5), outside=st.integers(1, 5), new=st.integers(0, 4))
 def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, outside, new):
     rng = np.random.default_rng(seed)
-    old = tuple(f"s{k}" for k in rng.permutation(shared + outside))
+    old = tuple(zero(f"s{k}") for k in rng.permutation(shared + outside))
     before = Carried(old, rng.normal(size=len(old)), spd(rng, len(old)), 0, 0.1)
-    seen_names = (*rng.permutation(old)[:shared].tolist(), *(f"n{k}" for k in range(new)))
+    seen = (*(old[k] for k in rng.permutation(len(old))[:shared]), *(zero(f"n{k}") for k in range(new)))
     # the full problem: old states, then new ones with a prior of their own, and observations of the seen
-    names = (*old, *seen_names[shared:])
+    names = (*old, *seen[shared:])
     n = len(names)
     p, x = np.zeros((n, n)), np.concatenate([before.x, rng.normal(size=new)])
     p[: len(old), : len(old)], p[len(old) :, len(old) :] = before.covariance, spd(rng, new) if new else 0.0
-    at = [names.index(name) for name in seen_names]
+    at = [names.index(name) for name in seen]
     h, r = np.zeros((6, n)), spd(rng, 6)
     h[:, at] = rng.normal(size=(6, len(at)))
     z = rng.normal(size=6)
@@ -64,8 +70,8 @@ def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, out
 
     whole_x, whole_p = updated(x, p, h)
     part_x, part_p = updated(x[at], p[np.ix_(at, at)], h[:, at])
-    after = with_unseen(before, Carried(seen_names, part_x, part_p, 5, 0.2))
-    order = [after.names.index(name) for name in names]
+    after = with_unseen(before, Carried(seen, part_x, part_p, 5, 0.2))
+    order = [after.parameters.index(name) for name in names]
     np.testing.assert_allclose(after.x[order], whole_x, rtol=0, atol=1e-8)
     np.testing.assert_allclose(after.covariance[np.ix_(order, order)], whole_p, rtol=0, atol=1e-8)
     np.testing.assert_allclose(after.covariance, after.covariance.T, rtol=0, atol=1e-10)  # what was seen is by inverses
@@ -73,7 +79,7 @@ def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, out
 
 
 def test_a_seen_state_stands_as_it_was_found():
-    before, seen = state(1, ("a", "b", "c")), state(2, ("c", "b"))
+    before, seen = state(1, ("zero a", "zero b", "zero c")), state(2, ("zero c", "zero b"))
     after = with_unseen(before, seen)
     np.testing.assert_array_equal(after.covariance[:2, :2], seen.covariance)
     np.testing.assert_array_equal(after.x[:2], seen.x)
@@ -82,20 +88,21 @@ def test_a_seen_state_stands_as_it_was_found():
 
 def test_the_reference_epoch_is_a_fully_correlated_copy_that_later_replaces_itself():
     first = with_reference(state(3), ["A", "D"])
-    now, then = first.columns(["A x", "D z"]), first.columns(["A@0 x", "D@0 z"])
+    now, then = (first.columns(parameters(t)) for t in (["A x", "D z"], ["A@0 x", "D@0 z"]))
     np.testing.assert_array_equal(first.x[now], first.x[then])
     p = first.covariance
     np.testing.assert_array_equal(p[np.ix_(now, now)], p[np.ix_(now, then)])
     np.testing.assert_array_equal(p[np.ix_(then, then)], p[np.ix_(now, now)])
-    moved = Carried(first.names, first.x + 1.0, first.covariance, 9, 0.1)
+    moved = Carried(first.parameters, first.x + 1.0, first.covariance, 9, 0.1)
     again = with_reference(moved, ["A"])
     assert sum("@0" in name for name in again.names) == 6, "D keeps its old reference, A has a new one"
-    np.testing.assert_array_equal(again.x[again.columns(["A@0 y"])], again.x[again.columns(["A y"])])
+    now, then = (again.columns([parameter(t)]) for t in ("A y", "A@0 y"))
+    np.testing.assert_array_equal(again.x[then], again.x[now])
 
 
 def test_a_marginal_leaves_the_rest_alone():
     whole = state(4)
-    left = without(whole, {"A x", "zero ZY1"})
+    left = without(whole, set(parameters(["A x", "zero ZY1"])))
     at = [i for i, name in enumerate(whole.names) if name not in {"A x", "zero ZY1"}]
     np.testing.assert_array_equal(left.x, whole.x[at])
     np.testing.assert_array_equal(left.covariance, whole.covariance[np.ix_(at, at)])
@@ -104,7 +111,7 @@ def test_a_marginal_leaves_the_rest_alone():
 def test_velocities_are_added_once_and_are_uncorrelated():
     one = with_velocities(state(5), ["A", "D"], USUAL)
     assert with_velocities(one, ["A", "D"], USUAL).names == one.names
-    rate = one.columns([f"{p} rate {a}" for p in "AD" for a in "xyz"])
+    rate = one.columns(parameters(f"{p} rate {a}" for p in "AD" for a in "xyz"))
     np.testing.assert_allclose(one.covariance[np.ix_(rate, rate)], (0.02e-3) ** 2 * np.eye(6), rtol=1e-12, atol=0)
     rest = np.setdiff1d(np.arange(len(one.x)), rate)
     assert not one.covariance[np.ix_(rate, rest)].any()
@@ -161,7 +168,7 @@ def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
 def test_the_profile_returns_to_its_prior_and_the_reference_stands():
     before = with_reference(state(7), ["A", "D"])
     after = carried_on(before, 0, 24 * 3600.0, 0.7, BODIES, USUAL, 0.4)
-    bend = after.columns(["the air bend"])[0]
+    bend = after.columns([parameter("the air bend")])[0]
     assert after.x[bend] == pytest.approx(0.0, abs=1e-12)
     assert after.covariance[bend, bend] == pytest.approx(0.16, rel=1e-9)
     assert np.abs(np.delete(after.covariance[bend], bend)).max() < 1e-12
@@ -179,7 +186,7 @@ def test_there_and_back_through_the_ground_is_where_it_was(seed):
     x, p = to_ground(before, frames)
     np.testing.assert_allclose(x[:3], frames["A"].points(before.x[:3]), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(x[3:], before.x[3:])
-    back = from_ground(before.names, x, p, frames, ticks=1, elevation=0.0)
+    back = from_ground(before.parameters, x, p, frames, ticks=1, elevation=0.0)
     np.testing.assert_allclose(back.x, before.x, rtol=0, atol=1e-12)
     np.testing.assert_allclose(back.covariance, before.covariance, rtol=0, atol=1e-18)
 
@@ -193,12 +200,12 @@ def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(veloci
     r = 1e-8
     for epoch in range(500):
         now = carried_on(now, epoch, 10.0, 0.7 + 1e-4 * epoch, BODIES, USUAL, 0.4)
-        at = now.columns(seen_names)
+        at = now.columns(parameters(seen_names))
         p, h = now.covariance[np.ix_(at, at)], rng.normal(size=(40, len(at)))
         gain = np.linalg.solve(h @ p @ h.T + r * np.eye(40), h @ p).T
         after = p - gain @ h @ p
         x = now.x[at] + gain @ rng.normal(0.0, 1e-4, 40)
-        now = with_unseen(now, Carried(tuple(seen_names), x, 0.5 * (after + after.T), epoch, now.elevation))
+        now = with_unseen(now, Carried(parameters(seen_names), x, 0.5 * (after + after.T), epoch, now.elevation))
         np.testing.assert_allclose(now.covariance, now.covariance.T, rtol=0, atol=1e-20)
     size = np.sqrt(np.diag(now.covariance))
     low = np.linalg.eigvalsh(now.covariance / np.outer(size, size))[0]
@@ -211,18 +218,16 @@ def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(veloci
 
 def test_points_are_found_by_name():
     one = state(2)
-    assert one.point("nobody") is None
-    np.testing.assert_array_equal(one.point("B"), one.x[3:6])
-    where, covariance = one.block(["B", "A"])
-    np.testing.assert_array_equal(where, [one.x[3:6], one.x[0:3]])
-    np.testing.assert_array_equal(covariance[:3, 3:], one.covariance[3:6, 0:3])
+    assert one.points() == {"A": 0, "B": 3, "C": 6, "D": 9, "E": 12, "ZY1": 15}
+    assert one.points(ParameterKind.FIXED_POINT) == {"ZY1": 18}
     with pytest.raises(KeyError):
-        one.columns(["nobody x"])
+        one.columns([parameter("nobody x")])
 
 
 def test_what_lasts_of_a_path_returns_to_its_prior():
     """Half an hour takes e^-1 of it and gives 1 - e^-2 of its variance back."""
-    before = Carried(("path ZY1 A", "x"), np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
+    path = parameters(["path ZY1 A", "normal A 1"])
+    before = Carried(path, np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
     after = carried_on(before, 1, 1800.0, 0.5, {}, USUAL, 0.5, 0.105)
     kept = np.exp(-1.0)
     np.testing.assert_allclose(after.x, [0.1 * kept, 2.0], rtol=1e-12)

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import FrameError, InputError
 from catseye.records.network.solved_points import SolvedPoints
+from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
 from catseye.reduction.live.pose import live_pose
-from catseye.reduction.live.state import REFERENCE_EPOCH, Carried
+from catseye.reduction.live.state import Carried
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose.pose import at_posture, frame_transform, group_names, pose_of_group
 from catseye.reduction.site.places import nominal_frame, places_of
@@ -97,7 +98,7 @@ def test_the_beam_is_what_the_coordinator_says_of_the_same_points(night_01, opti
         assert found.relative.shape == (6,)
         return
     to = nominal_frame(night_01).inverse()
-    names = [f"{n} {a}" for n in NAMES for a in "xyz"] + [f"{n}{REFERENCE_EPOCH} {a}" for n in NAMES for a in "xyz"]
+    names = [*point_parameters(ParameterKind.POINT, NAMES), *point_parameters(ParameterKind.REFERENCE_PLACE, NAMES)]
     x = np.concatenate([to.points(later.x).ravel(), to.points(before.x).ravel()])
     both = np.kron(np.eye(len(NAMES)), to.rotation)
     q = np.zeros((len(names), len(names)))

@@ -27,6 +27,7 @@ from catseye.estimation.quality.propagation import STUDENT, Input
 from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, ShotScene, head_columns
 from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
+from catseye.reduction.epoch.parameter import ParameterKind
 from catseye.signal.detection.buffers import inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES
 from catseye.signal.systematics.cyclic import cyclic_slope
@@ -201,19 +202,22 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
     slopes = iter(found.slopes[0])
     items = []
     for unknown in unknowns:
-        kind = unknown.name.partition(" ")[0]
+        kind = unknown.quantity.kind
         values: tuple[float, ...]
-        if kind == "axes":
+        if kind is ParameterKind.AXES:
             values, unit, factor = tuple(getattr(mirror, key) for key in AXES), "mm", MILLIMETRE
-        elif kind == "amplitude":
+        elif kind is ParameterKind.AMPLITUDE:
             values, unit, factor = (mirror.amplitude_to_phase_rad,), "rad", 1.0
         else:
             values, unit, factor = (*mirror.cyclic_cosine_mm, *mirror.cyclic_sine_mm), "mm", MILLIMETRE
         values = values or (0.0,) * len(unknown.parts)
         for part, value in zip(unknown.parts, values, strict=True):
-            name = {"axes": part, "amplitude": "amplitude to phase", "cyclic": f"cyclic, {part}"}[kind]
+            key, name = {
+                ParameterKind.AXES: (f"axes {part}", part),
+                ParameterKind.AMPLITUDE: ("coupling", "amplitude to phase"),
+                ParameterKind.CYCLIC: (f"cyclic {part}", f"cyclic, {part}"),
+            }[kind]
             given = Input(name, float(value), unknown.u / factor)
-            key = "coupling" if kind == "amplitude" else f"{kind} {part}"
             items.append(Item(key, given, unit, float(next(slopes)) * factor, file + unknown.key))
     return items
 

@@ -10,6 +10,7 @@ from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.air import AirField, PathAir
 from catseye.reduction.epoch.head import head_corrections, head_unknowns
+from catseye.reduction.epoch.parameter import Parameter
 from catseye.reduction.epoch.ranges import Phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import RangedPoint
@@ -267,11 +268,12 @@ def _seconds(campaign: Campaign, row: int) -> float:
     return float((campaign.shots.mjd_utc[row] - campaign.shots.mjd_utc[0]) * SECONDS_PER_DAY)
 
 
-def head_columns(campaign: Campaign, ranger: str) -> dict[str, int]:
+def head_columns(campaign: Campaign, ranger: str) -> dict[Parameter, int]:
     """First place of each unknown of a head in a list of all its parts."""
-    at, first = {}, 0
+    at: dict[Parameter, int] = {}
+    first = 0
     for unknown in head_unknowns(campaign, ranger):
-        at[unknown.name], first = first, first + len(unknown.parts)
+        at[unknown.quantity], first = first, first + len(unknown.parts)
     return at
 
 

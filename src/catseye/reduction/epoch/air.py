@@ -15,6 +15,7 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.campaign import Campaign
 from catseye.records.night.path_temperature import PathTemperatureTable
+from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 
 Profile = Callable[[np.ndarray], np.ndarray]
@@ -152,6 +153,15 @@ class AirField:
             wavelength_um=site.ranging.wavelength_um,
             model=settings.air_model,
             lines=lines,
+        )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The q parameters as values, in the order of `names`."""
+        return (
+            *(Parameter(ParameterKind.THERMOMETER, station) for station in self.stations),
+            GRADIENT if self.profile == "gradient" else BEND,
+            *(Parameter(ParameterKind.SOUND, *sorted(line.ends)) for line in self.lines),
         )
 
     @property

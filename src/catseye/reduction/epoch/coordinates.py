@@ -14,13 +14,12 @@ from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (
-    AIR,
     APPROXIMATE,
-    FIXED_POINT,
     HEADS,
     SOUND,
     THERMOMETERS,
@@ -178,7 +177,7 @@ def settle_network(
     """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
 
     network   with priors for whatever its shots do not hold
-    starts    point: (3,) m, or parameters by the name in `layout.at`, where to begin instead of the layout's start
+    starts    point: (3,) m, where to begin instead of the layout's start
     keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
     predicted the priors know where everything is to a few of the shots' sigmas: wrong shots are searched for only where
               one stands out, since none can hide behind another
@@ -188,10 +187,10 @@ def settle_network(
     layout, settings = network.layout, network.settings
     x = np.array(layout.start)
     for name, where in starts.items():
-        if name in layout.at:
-            x[layout.columns(name, len(where))] = where
+        if name in layout.points:
+            x[layout.columns(name)] = where
     free = np.array(layout.free)
-    points = [layout.columns(name) for name in network.places if name in layout.at]
+    points = [layout.columns(name) for name in network.places if name in layout.points]
     coordinates = np.concatenate(points)
     active, solution = None, None
     advice: list[Linear] = []
@@ -233,7 +232,7 @@ def settle_network(
             break
     else:
         raise EstimationError(
-            f"not settled: cycles, air and incidence still move {layout.names[coordinates[np.argmax(moved)]]} by "
+            f"not settled: cycles, air and incidence still move {layout.parameters[coordinates[np.argmax(moved)]]} by "
             f"{moved.max() / MILLIMETRE:.3f} mm after {PASSES} passes; check its typed position"
         )
     if progress is not None:
@@ -263,7 +262,7 @@ def coordinates_of(
     resolved                   what was known of whole cycles before
     """
     layout, campaign = network.layout, network.campaign
-    names = sorted([*network.places, *(m + FIXED_POINT for m in campaign.monuments)])
+    names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
     columns = np.concatenate([layout.columns(n) for n in names])
     ranges = _ranges(network, solution, shots)
     count = dict.fromkeys(names, 0)
@@ -276,10 +275,10 @@ def coordinates_of(
     def estimate(column: int) -> tuple[float, float]:
         return float(solution.x[column]), float(np.sqrt(solution.covariance[column, column]))
 
-    every = {n: estimate(layout.at[AIR] + i) for i, n in enumerate(network.field.names)}
+    every = {n: estimate(int(k)) for k, n in zip(layout.air, network.field.names, strict=True)}
     sound = {line.name: every[line.name] for line in network.field.lines}
     air = {n: value for n, value in every.items() if n not in sound}
-    leakage_at = {n: layout.columns(f"leakage {n}", 2) for n in network.rangers}
+    leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
     return AdjustedCoordinates(
         points=tuple(names),
@@ -290,12 +289,12 @@ def coordinates_of(
         shots=np.array([count[n] for n in names]),
         ranges=ranges,
         heads={
-            layout.names[column]: estimate(column)
+            str(layout.parameters[column]): estimate(column)
             for n in network.rangers
             for unknown in head_unknowns(campaign, n)
-            for column in layout.columns(unknown.name, len(unknown.parts))
+            for column in layout.columns(unknown.quantity, len(unknown.parts))
         },
-        zeros={n: estimate(layout.at[f"zero {n}"]) for n in network.rangers},
+        zeros={n: estimate(layout.at[Parameter(ParameterKind.ZERO, n)]) for n in network.rangers},
         leakage={n: (float(solution.x[c[0]]), float(solution.x[c[1]])) for n, c in leakage_at.items()},
         air=air,
         refractivity_ppm=float(used_paths.mean() / PPM) if len(used_paths) else float("nan"),
@@ -324,12 +323,13 @@ def _ranges(
     quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
     for (group, part), fit in zip(shots, fits, strict=True):
         n = 1.0 + part.refractivity
-        own_zero = np.full(len(n), x[layout.at[f"zero {part.name}"]])
-        at = x[layout.at[part.name] + np.arange(3)]
+        own_zero = np.full(len(n), x[layout.at[Parameter(ParameterKind.ZERO, part.name)]])
+        at = x[layout.columns(part.name)]
         to = np.array([x[layout.columns(t)] for t in part.target])
         zero.append(own_zero)
-        leakage.append(-(part.leakage_slope @ x[layout.columns(f"leakage {part.name}", 2)]) / n)
-        rest = [x[layout.at[f"glass {t}"]] if f"glass {t}" in layout.at else 0.0 for t in part.target]
+        leakage.append(-(part.leakage_slope @ x[layout.columns(Parameter(ParameterKind.LEAKAGE, part.name), 2)]) / n)
+        constants = [Parameter(ParameterKind.GLASS, t) for t in part.target]
+        rest = [x[layout.at[c]] if c in layout.at else 0.0 for c in constants]
         glass.append(part.glass + np.array(rest))
         residual.append(fit.residual / n)
         range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
@@ -414,16 +414,14 @@ def _notes(
     notes = []
     for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
         if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
-            names = [network.layout.names[c] for c in np.ravel(group.columns).tolist()]
+            owners = [network.layout.parameters[c].of for c in np.ravel(group.columns).tolist()]
         if fit.name == THERMOMETERS:
-            for name, active in zip(names, fit.active, strict=True):
-                station = name.removeprefix(f"{AIR} ")
+            for station, active in zip(owners, fit.active, strict=True):
                 value, u = air[station]
                 if not active:
                     notes.append(f"{station}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
         if fit.name == ZEROS:
-            for name, active, off, u in zip(names, fit.active, fit.residual, fit.sigma, strict=True):
-                ranger = name.removeprefix("zero ")
+            for ranger, active, off, u in zip(owners, fit.active, fit.residual, fit.sigma, strict=True):
                 if not active:
                     notes.append(
                         f"{ranger}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
@@ -431,7 +429,7 @@ def _notes(
                     )
         if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
             worst = int(np.argmax(np.abs(fit.standardised)))
-            called = network.layout.names[int(np.ravel(group.columns)[worst])]
+            called = network.layout.parameters[int(np.ravel(group.columns)[worst])]
             notes.append(
                 f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
                 f"{network.settings.critical}); check the sheet's value and u"

@@ -174,8 +174,8 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
     used: set[int] = set()
     part = build_network(network.campaign, network.phases, electronics, network.settings, motion=network.motion)
     if part.rangers:
-        column = {name: i for i, name in enumerate(network.layout.names)}
-        at = np.array([column[name] for name in part.layout.names])
+        column = {parameter: i for i, parameter in enumerate(network.layout.parameters)}
+        at = np.array([column[parameter] for parameter in part.layout.parameters])
         pairs = [shot_group(part, name, x[at]) for name in part.rangers]
         groups: list[ObservationGroup] = [group for group, _ in pairs] + part.priors
         removable = [
@@ -185,7 +185,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
             x[at],
             groups,
             removable,
-            points=[part.layout.columns(n) for n in part.places if n in part.layout.at],
+            points=[part.layout.columns(n) for n in part.places if n in part.layout.points],
             free=np.array(part.layout.free),
             names=part.layout.names,
             critical=network.settings.critical,

@@ -33,7 +33,7 @@ def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray)
     was decided by a foreign return is well known and wrong. Too few of them give no advice.
     """
     layout, campaign, limit = network.layout, network.campaign, network.settings.u_surface
-    names = np.array([n for n in dish_prisms(campaign) if n in layout.at])
+    names = np.array([n for n in dish_prisms(campaign) if n in layout.points])
     if not len(names):
         return []
     columns = np.array([layout.columns(n) for n in names])

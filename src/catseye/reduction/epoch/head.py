@@ -12,6 +12,7 @@ A campaign's records carry no encoder counts: a shot is taken as fired in the di
 azimuth limits forbid that and allow the prime one.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.files.refusal import refusal
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.mirror import Mirror
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.site.stations import AXES, station_in
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient, amplitude_phase
 from catseye.signal.systematics.cyclic import cyclic_design, cyclic_range
@@ -35,13 +37,13 @@ UNSAID_ORDERS = 2  # of a cyclic deviation of which the sheet says the uncertain
 class Unknown:
     """How far an effect's values may be off the sheet's: a parameter of a few parts, expected zero.
 
-    name    "axes ZY101", in the layout
-    parts   of it
-    u       of each, m or rad
-    key     where the sheet says so
+    quantity   in the layout
+    parts      of it
+    u          of each, m or rad
+    key        where the sheet says so
     """
 
-    name: str
+    quantity: Parameter
     parts: tuple[str, ...]
     u: float
     key: str
@@ -76,21 +78,23 @@ def head_unknowns(campaign: Campaign, name: str) -> list[Unknown]:
     if mirror.u_axis_mm is not None:
         mounted(campaign, name)
         parts = tuple(key.removesuffix("_mm").replace("_", " ") for key in AXES)
-        unknowns.append(Unknown(f"axes {name}", parts, mirror.u_axis_mm * MILLIMETRE, "u_axis_mm"))
+        unknowns.append(Unknown(Parameter(ParameterKind.AXES, name), parts, mirror.u_axis_mm * MILLIMETRE, "u_axis_mm"))
     if mirror.u_amplitude_to_phase_rad is not None:
         u = mirror.u_amplitude_to_phase_rad
-        unknowns.append(Unknown(f"amplitude {name}", ("",), u, "u_amplitude_to_phase_rad"))
+        unknowns.append(Unknown(Parameter(ParameterKind.AMPLITUDE, name), ("",), u, "u_amplitude_to_phase_rad"))
     if mirror.u_cyclic_mm is not None:
         orders = range(1, _orders(mirror) + 1)
         parts = (*(f"cosine {k}" for k in orders), *(f"sine {k}" for k in orders))
-        unknowns.append(Unknown(f"cyclic {name}", parts, mirror.u_cyclic_mm * MILLIMETRE, "u_cyclic_mm"))
+        unknowns.append(
+            Unknown(Parameter(ParameterKind.CYCLIC, name), parts, mirror.u_cyclic_mm * MILLIMETRE, "u_cyclic_mm")
+        )
     return unknowns
 
 
 def head_corrections(
     campaign: Campaign,
     name: str,
-    at: dict[str, int],
+    at: Mapping[Parameter, int],
     *,
     sight: np.ndarray,
     phase: np.ndarray,
@@ -101,7 +105,7 @@ def head_corrections(
     """Corrections of one ranger's ranges and their derivatives.
 
     name                 of the ranger
-    at                   first column of each parameter of the adjustment, by name
+    at                   first column of each quantity of the adjustment
     sight                (m, 3) m, ground frame: from the scan point to the target
     phase                (m,) rad, the target's after the electronics', as measured
     amplitude            (m,) V, of the target's return
@@ -116,10 +120,10 @@ def head_corrections(
     m = len(phase)
     value, columns, slopes = np.zeros(m), [], []
     for unknown in head_unknowns(campaign, name):
-        kind = unknown.name.partition(" ")[0]
-        if kind == "axes":
+        kind = unknown.quantity.kind
+        if kind is ParameterKind.AXES:
             change, by = _axes(campaign, name, sight)
-        elif kind == "amplitude":
+        elif kind is ParameterKind.AMPLITUDE:
             # A phase read too high is a range read too short.
             per_radian = 0.5 * SPEED_OF_LIGHT / (campaign.site.ranging.modulation_hz * TWO_PI * index)
             change = per_radian * amplitude_phase(amplitude, reference_amplitude, mirror.amplitude_to_phase_rad)
@@ -128,7 +132,7 @@ def head_corrections(
             cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
             change, by = -cyclic_range(phase, cosine, sine), -cyclic_design(phase, _orders(mirror))
         value = value + change
-        columns.append(np.broadcast_to(at[unknown.name] + np.arange(len(unknown.parts)), by.shape))
+        columns.append(np.broadcast_to(at[unknown.quantity] + np.arange(len(unknown.parts)), by.shape))
         slopes.append(by)
     none = np.zeros((m, 0))
     return HeadCorrections(value, np.concatenate([none.astype(int), *columns], 1), np.concatenate([none, *slopes], 1))

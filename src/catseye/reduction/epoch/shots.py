@@ -9,8 +9,9 @@ from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
-from catseye.reduction.epoch.unknowns import AIR, CampaignNetwork, path_of
+from catseye.reduction.epoch.unknowns import CampaignNetwork
 from catseye.reduction.site.places import unit
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
@@ -56,8 +57,8 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     rows = electronics.shots
     targets = tuple(campaign.shots.target[k] for k in rows)
     m = len(rows)
-    origin = np.full(m, layout.at[name])
-    target = np.array([layout.at[t] for t in targets])
+    origin = np.full(m, layout.points[name])
+    target = np.array([layout.points[t] for t in targets])
     a = x[origin[:, None] + np.arange(3)]
     b = x[target[:, None] + np.arange(3)]
     turns = None
@@ -69,19 +70,20 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     distance = np.linalg.norm(towards, axis=1)
     towards = towards / distance[:, None]
 
-    air_columns = layout.columns(AIR, len(network.field.names))
+    air_columns = layout.air
     air = network.field.along(campaign.shots.mjd_utc[rows], a, b, x[air_columns])
     n = 1.0 + air.refractivity
     d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
     glass = np.array([places[t].constant for t in targets])
-    has_rest = np.array([f"glass {t}" in layout.at for t in targets])
-    rest_columns = np.array([layout.at.get(f"glass {t}", 0) for t in targets])  # column 0 with derivative 0: none
+    has_rest = np.array([Parameter(ParameterKind.GLASS, t) in layout.at for t in targets])
+    rest_columns = np.array([layout.at.get(Parameter(ParameterKind.GLASS, t), 0) for t in targets])  # no slope: none
     seen = towards if turns is None else np.einsum("mji,mj->mi", turns[2], towards)  # by a target that stands still
     incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, seen, x)
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
     lit, cube = phases.phasor[rows], electronics.reference
+    zero = Parameter(ParameterKind.ZERO, name)
     head = head_corrections(
         campaign,
         name,
@@ -92,7 +94,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         reference_amplitude=np.abs(cube),
         index=n,
     )
-    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[f"zero {name}"]] - head.at(x))
+    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[zero]] - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
 
@@ -114,12 +116,12 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         - distance * (air.slopes @ x[air_columns])
         + n * np.sum(normal_slopes * x[normal_columns], axis=1)
     )
-    paths = np.array([[layout.at.get(path_of(name, t), -1)] for t in targets])  # -1: none
+    paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, name, t), -1)] for t in targets])  # -1: none
     nuisance = np.concatenate(
         [
             paths,
-            np.full((m, 1), layout.at[f"zero {name}"]),
-            np.broadcast_to(layout.columns(f"leakage {name}", 2), (m, 2)),
+            np.full((m, 1), layout.at[zero]),
+            np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, name), 2), (m, 2)),
             np.broadcast_to(air_columns, (m, len(air_columns))),
             normal_columns,
             rest_columns[:, None],
@@ -193,7 +195,7 @@ def _obliquity(
         place = network.places[target]
         if place.normal is None:
             continue
-        columns[k] = network.layout.columns(f"normal {place.group}", 2)
+        columns[k] = network.layout.columns(Parameter(ParameterKind.NORMAL, place.group), 2)
         normal, across = _tilted(place.normal, x[columns[k]])
         incidence[k] = np.arccos(np.clip(normal @ towards[k], -1.0, 1.0))
         # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.

@@ -13,13 +13,12 @@ from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.motion import CarriedMotion
 from catseye.reduction.site.places import RangedPoint, places_of, unit
 
-FIXED_POINT = "-F"  # a monument's Kelvin fixed point is ZY101-F, its ranger's scan point ZY101
-AIR = "the air"  # no point can have this name: it has a blank
 APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
 SOUND = "path temperatures"
@@ -28,30 +27,48 @@ HEADS = "head effects"
 PATHS = "lasting paths"
 
 
-def path_of(ranger: str, target: str) -> str:
-    """The parameter of what lasts of a line's index, ppm."""
-    return f"path {ranger} {target}"
-
-
 @dataclass
 class UnknownsLayout:
-    """Where each parameter stands in the vector of the adjustment."""
+    """Where each parameter stands in the vector of the adjustment.
 
-    names: list[str] = field(default_factory=list)
-    at: dict[str, int] = field(default_factory=dict)
+    parameters   in the order of the vector
+    start        their start values
+    free         False holds one at its start value
+    at           first column of each quantity
+    points       the same of each point by its name
+    """
+
+    parameters: list[Parameter] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
     free: list[bool] = field(default_factory=list)
+    at: dict[Parameter, int] = field(default_factory=dict)
+    points: dict[str, int] = field(default_factory=dict)
 
-    def add(self, name: str, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None) -> None:
+    def add(
+        self, quantity: Parameter, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None
+    ) -> None:
         """Append the parts of a quantity with their start values; False in `free` holds one."""
-        self.at[name] = len(self.names)
-        self.names.extend(f"{name} {part}".strip() for part in parts)
+        self.at[quantity] = len(self.parameters)
+        if quantity.kind in POINT_KINDS:
+            self.points[str(quantity)] = len(self.parameters)
+        self.parameters.extend(quantity._replace(part=part or quantity.part) for part in parts)
         self.start.extend(float(s) for s in start)
         self.free.extend(free if free is not None else [True] * len(parts))
 
-    def columns(self, name: str, count: int = 3) -> np.ndarray:
-        """Indices of the first parts of a quantity."""
-        return self.at[name] + np.arange(count)
+    def columns(self, quantity: Parameter | str, count: int = 3) -> np.ndarray:
+        """Indices of the first parts of a quantity, or of a point by its name."""
+        first = self.points[quantity] if isinstance(quantity, str) else self.at[quantity]
+        return first + np.arange(count)
+
+    @property
+    def names(self) -> list[str]:
+        """What people call the parameters."""
+        return [str(parameter) for parameter in self.parameters]
+
+    @property
+    def air(self) -> np.ndarray:
+        """Indices of the air's parameters, those of `AirField.parameters`."""
+        return np.array([k for k, p in enumerate(self.parameters) if p.kind in AIR_KINDS], dtype=int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,26 +128,29 @@ def build_network(
 
     layout = UnknownsLayout()
     for name, place in sorted(seen.items()):
-        layout.add(name, "xyz", place.start)
+        layout.add(Parameter(ParameterKind.POINT, name), XYZ, place.start)
     for name, monument in campaign.monuments.items():
         u = (monument.u_x_mm, monument.u_y_mm, monument.u_z_mm)
         where = np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE
-        layout.add(name + FIXED_POINT, "xyz", where, [value > 0.0 for value in u])
+        layout.add(Parameter(ParameterKind.FIXED_POINT, name), XYZ, where, [value > 0.0 for value in u])
     for name in sorted(shooting):
-        layout.add(f"zero {name}", [""], [0.0])
-        layout.add(f"leakage {name}", ["real", "imaginary"], [0.0, 0.0])
+        layout.add(Parameter(ParameterKind.ZERO, name), [""], [0.0])
+        layout.add(Parameter(ParameterKind.LEAKAGE, name), ["real", "imaginary"], [0.0, 0.0])
         for unknown in head_unknowns(campaign, name):
-            layout.add(unknown.name, unknown.parts, np.zeros(len(unknown.parts)))
+            layout.add(unknown.quantity, unknown.parts, np.zeros(len(unknown.parts)))
     air = AirField.of(campaign, settings)
-    layout.add(AIR, air.names, np.zeros(len(air.names)))
+    for parameter in air.parameters:
+        layout.add(parameter, [""], [0.0])
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
-        layout.add(f"normal {group}", ["1", "2"], [0.0, 0.0])
+        layout.add(Parameter(ParameterKind.NORMAL, group), ["1", "2"], [0.0, 0.0])
     for name in sorted(fired):
         if seen[name].u_constant > 0.0:
-            layout.add(f"glass {name}", [""], [0.0])
+            layout.add(Parameter(ParameterKind.GLASS, name), [""], [0.0])
     u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
-    fired_lines = {path_of(n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots}
-    lines = sorted(fired_lines) if u_path > 0.0 else []
+    fired_lines = {
+        Parameter(ParameterKind.PATH, n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots
+    }
+    lines = sorted(fired_lines, key=str) if u_path > 0.0 else []
     for line in lines:
         layout.add(line, [""], [0.0])
     priors = _priors(campaign, settings, seen, layout, air)
@@ -156,7 +176,7 @@ def _priors(
     campaign: Campaign, settings: ReductionSettings, seen: dict[str, RangedPoint], layout: UnknownsLayout, air: AirField
 ) -> list[ObservationGroup]:
     count = len(air.stations)
-    at = layout.columns(AIR, len(air.names))
+    at = layout.air
     priors = [
         *_survey(campaign, seen, layout),
         *_heads(campaign, layout),
@@ -198,11 +218,11 @@ def _survey(campaign: Campaign, seen: dict[str, RangedPoint], layout: UnknownsLa
         for i, axis in enumerate("xyz"):
             u = getattr(monument, f"u_{axis}_mm") * MILLIMETRE
             if u > 0.0:
-                columns.append(layout.at[name + FIXED_POINT] + i)
+                columns.append(layout.at[Parameter(ParameterKind.FIXED_POINT, name)] + i)
                 observed.append(getattr(monument, f"{axis}_mm") * MILLIMETRE)
                 sigma.append(u)
         mirror = campaign.mirror_of(name)
-        fixed = layout.columns(name + FIXED_POINT)
+        fixed = layout.columns(Parameter(ParameterKind.FIXED_POINT, name))
         u_offset = _positive(mirror.u_offset_mm * MILLIMETRE, f"mirrors/{mirror.zp}.toml: u_offset_mm")
         priors.append(
             Linear(
@@ -220,11 +240,11 @@ def _survey(campaign: Campaign, seen: dict[str, RangedPoint], layout: UnknownsLa
 
 def _heads(campaign: Campaign, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
-    rangers = [n for n in campaign.rangers if f"zero {n}" in layout.at]
+    rangers = [n for n in campaign.rangers if Parameter(ParameterKind.ZERO, n) in layout.at]
     mirrors = [campaign.mirror_of(n) for n in rangers]
-    zeros = [layout.at[f"zero {n}"] for n in rangers]
+    zeros = [layout.at[Parameter(ParameterKind.ZERO, n)] for n in rangers]
     u_zero = [_positive(m.u_d0_mm * MILLIMETRE, f"mirrors/{m.zp}.toml: u_d0_mm") for m in mirrors]
-    quadratures = [c for n in rangers for c in layout.columns(f"leakage {n}", 2)]
+    quadratures = [c for n in rangers for c in layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2)]
     u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
     return [
         _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
@@ -239,17 +259,17 @@ def _head(campaign: Campaign, name: str, layout: UnknownsLayout) -> Linear:
     columns: list[int] = []
     u: list[float] = []
     for unknown in head_unknowns(campaign, name):
-        columns.extend(layout.columns(unknown.name, len(unknown.parts)))
+        columns.extend(layout.columns(unknown.quantity, len(unknown.parts)))
         u.extend([_positive(unknown.u, f"mirrors/{zp}.toml: {unknown.key}")] * len(unknown.parts))
     return _independent(HEADS, columns, np.zeros(len(columns)), u)
 
 
 def _directions(campaign: Campaign, settings: ReductionSettings, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
-    normals = [name for name in layout.at if name.startswith("normal ")]
+    normals = [quantity for quantity in layout.at if quantity.kind is ParameterKind.NORMAL]
     if not normals:
         return []
-    triplets = [n.removeprefix("normal ") in campaign.triplets for n in normals]
+    triplets = [n.of in campaign.triplets for n in normals]
     columns = [c for n in normals for c in layout.columns(n, 2)]
     u = np.repeat(np.where(triplets, settings.u_plate_normal, settings.u_normal), 2)
     return [_independent("normals", columns, np.zeros(len(columns)), u)]
@@ -257,10 +277,10 @@ def _directions(campaign: Campaign, settings: ReductionSettings, layout: Unknown
 
 def _glass(seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
     """The rests of the glass constants, each common to every shot on its target."""
-    names = [name for name in sorted(seen) if f"glass {name}" in layout.at]
+    names = [name for name in sorted(seen) if Parameter(ParameterKind.GLASS, name) in layout.at]
     if not names:
         return []
-    columns = [layout.at[f"glass {name}"] for name in names]
+    columns = [layout.at[Parameter(ParameterKind.GLASS, name)] for name in names]
     return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
 
 

@@ -18,8 +18,10 @@ from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.records.night.shot import ShotColumns
 from catseye.records.night.weather import Weather
 from catseye.records.site.folder import SiteFolder
+from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of, settle_network
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
@@ -134,10 +136,11 @@ def solve_epoch(
     found = coordinates_of(network, solution, shots, resolved)
     reasons |= resolved.rejected
     layout = network.layout
-    lasts = np.array([i for i, free in enumerate(layout.free) if free and _lasts(layout.names[i], lasting)])
-    names = tuple(layout.names[i] for i in lasts)
+    lasts = np.array(
+        [i for i, free in enumerate(layout.free) if free and _lasts(layout.parameters[i], lasting, campaign.triplets)]
+    )
     seen = from_ground(
-        names,
+        tuple(layout.parameters[i] for i in lasts),
         solution.x[lasts],
         solution.covariance[np.ix_(lasts, lasts)],
         frames,
@@ -149,7 +152,7 @@ def solve_epoch(
 
 def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:
     """Ground from the frame of each moving point of a network, at the epoch."""
-    return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.at}
+    return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.points}
 
 
 def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, Transform]:
@@ -159,28 +162,24 @@ def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, T
     return {name: kinds[motion.frames[name]] for name in names if motion.frames.get(name) in kinds}
 
 
-def _lasts(name: str, lasting: Sequence[str]) -> bool:
+def _lasts(parameter: Parameter, lasting: Sequence[str], triplets: Mapping[str, TripletRecord]) -> bool:
     """Whether a parameter is one of something that stays: the air, a ranger's, a lasting point's."""
-    point = name.rpartition(" ")[0]
-    if point in lasting or point.endswith("-F") or name.startswith(("the air ", "zero ", "leakage ")):
-        return True
-    if name.startswith(("axes ", "amplitude ", "cyclic ")):
-        return True
-    kind, _, rest = name.partition(" ")
-    if kind == "path":
-        return all(end in lasting for end in rest.split(" "))
-    if kind == "normal":
-        group = rest.rpartition(" ")[0]
-        return group in lasting or any(n.startswith(f"{group}-") for n in lasting)
-    return kind == "glass" and rest in lasting
+    kind, of, part = parameter
+    if kind in (ParameterKind.POINT, ParameterKind.GLASS):
+        return of in lasting
+    if kind is ParameterKind.PATH:
+        return of in lasting and part in lasting
+    if kind is ParameterKind.NORMAL:
+        return any(n in lasting for n in (triplets[of].targets if of in triplets else [of]))
+    return True
 
 
 def _with_carried(network: CampaignNetwork, carried: Carried, frames: Mapping[str, Transform]) -> CampaignNetwork:
     """The network that begins at the carried state and has it instead of the priors that it took in already."""
     x, covariance = to_ground(carried, frames)
-    at = {name: i for i, name in enumerate(network.layout.names)}
-    shared = [i for i, name in enumerate(carried.names) if name in at]
-    columns = np.array([at[carried.names[i]] for i in shared])
+    at = {parameter: i for i, parameter in enumerate(network.layout.parameters)}
+    shared = [i for i, parameter in enumerate(carried.parameters) if parameter in at]
+    columns = np.array([at[carried.parameters[i]] for i in shared])
     prior = Linear("carried on", x[shared], covariance[np.ix_(shared, shared)], columns, np.eye(len(shared)))
     known = set(columns.tolist()) | {i for i, free in enumerate(network.layout.free) if not free}
     left = [g for g in (_without_known(group, known) for group in network.priors) if g is not None]

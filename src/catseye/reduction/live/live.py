@@ -18,6 +18,7 @@ from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGH
 from catseye.errors import CatseyeError
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder
+from catseye.reduction.epoch.parameter import GRADIENT, POINT_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.live.epoch import Epoch, campaign_of, frames_of_points, solve_epoch
@@ -260,9 +261,9 @@ class Live:
             for frame in ("alidade", "reflector"):
                 turns[frame] = ground_from(self.site, frame, latest.azimuth, latest.elevation).single.rotation
         found = {}
-        for i, name in enumerate(self.carried.names):
-            point = name[:-2]
-            if name.endswith(" x") and point in self._own:
+        for i, parameter in enumerate(self.carried.parameters):
+            point = str(parameter._replace(part=""))
+            if parameter.kind in POINT_KINDS and parameter.part == "x" and point in self._own:
                 turn = turns.get(self.frames[point], np.eye(3))
                 found[point] = turn @ self.carried.covariance[i : i + 3, i : i + 3] @ turn.T
         return found
@@ -401,18 +402,16 @@ class Live:
             return None
         carried = self.carried
         if self.settings.filter == "constant_velocity":
-            carried = with_velocities(
-                carried, [n for n in self._moving() if f"{n} x" in set(carried.names)], self.settings.loosening
-            )
+            carried = with_velocities(carried, self._moving(), self.settings.loosening)
         seconds = (ticks - carried.ticks) / TICKS_PER_DAY * SECONDS_PER_DAY
         rules = self.settings.reduction
-        profile = rules.u_gradient_c_per_m if "the air gradient" in carried.names else rules.u_profile_c
+        profile = rules.u_gradient_c_per_m if GRADIENT in carried.parameters else rules.u_profile_c
         path = self.settings.lasting_path * self.site.site.ranging.path_index_fluctuation_ppm
         return carried_on(carried, ticks, seconds, elevation, self.bodies, self.settings.loosening, profile, path)
 
     def _moving(self) -> list[str]:
-        known = set(self.carried.names) if self.carried is not None else set()
-        return [n for n in self.lasting if n in self.bodies and f"{n} x" in known]
+        known = self.carried.points() if self.carried is not None else {}
+        return [n for n in self.lasting if n in self.bodies and n in known]
 
     def _distance(self, shot: LiveShot) -> tuple[float, float]:
         """Predicted distance, m, at the buffer's middle and its rate, m/s; NaN and zero where nobody knows."""
@@ -449,7 +448,7 @@ def _own_places(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, Array]
     back = {f: ground_from(site, f, azimuth, elevation).single.inverse() for f in ("alidade", "reflector")}
     places = {name: place.start for name, place in places_of(site).items()}
     for name, m in site.monuments.items():
-        places[f"{name}-F"] = np.array([m.x_mm, m.y_mm, m.z_mm]) * MILLIMETRE
+        places[str(Parameter(ParameterKind.FIXED_POINT, name))] = np.array([m.x_mm, m.y_mm, m.z_mm]) * MILLIMETRE
     return {n: back[frames[n]].points(x) if frames[n] in back else np.array(x) for n, x in places.items()}
 
 

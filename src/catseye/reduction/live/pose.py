@@ -22,7 +22,8 @@ from catseye.errors import EstimationError
 from catseye.estimation.shapes.motions import motions
 from catseye.geometry.antenna.beam_deviation import aperture, prime_focus_tilt
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.live.state import REFERENCE_EPOCH, XYZ, Carried
+from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
+from catseye.reduction.live.state import Carried
 
 Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
@@ -125,14 +126,14 @@ def beam_per_feed_shift(site: SiteFolder) -> Array:
 
 
 def _referenced(carried: Carried, names: Sequence[str]) -> list[str]:
-    known = set(carried.names)
-    return [n for n in names if f"{n} x" in known and f"{n}{REFERENCE_EPOCH} x" in known]
+    now, then = carried.points(), carried.points(ParameterKind.REFERENCE_PLACE)
+    return [n for n in names if n in now and n in then]
 
 
 def _change(carried: Carried, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """Now less reference (3k,), its covariance, and the reference places (k, 3)."""
-    now = carried.columns([f"{n} {a}" for n in names for a in XYZ])
-    then = carried.columns([f"{n}{REFERENCE_EPOCH} {a}" for n in names for a in XYZ])
+    now = carried.columns(point_parameters(ParameterKind.POINT, names))
+    then = carried.columns(point_parameters(ParameterKind.REFERENCE_PLACE, names))
     p = carried.covariance
     cross = p[np.ix_(now, then)]
     covariance = p[np.ix_(now, now)] + p[np.ix_(then, then)] - cross - cross.T

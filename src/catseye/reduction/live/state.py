@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.frames.frame import Transform
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind, point_parameters
 
 Array = NDArray[np.float64]
-REFERENCE_EPOCH = "@0"  # after a point's name: where it was in the reference epoch, in its frame
-VELOCITY = " rate"  # after a point's name: m/s in its frame
-XYZ = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -69,63 +67,59 @@ USUAL = Loosening(
 class Carried:
     """A joint estimate at an instant.
 
-    names        (n) parameters, as the adjustment's layout calls them; points in their frames, "ZEG41040L x"
+    parameters   (n), as in the adjustment's layout; points in their frames
     x            (n,)
     covariance   (n, n)
     ticks        of the instant
     elevation    rad, of the telescope then
     """
 
-    names: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     x: Array
     covariance: Array
     ticks: int
     elevation: float
 
-    def columns(self, names: Sequence[str]) -> NDArray[np.int64]:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people call the parameters."""
+        return tuple(str(parameter) for parameter in self.parameters)
+
+    def columns(self, parameters: Sequence[Parameter]) -> NDArray[np.int64]:
         """Where some parameters stand.
 
         Raises KeyError for one that is not there.
         """
-        at = {name: i for i, name in enumerate(self.names)}
-        return np.array([at[name] for name in names], dtype=np.int64)
+        at = {parameter: i for i, parameter in enumerate(self.parameters)}
+        return np.array([at[parameter] for parameter in parameters], dtype=np.int64)
 
-    def point(self, name: str) -> Array | None:
-        """(3,) m in its frame, None where it is not carried."""
-        try:
-            return self.x[self.columns([f"{name} {axis}" for axis in XYZ])]
-        except KeyError:
-            return None
-
-    def block(self, points: Sequence[str]) -> tuple[Array, Array]:
-        """Points (k, 3) m in their frames and their covariance (3k, 3k)."""
-        at = self.columns([f"{name} {axis}" for name in points for axis in XYZ])
-        return self.x[at].reshape(-1, 3), self.covariance[np.ix_(at, at)]
+    def points(self, kind: ParameterKind = ParameterKind.POINT) -> dict[str, int]:
+        """Where each point's x stands, of scan points and targets or of another kind with places."""
+        return {p.of: i for i, p in enumerate(self.parameters) if p.kind is kind and p.part == "x"}
 
 
-def turned(names: Sequence[str], frames: Mapping[str, Transform]) -> tuple[Array, Array]:
+def turned(parameters: Sequence[Parameter], frames: Mapping[str, Transform]) -> tuple[Array, Array]:
     """Matrix (n, n) and shift (n,) that take parameters' points from their frames to the ground; others stay.
 
-    names    of parameters; the three of a point stand together
-    frames   point: ground from its frame
+    parameters   the three of a point stand together
+    frames       point: ground from its frame
     """
-    matrix, shift = np.eye(len(names)), np.zeros(len(names))
-    for i, name in enumerate(names):
-        point, _, axis = name.rpartition(" ")
-        if axis == "x" and point in frames:
-            matrix[i : i + 3, i : i + 3] = frames[point].rotation
-            shift[i : i + 3] = frames[point].translation
+    matrix, shift = np.eye(len(parameters)), np.zeros(len(parameters))
+    for i, (kind, of, part) in enumerate(parameters):
+        if kind is ParameterKind.POINT and part == "x" and of in frames:
+            matrix[i : i + 3, i : i + 3] = frames[of].rotation
+            shift[i : i + 3] = frames[of].translation
     return matrix, shift
 
 
 def to_ground(carried: Carried, frames: Mapping[str, Transform]) -> tuple[Array, Array]:
     """x (n,) and covariance (n, n) with points in the ground frame."""
-    matrix, shift = turned(carried.names, frames)
+    matrix, shift = turned(carried.parameters, frames)
     return matrix @ carried.x + shift, matrix @ carried.covariance @ matrix.T
 
 
 def from_ground(
-    names: tuple[str, ...],
+    parameters: tuple[Parameter, ...],
     x: Array,
     covariance: Array,
     frames: Mapping[str, Transform],
@@ -134,8 +128,8 @@ def from_ground(
     elevation: float,
 ) -> Carried:
     """The state of points given in the ground frame."""
-    matrix, shift = turned(names, frames)
-    return Carried(names, matrix.T @ (x - shift), matrix.T @ covariance @ matrix, ticks, elevation)
+    matrix, shift = turned(parameters, frames)
+    return Carried(parameters, matrix.T @ (x - shift), matrix.T @ covariance @ matrix, ticks, elevation)
 
 
 def with_unseen(before: Carried, seen: Carried) -> Carried:
@@ -144,9 +138,9 @@ def with_unseen(before: Carried, seen: Carried) -> Carried:
     before   the prior, all states
     seen     the answer for some or all of them, perhaps with states that were not carried before
     """
-    own = set(before.names)
-    shared = [name for name in seen.names if name in own]
-    outside = [name for name in before.names if name not in set(seen.names)]
+    own, now = set(before.parameters), set(seen.parameters)
+    shared = [parameter for parameter in seen.parameters if parameter in own]
+    outside = [parameter for parameter in before.parameters if parameter not in now]
     if not outside:
         return seen
     s, o, at = before.columns(shared), before.columns(outside), seen.columns(shared)
@@ -156,36 +150,37 @@ def with_unseen(before: Carried, seen: Carried) -> Carried:
     own_covariance = before.covariance[np.ix_(o, o)] + gain @ (after - prior) @ gain.T
     cross = gain @ seen.covariance[at]  # new states correlate with the shared ones alone
     whole = np.block([[seen.covariance, cross.T], [cross, 0.5 * (own_covariance + own_covariance.T)]])
-    return Carried((*seen.names, *outside), np.concatenate([seen.x, x]), whole, seen.ticks, seen.elevation)
+    return Carried((*seen.parameters, *outside), np.concatenate([seen.x, x]), whole, seen.ticks, seen.elevation)
 
 
-def without(carried: Carried, names: set[str]) -> Carried:
+def without(carried: Carried, parameters: set[Parameter]) -> Carried:
     """The state without some parameters: a marginal."""
-    at = np.array([i for i, name in enumerate(carried.names) if name not in names], dtype=int)
-    kept = tuple(carried.names[i] for i in at)
-    return replace(carried, names=kept, x=carried.x[at], covariance=carried.covariance[np.ix_(at, at)])
+    at = np.array([i for i, parameter in enumerate(carried.parameters) if parameter not in parameters], dtype=int)
+    kept = tuple(carried.parameters[i] for i in at)
+    return replace(carried, parameters=kept, x=carried.x[at], covariance=carried.covariance[np.ix_(at, at)])
 
 
 def with_reference(carried: Carried, points: Sequence[str]) -> Carried:
     """The state with a copy of some points as they are now, to which later epochs compare; fully correlated."""
-    old = {f"{name}{REFERENCE_EPOCH} {axis}" for name in points for axis in XYZ}
-    bare = without(carried, old)
-    at = bare.columns([f"{name} {axis}" for name in points for axis in XYZ])
+    copies = point_parameters(ParameterKind.REFERENCE_PLACE, points)
+    bare = without(carried, set(copies))
+    at = bare.columns(point_parameters(ParameterKind.POINT, points))
     pick = np.concatenate([np.arange(len(bare.x)), at])
-    names = (*bare.names, *(f"{name}{REFERENCE_EPOCH} {axis}" for name in points for axis in XYZ))
-    return replace(bare, names=names, x=bare.x[pick], covariance=bare.covariance[np.ix_(pick, pick)])
+    return replace(
+        bare, parameters=(*bare.parameters, *copies), x=bare.x[pick], covariance=bare.covariance[np.ix_(pick, pick)]
+    )
 
 
 def with_velocities(carried: Carried, points: Sequence[str], rule: Loosening) -> Carried:
     """The state with a velocity of zero for points that have none yet."""
-    new = [f"{n}{VELOCITY} {a}" for n in points for a in XYZ if f"{n}{VELOCITY} {a}" not in set(carried.names)]
+    known = set(carried.parameters)
+    new = [v for v in point_parameters(ParameterKind.VELOCITY, points) if v not in known]
     n = len(carried.x)
     covariance = np.zeros((n + len(new), n + len(new)))
     covariance[:n, :n] = carried.covariance
     covariance[n:, n:] = (rule.velocity_mm_per_s * MILLIMETRE) ** 2 * np.eye(len(new))
-    return replace(
-        carried, names=(*carried.names, *new), x=np.concatenate([carried.x, np.zeros(len(new))]), covariance=covariance
-    )
+    x = np.concatenate([carried.x, np.zeros(len(new))])
+    return replace(carried, parameters=(*carried.parameters, *new), x=x, covariance=covariance)
 
 
 def carried_on(
@@ -211,30 +206,31 @@ def carried_on(
     """
     t, degrees = max(seconds, 0.0), abs(elevation - carried.elevation) / DEGREE
     x, p = carried.x.copy(), carried.covariance.copy()
-    at = {name: i for i, name in enumerate(carried.names)}
-    points = [n[:-2] for n in carried.names if n.endswith(" x") and n[:-2] in bodies]
+    at = {parameter: i for i, parameter in enumerate(carried.parameters)}
+    first = carried.points()
+    points = [name for name in first if name in bodies]
     p = _with_velocity(x, p, at, points, t, rule)
     for body in ("dish", "arm", "alidade"):
         mine = [n for n in points if bodies[n] == body]
         if mine:
-            _loosen_body(x, p, np.array([at[f"{n} x"] for n in mine]), body, t, degrees, rule)
+            _loosen_body(x, p, np.array([first[n] for n in mine]), body, t, degrees, rule)
     hours = t / 3600.0
-    for name, i in at.items():
-        if name.endswith(("-F x", "-F y", "-F z")):  # the ranger settles with its monument
+    for parameter, i in at.items():
+        kind = parameter.kind
+        if kind is ParameterKind.FIXED_POINT:  # the ranger settles with its monument
             step = (rule.ground_mm_per_root_hour * MILLIMETRE) ** 2 * hours
-            both = (
-                np.array([i, at[name.replace("-F ", " ", 1)]]) if name.replace("-F ", " ", 1) in at else np.array([i])
-            )
+            ranger = parameter._replace(kind=ParameterKind.POINT)
+            both = np.array([i, at[ranger]]) if ranger in at else np.array([i])
             p[np.ix_(both, both)] += step
-        elif name.startswith("zero "):
+        elif kind is ParameterKind.ZERO:
             p[i, i] += (rule.zero_mm_per_root_hour * MILLIMETRE) ** 2 * hours
-        elif name.startswith("leakage "):
+        elif kind is ParameterKind.LEAKAGE:
             p[i, i] += rule.leakage_volt_per_root_hour**2 * hours
-        elif name in ("the air bend", "the air gradient"):
+        elif kind is ParameterKind.PROFILE:
             _return(x, p, i, np.exp(-t / rule.profile_s), profile_sigma)
-        elif name.startswith("path "):
+        elif kind is ParameterKind.PATH:
             _return(x, p, i, np.exp(-t / rule.path_s), path_sigma_ppm)
-        elif name.startswith("the air ") and " - " not in name:
+        elif kind is ParameterKind.THERMOMETER:
             p[i, i] += rule.thermometer_c_per_root_hour**2 * hours
     return replace(carried, x=x, covariance=p, ticks=ticks, elevation=elevation)
 
@@ -248,14 +244,14 @@ def _return(x: Array, p: Array, i: int, kept: float, sigma: float) -> None:
 
 
 def _with_velocity(
-    x: Array, p: Array, at: Mapping[str, int], points: Sequence[str], t: float, rule: Loosening
+    x: Array, p: Array, at: Mapping[Parameter, int], points: Sequence[str], t: float, rule: Loosening
 ) -> Array:
     """Covariance with places moved on by their velocities; x is moved in place."""
-    moving = [n for n in points if f"{n}{VELOCITY} x" in at]
+    moving = [n for n in points if Parameter(ParameterKind.VELOCITY, n, "x") in at]
     if not moving:
         return p
-    place = np.array([at[f"{n} {a}"] for n in moving for a in XYZ])
-    speed = np.array([at[f"{n}{VELOCITY} {a}"] for n in moving for a in XYZ])
+    place = np.array([at[p] for p in point_parameters(ParameterKind.POINT, moving)])
+    speed = np.array([at[v] for v in point_parameters(ParameterKind.VELOCITY, moving)])
     x[place] += t * x[speed]
     p = p.copy()
     p[place] += t * p[speed]

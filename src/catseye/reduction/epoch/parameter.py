@@ -1,0 +1,59 @@
+"""What the parameters of an adjustment are of: values that code compares, and the texts by which people know them."""
+
+from collections.abc import Iterable
+from enum import Enum
+from typing import NamedTuple
+
+XYZ = ("x", "y", "z")
+
+
+class ParameterKind(Enum):
+    """Of what a parameter is; the value is the form of its text, of its owner and its part."""
+
+    POINT = "{of} {part}"
+    FIXED_POINT = "{of}-F {part}"  # a monument's Kelvin fixed point is ZY101-F, its ranger's scan point ZY101
+    REFERENCE_PLACE = "{of}@0 {part}"  # where a point was in the reference epoch, in its frame
+    VELOCITY = "{of} rate {part}"  # m/s in its frame
+    ZERO = "zero {of}"
+    LEAKAGE = "leakage {of} {part}"
+    AXES = "axes {of} {part}"  # how far the sheet's four offsets of the mirror's axes and the beam are off
+    AMPLITUDE = "amplitude {of}"
+    CYCLIC = "cyclic {of} {part}"
+    NORMAL = "normal {of} {part}"  # tilts of a prism's face or of a triplet's plate
+    GLASS = "glass {of}"
+    PATH = "path {of} {part}"  # what lasts of a line's index, ppm: of a ranger, to a target
+    THERMOMETER = "the air {of}"  # of a weather station
+    PROFILE = "the air {part}"  # "bend" or "gradient"
+    SOUND = "the air {of} - {part}"  # of a line whose temperature sound measured: from, to
+
+
+AIR_KINDS = (ParameterKind.THERMOMETER, ParameterKind.PROFILE, ParameterKind.SOUND)
+POINT_KINDS = (ParameterKind.POINT, ParameterKind.FIXED_POINT)
+
+
+class Parameter(NamedTuple):
+    """A parameter, or the first of a quantity of several.
+
+    kind   of what
+    of     its owner: a point, a ranger, a unit, a station, a sounded line
+    part   of the quantity; "" where it has but one, and of a quantity as a whole
+
+    >>> str(Parameter(ParameterKind.LEAKAGE, "ZY101", "real")), str(Parameter(ParameterKind.GLASS, "DP001"))
+    ('leakage ZY101 real', 'glass DP001')
+    """
+
+    kind: ParameterKind
+    of: str
+    part: str = ""
+
+    def __str__(self) -> str:
+        return self.kind.value.format(of=self.of, part=self.part).strip()
+
+
+GRADIENT = Parameter(ParameterKind.PROFILE, "", "gradient")
+BEND = Parameter(ParameterKind.PROFILE, "", "bend")
+
+
+def point_parameters(kind: ParameterKind, names: Iterable[str]) -> list[Parameter]:
+    """Three parameters of each of some points."""
+    return [Parameter(kind, name, axis) for name in names for axis in XYZ]
