@@ -23,7 +23,7 @@ def test_its_options_say_the_same_world_to_another_process(monkeypatch):
         made.append(TwinWords(*given, **named))
         raise InputError("enough")
 
-    monkeypatch.setattr("catseye.service.world.World", noted)
+    monkeypatch.setattr("catseye.service.world.TwinWords", noted)
     monkeypatch.setattr(command, "site_of", lambda name: site())
     with pytest.raises(InputError, match="enough"):
         typer.main.get_command(app).main(["zy", "gbt", *world.options()])

@@ -18,11 +18,13 @@ from catseye.errors import CatseyeError
 from catseye.ranger.initialisation import frame_of
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import REFERENCE, SiteFolder
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.site.motion import frames_of
 
-GOOD = frozenset(["used", "reference"])
-OF_THE_LINE = frozenset(["blocked", "clipped", "dead", "dropout", "stuck", "refused"])  # its own fault
-MISFIT = "reflected"  # how an epoch begins its reason for a range that does not fit the others
+GOOD = frozenset([ShotStatus.USED, ShotStatus.REFERENCE])
+OF_THE_LINE = frozenset(  # its own fault
+    [ShotStatus.BLOCKED, ShotStatus.CLIPPED, ShotStatus.DEAD, ShotStatus.DROPOUT, ShotStatus.STUCK, ShotStatus.REFUSED]
+)
 WEAK = 0.1  # of the usual return, below which it is told
 RETURNS, FEWEST_RETURNS = 31, 5  # whose median is usual
 FAILURES = 3  # in a row, on whatever target, until a ranger counts as failing
@@ -114,16 +116,16 @@ class Firing:
             self._herald.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
             self._line_failed(shot.ranger, shot.target, answered.status)
 
-    def fitted(self, used: Iterable[int], rejected: Mapping[int, str]) -> None:
+    def fitted(self, used: Iterable[int], rejected: Mapping[int, Reason]) -> None:
         """What an epoch said of shots that were good by themselves: one that does not fit is told, its line rests."""
         kept = frozenset(used)
         latest = max([*kept, *rejected], default=0)
         for number in [n for n in self._unfitted if n <= latest]:
             ranger, target = self._unfitted.pop(number)
-            reason = rejected.get(number, "")
+            reason = rejected.get(number)
             if number in kept:
                 self._misfits.good(ranger, target)
-            elif reason.startswith(MISFIT):
+            elif reason is not None and reason.status is ShotStatus.REFLECTED:
                 line = f"{ranger} {target}"
                 text = f"{line}: {reason} (light from elsewhere, or one of them has moved)"
                 self._herald.tell("wrong-range", text, "warning", about=line, ranger=ranger, target=target)

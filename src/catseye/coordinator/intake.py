@@ -17,6 +17,7 @@ from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Docum
 from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
+from catseye.reduction.epoch.reason import ShotStatus
 
 TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back
@@ -149,7 +150,7 @@ class Intake:
         try:
             answered = AnsweredShot.of(shot, self._live.shot(shot))
         except CatseyeError as problem:
-            answered = AnsweredShot(shot, "refused", str(problem))
+            answered = AnsweredShot(shot, str(ShotStatus.REFUSED), str(problem))
         self._fresh += 1
         self._judged(answered)
         return answered

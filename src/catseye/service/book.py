@@ -4,12 +4,14 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from catseye.coordinator.firing import GOOD
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.records.night.live import Happening, LivePosture
+from catseye.reduction.epoch.reason import status_of
 from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.logs import epoch_of
 
-GOOD = ("used", "reference")
+UNKNOWN = "unknown"  # to this version
 KEPT_EVENTS, KEPT_EPOCHS = 60, 10_000
 
 
@@ -98,4 +100,4 @@ class LiveBook:
         counts = {key: len(answer.get(key, ())) for key in ("names", "used", "rejected")}
         self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
         for reason in (answer.get("rejected") or {}).values():
-            self.left_out[str(reason).partition(":")[0]] += 1
+            self.left_out[str(status_of(reason) or UNKNOWN)] += 1

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from catseye.constants import ARCSECOND
-from catseye.coordinator.firing import OF_THE_LINE
+from catseye.coordinator.firing import GOOD, OF_THE_LINE
 from catseye.records.night.live import TICKS_PER_DAY
-from catseye.service.book import GOOD, LiveBook
+from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.world import TwinWords
 

@@ -54,14 +54,19 @@ def test_kinds_are_chosen(tmp_path):
     entries = scene_entries(12)
     written(tmp_path / "j.db", entries)
     with JournalReader(tmp_path / "j.db") as reader:
-        names = {"shots": "AnsweredShot", "weather": "LiveWeather", "postures": "LivePosture", "commands": "Command"}
-        names |= {"happenings": "Happening", "solutions": "Solution", "documents": "Document"}
+        names = {
+            "shots": "AnsweredShot",
+            "weather": "LiveWeather",
+            "postures": "LivePosture",
+            "commands": "SentCommand",
+        }
+        names |= {"happenings": "Happening", "solutions": "EpochSolution", "documents": "Document"}
         for kind, name in names.items():
             wanted = [(seq, plainly(e)) for seq, e in enumerate(entries, 1) if type(e).__name__ == name]
             assert [(seq, plainly(e)) for seq, e in reader.events(1, kinds=[kind])] == wanted
             assert wanted
         assert [seq for seq, _ in reader.solutions(1)] == [
-            seq for seq, e in enumerate(entries, 1) if type(e).__name__ == "Solution"
+            seq for seq, e in enumerate(entries, 1) if type(e).__name__ == "EpochSolution"
         ]
         assert all(shot.shot.samples is None for _, shot in reader.shots(1, buffers=False))
 

@@ -16,6 +16,7 @@ from catseye.gateways.epoch.summary import passages
 from catseye.gateways.epoch.tables import ranges_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 VOID = {"meta", "img", "link", "br"}
@@ -95,7 +96,7 @@ def test_names_and_notes_are_escaped(reduction):
     posture = reduction.campaign.site.campaign.model_copy(update={"name": hostile})
     site = reduction.campaign.site.model_copy(update={"campaign": posture})
     campaign = replace(reduction.campaign, site=site)
-    bad = replace(reduction, campaign=campaign, notes=(hostile,), rejected={1: f"blocked: {hostile}"})
+    bad = replace(reduction, campaign=campaign, notes=(hostile,), rejected={1: Reason(ShotStatus.BLOCKED, hostile)})
     text = report(bad, WHEN)
     assert "<script" not in text
     assert "&lt;script&gt;" in text

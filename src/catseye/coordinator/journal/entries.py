@@ -40,7 +40,7 @@ class AnsweredShot:
     @classmethod
     def of(cls, shot: LiveShot, verdict: "ShotVerdict") -> "AnsweredShot":
         """The shot with the answer that `Live.shot` gave."""
-        return cls(shot, verdict.status, verdict.text, verdict.range_, verdict.u_range, verdict.misfit)
+        return cls(shot, str(verdict.status), verdict.text, verdict.range_, verdict.u_range, verdict.misfit)
 
 
 @dataclass(frozen=True)

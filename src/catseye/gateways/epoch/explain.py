@@ -32,7 +32,7 @@ def explanation_object(found: Explanation, seed: int | None = None) -> dict[str,
         "target": found.target,
         "mjd_utc": found.mjd_utc,
         "status": found.status,
-        "reason": found.reason,
+        "reason": found.reason or "",
         "amplitude": abs(found.phasor),
         "phase": float(np.mod(np.angle(found.phasor), 2.0 * np.pi)),
         "u_phase": found.u_across / abs(found.phasor) if found.phasor else None,
@@ -172,8 +172,8 @@ def _shot(found: Explanation) -> str:
         return start + "It took part in the adjustment."
     if found.status == "reference":
         return start + "It follows the drift of the electronics; a range it gives none."
-    word = found.reason.partition(":")[0]
-    meaning = f" ({MEANING[word]})" if word in MEANING and MEANING[word] not in found.reason else ""
+    meaning = MEANING.get(found.status, "")
+    meaning = f" ({meaning})" if found.reason and meaning and meaning not in found.reason else ""
     return start + (f"Not used: {found.reason}{meaning}." if found.reason else f"Status: {found.status}.")
 
 

@@ -15,6 +15,7 @@ from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
 
 CONTENTS = {
@@ -65,7 +66,9 @@ def _summary(reduction: Reduction) -> str:
     _, spread = trust_limits(reduction)
     cards = [
         card(
-            "Ranges used", f"{count['used']}", f"{len(reduction.rejected)} of all shots rejected, each with its reason"
+            "Ranges used",
+            f"{count[ShotStatus.USED]}",
+            f"{len(reduction.rejected)} of all shots rejected, each with its reason",
         ),
         card(
             "Variance factor",
@@ -198,8 +201,7 @@ def _rejected(reduction: Reduction) -> str:
     for k, number in enumerate(shots.shot):
         reason = reduction.rejected.get(int(number))
         if reason is not None:
-            word, _, rest = reason.partition(": ")
-            rows.append((str(number), shots.ranger[k], shots.target[k], word, rest))
+            rows.append((str(number), shots.ranger[k], shots.target[k], str(reason.status), reason.text))
     if not rows:
         return section("rejected", CONTENTS["rejected"], paragraph("None."))
     return section(

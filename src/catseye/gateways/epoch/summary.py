@@ -9,6 +9,7 @@ from catseye.gateways.epoch.tables import kind_of
 from catseye.gateways.writers.passage import Passage
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.reason import ShotStatus
 
 MEANING = {
     "blocked": "nothing came back",
@@ -81,13 +82,13 @@ def _shots(reduction: Reduction) -> str:
     references = sum(
         reduction.campaign.shots.target[k] == REFERENCE and shot not in reduction.rejected for shot, k in index.items()
     )
-    words = Counter(reason.partition(":")[0] for reason in reduction.rejected.values())
+    words = Counter(reason.status for reason in reduction.rejected.values())
     told = ", ".join(
         f"{number} {word}" + (f" ({MEANING[word]})" if word in MEANING else "") for word, number in words.most_common()
     )
     rejected = f"{len(reduction.rejected)} were rejected: {told}" if reduction.rejected else "none was rejected"
     return (
-        f"{count['used']} ranges went into one adjustment; {references} shots on the reference cubes followed "
+        f"{count[ShotStatus.USED]} ranges went into one adjustment; {references} shots on the reference cubes followed "
         f"the drift of the electronics; {rejected}."
     )
 

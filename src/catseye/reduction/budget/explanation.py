@@ -15,12 +15,12 @@ from catseye.reduction.budget.scene import Assumptions, ShotScene, scene_of
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
 from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import RangedPoint, places_of
 from catseye.signal.cycles.whole import CycleDecision, decision, unwrapped_length
 
 CHECKED = 0.05  # redundancy below which the other shots do not say where a target is
-UNDECIDED = "not adjusted"  # status of a usable shot where the campaign cannot be adjusted
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Explanation:
     """Everything that can be told of one shot.
 
     shot, ranger, target, mjd_utc   of the record
-    status      "used", "reference", or what the reason begins with; "not adjusted" without an adjustment
-    reason      why it was not used, "" where it was
+    status      what became of it; NOT_ADJUSTED without an adjustment
+    reason      why it was not used, None where it was
     phasor      V, the light, complex
     u_across    V, standard uncertainty of the quadrature across it, which turns its phase
     scene       its measurement; None where there is no range, and then so are the next five
@@ -70,7 +70,7 @@ class Explanation:
     target: str
     mjd_utc: float
     status: str
-    reason: str
+    reason: Reason | None
     phasor: complex
     u_across: float
     scene: ShotScene | None = None
@@ -138,7 +138,7 @@ def explain_shot(
         adjusted=_adjusted(reduction.coordinates, row) if reduction else None,
         notes=tuple(notes),
     )
-    if campaign.shots.target[row] == REFERENCE or phases.reason[row] or reason.startswith("no reference"):
+    if campaign.shots.target[row] == REFERENCE or phases.reason[row] or status is ShotStatus.NO_REFERENCE:
         return known
     ends, place = _places(campaign, row, reduction)
     try:
@@ -203,13 +203,13 @@ def _unsaid(mirror: Mirror, turns_known: bool) -> list[str]:
 
 
 def _status(
-    campaign: Campaign, phases: Phases, wrong: dict[int, str], row: int, reduction: Reduction | None
-) -> tuple[str, str]:
+    campaign: Campaign, phases: Phases, wrong: dict[int, Reason], row: int, reduction: Reduction | None
+) -> tuple[ShotStatus, Reason | None]:
     if reduction:
-        return reduction.status[row], reduction.rejected.get(int(campaign.shots.shot[row]), "")
-    reason = phases.reason[row] or wrong.get(row, "")
-    usual = "reference" if campaign.shots.target[row] == REFERENCE else UNDECIDED
-    return reason.partition(":")[0] or usual, reason
+        return reduction.status[row], reduction.rejected.get(int(campaign.shots.shot[row]))
+    reason = phases.reason[row] or wrong.get(row)
+    usual = ShotStatus.REFERENCE if campaign.shots.target[row] == REFERENCE else ShotStatus.NOT_ADJUSTED
+    return reason.status if reason else usual, reason
 
 
 def _places(

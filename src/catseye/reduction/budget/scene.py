@@ -1,5 +1,6 @@
 """One shot with everything that its range follows from, at the best values."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,7 +152,7 @@ class ShotScene:
 def scene_of(
     campaign: Campaign,
     phases: Phases,
-    wrong: dict[int, str],
+    wrong: Mapping[int, str],
     row: int,
     *,
     ends: tuple[np.ndarray, np.ndarray],
@@ -221,7 +222,7 @@ def scene_of(
     )
 
 
-def references_of(campaign: Campaign, phases: Phases, wrong: dict[int, str], row: int) -> References:
+def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], row: int) -> References:
     """The good reference shots of a shot's ranger, and how the electronics' phase at the shot follows from them.
 
     Raises InputError where the ranger has none.

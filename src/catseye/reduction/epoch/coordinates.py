@@ -16,6 +16,7 @@ from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (
@@ -127,7 +128,7 @@ class AdjustedCoordinates:
     status: str
     fits: tuple[GroupFit, ...]
     notes: tuple[str, ...]
-    unresolved: dict[int, str]
+    unresolved: dict[int, Reason]
     sound: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def index(self, name: str) -> int:

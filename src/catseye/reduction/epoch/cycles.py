@@ -20,6 +20,7 @@ from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, shot_group
 from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, CampaignNetwork, build_network
@@ -41,7 +42,7 @@ class Resolved:
     """
 
     starts: dict[str, np.ndarray]
-    rejected: dict[int, str]
+    rejected: dict[int, Reason]
     notes: tuple[str, ...]
 
 
@@ -256,12 +257,14 @@ def _lost_notes(
         return [
             f"{len(lost)} points have shots whose whole cycles are unknown, see rejected: {', '.join(lost[:MANY])} ..."
         ]
-    return [_reason(network, settings, [name], last) for name in lost]
+    return [str(_reason(network, settings, [name], last)) for name in lost]
 
 
-def _reason(network: CampaignNetwork, settings: ReductionSettings, names: list[str], last: dict[str, Located]) -> str:
+def _reason(
+    network: CampaignNetwork, settings: ReductionSettings, names: list[str], last: dict[str, Located]
+) -> Reason:
     """Why the whole cycles of a shot are unknown, by the points that it hangs on."""
     name = names[0]
     u = _u_mm(network, settings, name)
     why = last[name].text if name in last else "the other ends of its shots are known as badly; survey it better"
-    return f"whole cycles unknown: {name} is typed to {u:.0f} mm only; {why}"
+    return Reason(ShotStatus.CYCLES_UNKNOWN, f"{name} is typed to {u:.0f} mm only; {why}")

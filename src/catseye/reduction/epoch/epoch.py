@@ -15,6 +15,7 @@ from catseye.reduction.epoch.ranges import (
     measure_phases,
     walk_notes,
 )
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.surface import DishFit, fit_surface
 from catseye.reduction.site.places import sheet_notes
@@ -24,7 +25,7 @@ from catseye.reduction.site.places import sheet_notes
 class Reduction:
     """Everything that a campaign gave.
 
-    status     one word a shot, in the campaign's order: "used", "reference", or what its reason begins with
+    status     of each shot, in the campaign's order
     rejected   shot id: reason; reference shots included
     notes      what a person should know, one line each
     """
@@ -35,8 +36,8 @@ class Reduction:
     electronics: dict[str, ElectronicsPhase]
     coordinates: AdjustedCoordinates
     surface: DishFit | None
-    status: tuple[str, ...]
-    rejected: dict[int, str]
+    status: tuple[ShotStatus, ...]
+    rejected: dict[int, Reason]
     notes: tuple[str, ...]
 
 
@@ -63,7 +64,7 @@ def reduce_epoch(
         if not ranges.used[row]:
             reasons[int(k)] = _misfit(coordinates, row, settings)
     status = tuple(
-        reasons[k].partition(":")[0] if k in reasons else "reference" if target == REFERENCE else "used"
+        reasons[k].status if k in reasons else ShotStatus.REFERENCE if target == REFERENCE else ShotStatus.USED
         for k, target in enumerate(campaign.shots.target)
     )
     notes = [
@@ -87,18 +88,17 @@ def reduce_epoch(
     )
 
 
-def _misfit(coordinates: AdjustedCoordinates, row: int, settings: ReductionSettings) -> str:
+def _misfit(coordinates: AdjustedCoordinates, row: int, settings: ReductionSettings) -> Reason:
     ranges = coordinates.ranges
     error, w = ranges.residual[row], ranges.standardised[row]
     if abs(w) <= settings.critical:
-        return (
-            f"undecided: this shot and another on {ranges.target[row]} contradict each other, and nothing says which "
-            "is wrong; both are left out"
-        )
-    return (
-        f"reflected: range {abs(error) * 1e3:.3f} mm too {'long' if error > 0 else 'short'} "
+        other = f"this shot and another on {ranges.target[row]} contradict each other"
+        return Reason(ShotStatus.UNDECIDED, f"{other}, and nothing says which is wrong; both are left out")
+    text = (
+        f"range {abs(error) * 1e3:.3f} mm too {'long' if error > 0 else 'short'} "
         f"for the adjusted points (w {w:.1f}, limit {settings.critical}): light from elsewhere in the return"
     )
+    return Reason(ShotStatus.REFLECTED, text)
 
 
 def _weak_rangers(campaign: Campaign, phases: Phases) -> list[str]:

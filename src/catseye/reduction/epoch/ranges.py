@@ -10,6 +10,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
@@ -26,6 +27,8 @@ WARM_UP = 0.03  # rad, more allowed at the ends of a ranger's block, where a tra
 BEND = 0.005  # rad, more allowed inside, where only its curvature counts
 REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which something else is in it
 
+WRONG = {BufferStatus.DROPOUT: ShotStatus.DROPOUT, BufferStatus.STUCK: ShotStatus.STUCK}
+
 
 @dataclass(frozen=True, eq=False)
 class Phases:
@@ -38,7 +41,7 @@ class Phases:
     offset      V
     harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
     largest     V, largest magnitude of a sample
-    reason      why a shot cannot be used, "" where it can
+    reason      why a shot cannot be used, None where it can
     """
 
     phasor: np.ndarray
@@ -47,7 +50,7 @@ class Phases:
     offset: np.ndarray
     harmonics: np.ndarray
     largest: np.ndarray
-    reason: tuple[str, ...]
+    reason: tuple[Reason | None, ...]
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -117,7 +120,7 @@ class Detected:
     """What synchronous detection found in n buffers, leakage still in it; fields as in
     `signal.detection.phase.Detection`.
 
-    wrong   why a buffer's samples cannot be believed, "" where they can
+    wrong   why a buffer's samples cannot be believed, None where they can
     """
 
     raw: np.ndarray
@@ -128,7 +131,7 @@ class Detected:
     clipped: np.ndarray
     total: np.ndarray
     between: np.ndarray
-    wrong: list[str]
+    wrong: list[Reason | None]
 
     @staticmethod
     def empty(n: int) -> "Detected":
@@ -143,7 +146,7 @@ class Detected:
             np.zeros(n, dtype=int),
             three,
             three.copy(),
-            [""] * n,
+            [None] * n,
         )
 
     def put(
@@ -154,8 +157,9 @@ class Detected:
         seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
         found = seen.detection
         for k, row in enumerate(rows):
-            if seen.status[k] in (BufferStatus.DROPOUT, BufferStatus.STUCK):
-                self.wrong[row] = seen.text(k)
+            wrong = WRONG.get(BufferStatus(seen.status[k]))
+            if wrong is not None:
+                self.wrong[row] = Reason(wrong, seen.detail(k))
         self.total[rows], self.between[rows] = found.scatter.total, found.scatter.between
         self.raw[rows], self.u_phasor[rows], self.offset[rows] = found.phasor, found.u_phasor, found.offset
         self.harmonics[rows], self.largest[rows], self.clipped[rows] = found.harmonics, found.largest, found.clipped
@@ -215,8 +219,8 @@ def why_not(
     mirror: Mirror,
     settings: ReductionSettings,
     usual: float,
-) -> str:
-    """Why a buffer's phase cannot be used, "" where it can.
+) -> Reason | None:
+    """Why a buffer's phase cannot be used, None where it can.
 
     raw, phasor   V, with leakage in it and without
     clipped       samples at the converter's end
@@ -226,20 +230,20 @@ def why_not(
     """
     limit = settings.smallest_return * math.hypot(u_phasor, mirror.u_leakage_volt)
     if clipped:
-        return f"clipped: {clipped} samples at the converter's end ({largest:.2f} V)"
+        return Reason(ShotStatus.CLIPPED, f"{clipped} samples at the converter's end ({largest:.2f} V)")
     if not math.isfinite(limit):
-        return (
-            f"noise unknown: {sampling[0]} cycles of {sampling[1]} samples show no scatter "
-            "(expected at least 2 cycles, or 8 samples)"
+        text = (
+            f"{sampling[0]} cycles of {sampling[1]} samples show no scatter (expected at least 2 cycles, or 8 samples)"
         )
+        return Reason(ShotStatus.NOISE_UNKNOWN, text)
     if abs(phasor) < limit:
-        return f"blocked: return {abs(phasor):.4f} V, below the limit of {limit:.4f} V (usual {usual:.2f} V)"
+        text = f"return {abs(phasor):.4f} V, below the limit of {limit:.4f} V (usual {usual:.2f} V)"
+        return Reason(ShotStatus.BLOCKED, text)
     if abs(raw) < limit:
-        return (
-            f"dead: the samples hold {abs(raw):.4f} V, not even the leakage of "
-            f"{mirror.leakage_amplitude_volt:.4f} V: converter or cable"
-        )
-    return ""
+        leakage = mirror.leakage_amplitude_volt
+        text = f"the samples hold {abs(raw):.4f} V, not even the leakage of {leakage:.4f} V: converter or cable"
+        return Reason(ShotStatus.DEAD, text)
+    return None
 
 
 def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
@@ -251,7 +255,7 @@ def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
     return usual
 
 
-def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, str]]:
+def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
     """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
 
     References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
@@ -265,7 +269,7 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
     ranger, target = np.array(shots.ranger), np.array(shots.target)
     usable = np.array([not r for r in phases.reason])
     variance = np.where(usable, phases.u_phase, 0.0) ** 2
-    rejected: dict[int, str] = {}
+    rejected: dict[int, Reason] = {}
     electronics: dict[str, ElectronicsPhase] = {}
     for name in campaign.rangers:
         mine = ranger == name
@@ -276,12 +280,8 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
         rejected.update(wrong)
         references = np.array([k for k in references if k not in wrong], dtype=int)
         if not len(references):
-            rejected.update(
-                {
-                    int(k): f"no reference: {name} has no usable shot on its internal cube, its drift is unknown"
-                    for k in lit
-                }
-            )
+            text = f"{name} has no usable shot on its internal cube, its drift is unknown"
+            rejected.update({int(k): Reason(ShotStatus.NO_REFERENCE, text) for k in lit})
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))
         phase, covariance = drift_at(
@@ -333,15 +333,15 @@ def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> li
 
 def _wrong_references(
     seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
-) -> dict[int, str]:
-    wrong: dict[int, str] = {}
+) -> dict[int, Reason]:
+    wrong: dict[int, Reason] = {}
     usual = float(np.median(phases.amplitude[references])) if len(references) else 0.0
     for k in references:
         if len(references) > 2 and abs(phases.amplitude[k] / usual - 1.0) > REFERENCE_AMPLITUDE:
-            wrong[int(k)] = (
-                f"bad reference: return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: "
-                "something else is in the beam"
+            text = (
+                f"return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: something else is in the beam"
             )
+            wrong[int(k)] = Reason(ShotStatus.BAD_REFERENCE, text)
     while True:
         left = np.array([k for k in references if k not in wrong], dtype=int)
         if len(left) < 3:
@@ -356,10 +356,11 @@ def _wrong_references(
             d, a = _surprises(seconds, phases, variance, np.delete(left, suspect), walk)
             rest.append(float(np.max(np.abs(d) / a)))
         worst = int(suspects[int(np.argmin(rest))])
-        wrong[int(left[worst])] = (
-            f"bad reference: phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
+        text = (
+            f"phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
             f"(allowed {allowed[worst]:.4f})"
         )
+        wrong[int(left[worst])] = Reason(ShotStatus.BAD_REFERENCE, text)
 
 
 def _surprises(

@@ -23,6 +23,7 @@ from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics
+from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import Taken, phases_of
@@ -45,7 +46,7 @@ class Epoch:
     rows: tuple[Taken, ...]
     coordinates: AdjustedCoordinates
     carried: Carried
-    reasons: dict[int, str]
+    reasons: dict[int, Reason]
 
 
 def campaign_of(

@@ -20,6 +20,7 @@ from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture,
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.reduction.epoch.parameter import GRADIENT, POINT_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.live.epoch import Epoch, campaign_of, frames_of_points, solve_epoch
 from catseye.reduction.live.jitter import Jitter
@@ -101,7 +102,7 @@ class EpochAnswer:
     covariance: Array
     shots: tuple[int, ...]
     used: tuple[int, ...]
-    rejected: dict[int, str]
+    rejected: dict[int, Reason]
     variance_factor: float
     degrees_of_freedom: float
     refractivity_ppm: float
@@ -202,8 +203,9 @@ class Live:
         """One shot; it takes part in the next epoch."""
         now = self.rangers.get(shot.ranger)
         if now is None:
-            text = f"no ranger: {shot.ranger} is not at this site"
-            return ShotAnswer("no ranger", text, math.nan, math.nan)
+            return ShotAnswer.refused(
+                Reason(ShotStatus.NO_RANGER, f"{shot.ranger} is not at this site"), math.nan, math.nan
+            )
         mirror, adc, rules = self.site.mirror_of(shot.ranger), self.site.site.adc, self.settings.reduction
         own = shot.target == REFERENCE
         usual = now.usual[own]
@@ -230,14 +232,17 @@ class Live:
             modulation_hz=modulation,
             walk=self.site.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR,
         )
-        if said.status == "no place" and not own and shot.target not in self._own:
-            said = replace(said, text=f"no place: the site has no target {shot.target}")
-        if said.status in ("used", "reference"):
+        if said.status is ShotStatus.NO_PLACE:
+            if shot.target not in self._own:
+                stranger = Reason(ShotStatus.NO_PLACE, f"the site has no target {shot.target}")
+                said = ShotAnswer.refused(stranger, said.amplitude, said.phase)
+            row = replace(row, reason=said.reason)
+        if said.status in (ShotStatus.USED, ShotStatus.REFERENCE):
             usual.append(said.amplitude)
-        if said.status == "reference":
+        if said.status is ShotStatus.REFERENCE:
             now.references.append(row)
-        if not own or said.status != "reference":
-            self._pending.append(row if said.status != "no place" else replace(row, reason=said.text))
+        if not own or said.status is not ShotStatus.REFERENCE:
+            self._pending.append(row)
         return said
 
     def place(self, name: str, mjd: ArrayLike) -> Array:
@@ -342,7 +347,7 @@ class Live:
         for row, on in enumerate(ranges.used):
             if not on:
                 text = f"range {ranges.residual[row] * 1e3:+.3f} mm off, w {ranges.standardised[row]:.1f}"
-                why[int(ranges.shot[row])] = f"reflected: {text}"
+                why[int(ranges.shot[row])] = Reason(ShotStatus.REFLECTED, text)
         rejected = {n: reason for k, reason in why.items() for n in rows[k].numbers}
         return EpochAnswer(
             self.number,
@@ -382,8 +387,9 @@ class Live:
         rows = sorted([*self._pending, *references, *latest], key=lambda r: (r.mjd, r.shot.ranger, r.shot.number))
         moving = {name for name, frame in self.frames.items() if frame != "ground"}
         age = self.track.age(np.array([r.mjd for r in rows]))
+        nearest, expected = "the telescope's nearest is", f"(expected {LONGEST_GAP:g} s)"
         return [
-            replace(row, reason=f"no posture: the telescope's nearest is {old:.1f} s away (expected {LONGEST_GAP:g} s)")
+            replace(row, reason=Reason(ShotStatus.NO_POSTURE, f"{nearest} {old:.1f} s away {expected}"))
             if not row.reason and old > LONGEST_GAP and {row.shot.ranger, row.shot.target} & moving
             else row
             for row, old in zip(rows, age, strict=True)

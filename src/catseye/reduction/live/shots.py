@@ -20,6 +20,7 @@ from catseye.records.site.folder import REFERENCE
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.site import Adc
 from catseye.reduction.epoch.ranges import Detected, Phases, why_not
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.detection.buffers import shortest_run
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
@@ -27,16 +28,14 @@ from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, variance_
 USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
 U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
 REFERENCE_CHANGE = 0.03  # of the cube's amplitude, beyond which something else is in its return
-Status = str
 
 
 @dataclass(frozen=True)
 class ShotAnswer:
     """What one shot is worth, at once.
 
-    status     "used", "reference", or the first word of why not: blocked, clipped, dead, dropout, stuck, noise unknown,
-               "no reference", "no place"
-    text       one line, "" where all is well
+    status     what became of it
+    reason     why it gives no range, None where it does
     amplitude  V, leakage taken out
     phase      rad, the same, in [0, 2 pi)
     range_     m, from the scan point; NaN where there is none
@@ -44,13 +43,23 @@ class ShotAnswer:
     misfit     m, range less what was predicted
     """
 
-    status: Status
-    text: str
+    status: ShotStatus
+    reason: Reason | None
     amplitude: float
     phase: float
     range_: float = math.nan
     u_range: float = math.nan
     misfit: float = math.nan
+
+    @property
+    def text(self) -> str:
+        """Why it gives no range, "" where it does."""
+        return str(self.reason or "")
+
+    @classmethod
+    def refused(cls, reason: Reason, amplitude: float, phase: float) -> "ShotAnswer":
+        """Of a shot that gives no range."""
+        return cls(reason.status, reason, amplitude, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +74,7 @@ class Taken:
     offset: float
     harmonics: NDArray[np.float64]
     largest: float
-    reason: str
+    reason: Reason | None
     repeats: tuple[int, ...] = ()
 
     @property
@@ -106,12 +115,12 @@ def taken(
     seen = _Seen()
     if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
         told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
-        seen.wrong = f"wrong length: {told} {shot.cycles * shot.samples_per_cycle}"
+        seen.wrong = Reason(ShotStatus.WRONG_LENGTH, f"{told} {shot.cycles * shot.samples_per_cycle}")
     elif shot.samples is not None:
         leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
         _detect(shot, shot.samples, seen, adc.bits, run, leaked)
     elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
-        seen.wrong = "no samples: neither the buffer came nor what the ranger made of it"
+        seen.wrong = Reason(ShotStatus.NO_SAMPLES, "neither the buffer came nor what the ranger made of it")
     else:
         seen.raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
         seen.u_phasor, seen.largest = U_UNSEEN_VOLT, shot.amplitude
@@ -148,7 +157,7 @@ class _Seen:
     clipped: int = 0
     total: Sequence[float] = (0.0, 0.0, 0.0)
     between: Sequence[float] = (0.0, 0.0, 0.0)
-    wrong: str = ""
+    wrong: Reason | None = None
 
 
 def _detect(shot: LiveShot, samples: NDArray[np.int16], into: _Seen, bits: int, run: float, leaked: complex) -> None:
@@ -219,19 +228,19 @@ def answer(
     """
     amplitude, phase = abs(row.phasor), math.atan2(row.phasor.imag, row.phasor.real) % TWO_PI
     if row.reason:
-        return ShotAnswer(row.reason.partition(":")[0], row.reason, amplitude, phase)
+        return ShotAnswer.refused(row.reason, amplitude, phase)
     if row.shot.target == REFERENCE:
         usual = now.usual[True]
         level = median(usual) if len(usual) >= 3 else amplitude
         if abs(amplitude / level - 1.0) > REFERENCE_CHANGE:
-            text = f"bad reference: return {amplitude:.3f} V where the cube gives {level:.3f} V"
-            return ShotAnswer("bad reference", text, amplitude, phase)
-        return ShotAnswer("reference", "", amplitude, phase, d0, 0.0, 0.0)
+            text = f"return {amplitude:.3f} V where the cube gives {level:.3f} V"
+            return ShotAnswer.refused(Reason(ShotStatus.BAD_REFERENCE, text), amplitude, phase)
+        return ShotAnswer(ShotStatus.REFERENCE, None, amplitude, phase, d0, 0.0, 0.0)
     if not now.references:
-        text = "no reference: the ranger has no good shot on its internal cube yet"
-        return ShotAnswer("no reference", text, amplitude, phase)
+        text = "the ranger has no good shot on its internal cube yet"
+        return ShotAnswer.refused(Reason(ShotStatus.NO_REFERENCE, text), amplitude, phase)
     if predicted is None:
-        return ShotAnswer("no place", "no place: the telescope has told no posture", amplitude, phase)
+        return ShotAnswer.refused(Reason(ShotStatus.NO_PLACE, "the telescope has told no posture"), amplitude, phase)
     last = now.references[-1]
     half = 0.5 * SPEED_OF_LIGHT / modulation_hz
     share = ((phase - math.atan2(last.phasor.imag, last.phasor.real)) / TWO_PI) % 1.0
@@ -242,4 +251,4 @@ def answer(
     u_phase = math.hypot(row.u_across / amplitude, last.u_across / max(abs(last.phasor), 1e-9))
     drift = walk * math.sqrt(abs(row.mjd - last.mjd) * SECONDS_PER_DAY)
     u = half / TWO_PI / corrections.index * math.hypot(u_phase, drift)
-    return ShotAnswer("used", "", amplitude, phase, range_, u, range_ - distance)
+    return ShotAnswer(ShotStatus.USED, None, amplitude, phase, range_, u, range_ - distance)

@@ -30,16 +30,16 @@ class BufferStatus(IntEnum):
 
 
 TEXTS = {
-    BufferStatus.GOOD: "good",
-    BufferStatus.WEAK: "weak: amplitude {amplitude:.4g} V is below the limit of {weakest:.4g} V",
-    BufferStatus.NO_SCATTER: "no scatter: {cycles} cycles of {n} samples do not show their noise, so the uncertainty "
+    BufferStatus.GOOD: "",
+    BufferStatus.WEAK: "amplitude {amplitude:.4g} V is below the limit of {weakest:.4g} V",
+    BufferStatus.NO_SCATTER: "{cycles} cycles of {n} samples do not show their noise, so the uncertainty "
     "is unknown; take at least 2 cycles, and noise above a converter step",
-    BufferStatus.DROPOUT: "dropout: {dropped} of {cycles} cycles have less than half the amplitude; was the beam cut?",
-    BufferStatus.STUCK: "stuck: a run of at least {run} equal samples (a cycle has {n}); look at the converter",
-    BufferStatus.CLIPPED: "clipped: {clipped} samples at the converter's ends (largest {largest:.4g} V)",
-    BufferStatus.NOT_FINITE: "not finite: a sample is NaN, infinite, or too large to be squared",
-    BufferStatus.WRONG_LENGTH: "wrong length: {length} samples, expected {expected}",
-    BufferStatus.NOT_SAMPLES: "not samples: expected a row of integers or floats",
+    BufferStatus.DROPOUT: "{dropped} of {cycles} cycles have less than half the amplitude; was the beam cut?",
+    BufferStatus.STUCK: "a run of at least {run} equal samples (a cycle has {n}); look at the converter",
+    BufferStatus.CLIPPED: "{clipped} samples at the converter's ends (largest {largest:.4g} V)",
+    BufferStatus.NOT_FINITE: "a sample is NaN, infinite, or too large to be squared",
+    BufferStatus.WRONG_LENGTH: "{length} samples, expected {expected}",
+    BufferStatus.NOT_SAMPLES: "expected a row of integers or floats",
 }
 
 
@@ -64,6 +64,12 @@ class Inspection:
 
     def text(self, buffer: int) -> str:
         """The status of one buffer in words: what is wrong and what to do."""
+        name = BufferStatus(self.status[buffer]).name.lower().replace("_", " ")
+        detail = self.detail(buffer)
+        return f"{name}: {detail}" if detail else name
+
+    def detail(self, buffer: int) -> str:
+        """The same without the status."""
         n, found = self.samples_per_cycle, self.detection
         expected = f"a whole number of cycles of {n}" if self.cycles is None else f"{self.cycles} cycles of {n}"
         return TEXTS[BufferStatus(self.status[buffer])].format(
