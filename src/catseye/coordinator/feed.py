@@ -134,7 +134,7 @@ class FeedClient:
             client.close()
 
     async def _look(self) -> None:
-        """Who is silent."""
+        """Look again and again who is silent."""
         while True:
             await asyncio.sleep(LOOK)
             self.look()

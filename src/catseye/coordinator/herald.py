@@ -79,5 +79,5 @@ class Herald:
 
     @property
     def standings(self) -> tuple[str, ...]:
-        """What lasts now."""
+        """Happenings that last at this instant."""
         return tuple(self._standing)

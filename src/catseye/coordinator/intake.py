@@ -92,7 +92,7 @@ class Intake:
             self.broken.set_exception(problem)
 
     def flush(self) -> None:
-        """Handle what has come."""
+        """Handle the shots that have come."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

@@ -56,10 +56,10 @@ class Suspensions:
         self._records.pop((ranger, target), None)
 
     def resting(self, ranger: str, target: str, now_ticks: int) -> bool:
-        """Whether it rests now."""
+        """Whether a ranger, or one of its lines, is left alone at a time."""
         record = self._records.get((ranger, target))
         return record is not None and now_ticks < record.until
 
     def lines(self, now_ticks: int) -> frozenset[tuple[str, str]]:
-        """All lines that rest."""
+        """All lines that are left alone at a time."""
         return frozenset(key for key, record in self._records.items() if key[1] and now_ticks < record.until)

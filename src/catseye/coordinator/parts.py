@@ -82,7 +82,7 @@ class Clock(Protocol):
 
 
 class Planner(Protocol):
-    """What to shoot next."""
+    """What chooses the shots of the next round."""
 
     def round(self, state: SiteState) -> Round: ...
 
@@ -189,5 +189,5 @@ Tell = Callable[[Happening], None]
 
 
 def ticks_now(clock: Clock) -> int:
-    """The stamp of now."""
+    """Ticks of a clock at this instant."""
     return (2 * clock.now_ns() + 864_000) // 1_728_000

@@ -218,7 +218,7 @@ def ellipse(field: ArrayLike) -> tuple[Array, Array]:
 
 
 def _dyad(out: NDArray, into: NDArray, gain: ArrayLike) -> Complex:
-    """gain * out into^T."""
+    """The Jones matrix gain * out into^T."""
     return np.asarray(gain, dtype=complex)[..., None, None] * out[..., :, None] * into[..., None, :]
 
 

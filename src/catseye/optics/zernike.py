@@ -31,7 +31,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As opticians call it."""
+        """What opticians call the term."""
         return NAMES.get((self.n, self.m), f"order {self.n}, {'cosine' if self.m >= 0 else 'sine'} {abs(self.m)}")
 
 

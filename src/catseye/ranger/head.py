@@ -55,7 +55,7 @@ class SamplingSettings:
 
     @property
     def duration(self) -> float:
-        """Of a buffer, s."""
+        """How long a buffer takes, s."""
         return self.cycles / self.frequency_hz
 
 
@@ -83,7 +83,7 @@ class RangerHead(Protocol):
         ...
 
     def set_clock(self, tag: TimeTag) -> None:
-        """Set the clock."""
+        """Set the clock to a number of ticks."""
         ...
 
     def clock_locked(self) -> bool:
@@ -151,7 +151,7 @@ class RangerHead(Protocol):
         ...
 
     def switch_laser(self, on: bool) -> None:
-        """The laser's power."""
+        """Switch the laser's power on or off."""
         ...
 
     def laser_on(self) -> bool:

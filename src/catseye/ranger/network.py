@@ -30,7 +30,7 @@ class ConnectionMaker(Protocol):
 
 
 class Sockets:
-    """TCP."""
+    """Connections over TCP sockets."""
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> "SocketListener":
         loop = asyncio.get_running_loop()
@@ -42,7 +42,7 @@ class Sockets:
 
 
 class SocketListener:
-    """A TCP port."""
+    """A TCP port that is listened at."""
 
     def __init__(self, server: asyncio.Server):
         self._server = server

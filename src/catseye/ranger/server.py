@@ -69,7 +69,7 @@ class ClientConnection(asyncio.Protocol):
             self.paused = full
 
     def refuse(self, text: str) -> None:
-        """Say why, and close."""
+        """Tell a client why not, and close its connection."""
         self.unread.clear()
         self.tell(Reply("LINE", False, (text,), 0, self.server.ranger.now_ticks()))
         if self.transport is not None:

@@ -133,7 +133,7 @@ class RangerState:
             self.head.set_error_limit(axis, settings.error_limit)
 
     def reset(self) -> None:
-        """Cold boot: RST."""
+        """A cold boot, as RST asks for."""
         self._scan_work = self._stream_work = None
         self.scheduler = Scheduler()
         self.head.reset()
@@ -144,11 +144,11 @@ class RangerState:
         return self._head_now_ns()
 
     def now_ticks(self) -> int:
-        """The stamp of now."""
+        """Ticks of the ranger's clock at this instant."""
         return nanoseconds_to_ticks(self.now_ns())
 
     def status(self) -> StatusWord:
-        """The status word of now."""
+        """The status word at this instant."""
         head, measured = self.head, self.measured
         on = (
             self.auto,

@@ -58,7 +58,7 @@ class LiveBook:
         self.answer: dict[str, Any] = {}  # of the last epoch
 
     def entry(self, entry: Any) -> None:
-        """One more."""
+        """Take in one entry of the journal."""
         if isinstance(entry, AnsweredShot):
             self._shot(entry)
         elif isinstance(entry, EpochSolution):
@@ -72,7 +72,7 @@ class LiveBook:
 
     @property
     def acknowledged(self) -> int:
-        """Shots that are durable."""
+        """Number of shots that are durable."""
         return sum(self.statuses.values())
 
     @property

@@ -49,7 +49,7 @@ class LiveChild:
 
     @property
     def pid(self) -> int | None:
-        """Of the child that runs."""
+        """Process id of the child that runs."""
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
@@ -118,7 +118,7 @@ class LiveChild:
             process.stdin.close()
 
     def kill(self) -> None:
-        """At once."""
+        """End the child at once, by SIGKILL."""
         if self._process is not None and self._process.returncode is None:
             with suppress(OSError):
                 os.kill(self._process.pid, signal.SIGKILL)

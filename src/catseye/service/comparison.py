@@ -76,7 +76,7 @@ class TwinComparison:
         self._reference: dict[str, Array] = {}  # true places in the reflector frame, at the reference epoch
 
     def shot(self, answered: AnsweredShot) -> None:
-        """One shot."""
+        """Compare one shot with the truth."""
         shot = answered.shot
         if len(self._middles) >= MOST_SHOTS:
             del self._middles[next(iter(self._middles))]
@@ -160,7 +160,7 @@ class TwinComparison:
 
 
 def _chi2(off: Array, covariance: Array) -> float:
-    """off' C^-1 off."""
+    """The quadratic form off' C^-1 off."""
     return float(off @ np.linalg.solve(covariance, off))
 
 

@@ -35,11 +35,11 @@ class LiveLog:
             self.happened(epoch_of(entry))
 
     def tell(self, who: str, kind: str, text: str, severity: Any = "note") -> None:
-        """Something of now."""
+        """Log something that happens at this instant."""
         self.happened(Happening(ticks_now(self._clock), who, kind, text, severity))
 
     def happened(self, what: Happening) -> None:
-        """One line."""
+        """Log one happening as a line."""
         if self._json:
             row = {
                 "time_utc": time_text(what.ticks),
@@ -85,5 +85,5 @@ def time_text(ticks: int) -> str:
 
 
 def one_line(text: str) -> str:
-    """Whatever it holds."""
+    """The text on one line, whatever it holds."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())

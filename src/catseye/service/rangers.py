@@ -30,7 +30,7 @@ class Listening:
     feed: tuple[str, int] | None = None
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Where rangers and feed listen, as a plain object for JSON."""
         return {
             "rangers": {name: list(at) for name, at in self.rangers.items()},
             "feed": None if self.feed is None else list(self.feed),

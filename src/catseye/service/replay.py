@@ -56,7 +56,7 @@ class ReplayFound:
 
     @property
     def same(self) -> bool:
-        """All to the last bit."""
+        """Whether all answers are the same to the last bit."""
         return self.epochs == self.same_epochs and self.shots == self.same_shots
 
 
@@ -135,7 +135,7 @@ def replay_object(found: ReplayFound) -> dict[str, Any]:
 
 
 def replay_passages(found: ReplayFound) -> list[tuple[str, str]]:
-    """Title and text of each."""
+    """What a replay came to: title and text of each passage."""
     run = found.run
     told = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {found.shots} shots.")]
     if found.same:

@@ -30,19 +30,19 @@ STYLES = {"note": "", "warning": "yellow", "alarm": "bold red"}
 
 
 class SilentView:
-    """Nothing."""
+    """A view that shows nothing."""
 
     def tell(self, text: str) -> None:
-        """Said to nobody."""
+        """Drop what a person would be told."""
 
     def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
-        """Seen by nobody."""
+        """Begin without a screen."""
 
     def entry(self, entry: Any) -> None:
-        """Seen by nobody."""
+        """Drop an entry."""
 
     def end(self) -> None:
-        """Seen by nobody."""
+        """End without a screen."""
 
 
 class LinesView(SilentView):

@@ -41,7 +41,7 @@ class View(Protocol):
         ...
 
     def end(self) -> None:
-        """Nothing more comes."""
+        """Note that nothing more comes."""
         ...
 
 

@@ -56,7 +56,7 @@ class TwinWords:
         return replace(self, offset=self.offset - seconds)
 
     def clock(self) -> SystemClock:
-        """Its time."""
+        """The clock of the twin's time."""
         return SystemClock(self.offset)
 
     def twin(self, site: SiteFolder) -> Twin:

@@ -200,12 +200,12 @@ class GravityStation:
 
     @property
     def gravity(self) -> float:
-        """m/s²."""
+        """Local gravity, m/s²."""
         return self.gravity_gal * GAL
 
     @property
     def elevation(self) -> float:
-        """m."""
+        """Height above sea level, m."""
         return self.elevation_ft * FOOT
 
     def gravity_at(self, elevation, *, gradient=FREE_AIR):

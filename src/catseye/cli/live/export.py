@@ -69,7 +69,7 @@ def export(
 
 
 def _span(since: str | None, until: str | None) -> tuple[int, int] | None:
-    """Ticks; None for all."""
+    """First and last tick that are asked for; None for all."""
     if since is None and until is None:
         return None
     from catseye.geometry.sky.time_tag import mjd_of

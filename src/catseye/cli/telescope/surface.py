@@ -173,7 +173,7 @@ def _keep(found: "SurfaceResult", actuators: Path | None) -> None:
 
 @dataclass(frozen=True)
 class _Reading:
-    """How inputs are read."""
+    """How the command's input files are read."""
 
     site: str
     frame: "Frame"

@@ -39,7 +39,7 @@ class Samplers:
         return [ring[k] for k in range(max(0, len(ring) - count), len(ring))]
 
     def lengths(self) -> dict[str, int]:
-        """How many each holds."""
+        """How many values each sampler holds."""
         return {name: len(ring) for name, ring in self._rings.items()}
 
 

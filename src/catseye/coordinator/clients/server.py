@@ -146,7 +146,7 @@ class ZiyServer:
             await self._listener.close()
 
     def now_ticks(self) -> int:
-        """The stamp of now."""
+        """Ticks of this instant."""
         return ticks_now(self.coordinator.clock)
 
     def joined(self, client: Client) -> None:
@@ -161,7 +161,7 @@ class ZiyServer:
         client.tell(0, f"CONNECT 1, {self.port}")
 
     def left(self, client: Client) -> None:
-        """A connection is over."""
+        """Forget a connection that is over."""
         self.clients.discard(client)
 
     def publish(self, entry: Any) -> None:
@@ -175,7 +175,7 @@ class ZiyServer:
                     client.write(line)
 
     def answer(self, client: Client, line: str) -> None:
-        """A line of a client."""
+        """Answer a line that a client sent."""
         try:
             request = parse_request(line)
         except InputError as problem:

@@ -42,7 +42,7 @@ class Stand:
 
     @property
     def known(self) -> bool:
-        """Whether both axes are."""
+        """Whether both axes' counts are known."""
         return bool(np.isfinite(self.low).all())
 
     def settle(self, now_ticks: int) -> None:
@@ -51,7 +51,7 @@ class Stand:
             self.arrive()
 
     def arrive(self) -> None:
-        """At the goal."""
+        """Note that the mirror stands at its goal."""
         if self.goal is not None:
             self.low, self.high = self.goal
             self.goal = self.arrives = None
@@ -109,7 +109,7 @@ class Memory:
 
     @property
     def pace(self) -> Pace:
-        """Of its next moves."""
+        """Speed and acceleration of its next moves."""
         velocity, acceleration = (
             (convert(getattr(self.axes[0], name)), convert(getattr(self.axes[1], name)))
             for name, convert in (("velocity", velocity_counts), ("acceleration", acceleration_counts))

@@ -58,7 +58,7 @@ def resting(
 
 
 def in_words(seconds: float) -> str:
-    """Now, or in some s."""
+    """When a zone comes to the beam: now, or in so many seconds."""
     return "now" if seconds <= 0.0 else f"in {seconds:.0f} s"
 
 

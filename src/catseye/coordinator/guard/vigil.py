@@ -22,7 +22,7 @@ class Vigil:
         self._links, self._guard, self._clock, self._herald = links, guard, clock, herald
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Watch all beams until cancelled."""
         await asyncio.gather(self._suns(), self._watch())
 
     async def _suns(self) -> None:

@@ -201,7 +201,7 @@ class WriterLock:
         os.write(self._file, json.dumps({"host": socket.gethostname(), "pid": os.getpid()}).encode())
 
     def release(self) -> None:
-        """Let others write."""
+        """Give the lock back, so that others may write."""
         if self._file is not None:
             self._path.unlink(missing_ok=True)
             os.close(self._file)

@@ -67,7 +67,7 @@ class JournalReader:
                 raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
 
     def runs(self) -> tuple[StoredRun, ...]:
-        """All runs, oldest first."""
+        """All runs of the journal, oldest first."""
         with self._reading() as connection:
             files: dict[int, dict[str, str]] = {}
             for row in connection.execute(select(RUN_FILES).order_by(RUN_FILES.c.path)):

@@ -272,7 +272,7 @@ class Journal:
         self._acknowledge(batches)
 
     def _store(self, batches: Sequence[Batch]) -> None:
-        """One transaction."""
+        """Write some entries in one transaction."""
         rows: dict[str, list[Row]] = defaultdict(list)
         for batch in batches:
             for table, row in batch.rows:

@@ -79,7 +79,7 @@ class Places:
         return self._shifts[vantage.name]
 
     def shots(self, vantage: Vantage, chosen: "list[ChosenTarget]", duration: float) -> tuple[PlannedShot, ...]:
-        """The shots of a ranger."""
+        """The planned shots of one ranger."""
         begin = np.array([later(int(self.ticks[0]), each.at) for each in chosen], dtype=np.int64)
         both = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)
         nodes = np.array([self._own(vantage, each.target) for each in chosen]).reshape(-1, len(self.ticks), 3)

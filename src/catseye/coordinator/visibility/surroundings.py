@@ -263,5 +263,5 @@ def instants(since_ticks: int, until_ticks: int) -> NDArray[np.int64]:
 
 
 def later(ticks: int, seconds: float) -> int:
-    """The tick some s later."""
+    """The tick some seconds after a tick."""
     return ticks + round(seconds / TICK_SECONDS)

@@ -165,7 +165,7 @@ def nominal_posture(site: SiteFolder) -> LivePosture:
 
 
 def seconds_between(since_ticks: int, ticks: int) -> float:
-    """s."""
+    """Seconds from one tick to another."""
     return (ticks - since_ticks) * TICK_SECONDS
 
 

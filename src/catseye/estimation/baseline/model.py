@@ -61,7 +61,7 @@ class BaselineSights:
 
     @cached_property
     def shots(self) -> np.ndarray:
-        """(M,) shots in each set."""
+        """Number of shots in each set, (M,)."""
         return np.bincount(self.set)
 
     @cached_property

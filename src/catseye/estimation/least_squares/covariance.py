@@ -35,7 +35,7 @@ class Covariance(Protocol):
         ...
 
     def diagonal(self) -> np.ndarray:
-        """(n,) variances."""
+        """The variances of all parameters, (n,)."""
         ...
 
 

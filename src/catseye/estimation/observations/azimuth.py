@@ -34,7 +34,7 @@ class Azimuths(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 6): origin, target."""
+        """Columns of origin and target, (m, 6)."""
         return beside(self.name, len(self.observed), triples(self.origin), triples(self.target))
 
     @property

@@ -47,7 +47,7 @@ class ObservedCoordinates(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 1): the coordinate."""
+        """Column of the coordinate, (m, 1)."""
         if not np.isin(self.axis, (0, 1, 2)).all():
             raise EstimationError(
                 f"{self.name}: an axis is {np.setdiff1d(self.axis, (0, 1, 2))[0]}, expected 0, 1 or 2"

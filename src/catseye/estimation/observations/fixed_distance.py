@@ -50,7 +50,7 @@ class FixedDistances(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 6): origin, target."""
+        """Columns of origin and target, (m, 6)."""
         return beside(self.name, len(self.observed), triples(self.origin), triples(self.target))
 
     @property

@@ -76,7 +76,7 @@ class ObservationKind:
 
     @property
     def kinds(self: Reported) -> np.ndarray:
-        """(m,) kind of each row."""
+        """The kind of each row, (m,)."""
         return np.full(len(self.observed), self.kind)
 
     @property

@@ -46,7 +46,7 @@ class ObservedTilts(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 4): w, zero."""
+        """Columns of the rotation w and the zero, (m, 4)."""
         m = len(self.observed)
         return beside(self.name, m, np.atleast_2d(self.turn), optional(self.zero, m))
 

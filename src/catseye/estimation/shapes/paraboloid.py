@@ -70,7 +70,7 @@ class ParaboloidFit:
 
     @property
     def half_path_covariance(self) -> np.ndarray:
-        """(k, k) m^2."""
+        """Covariance of the half-path errors, (k, k) m^2."""
         c = self.cos_incidence
         return self.deviation_covariance * c[:, None] * c
 

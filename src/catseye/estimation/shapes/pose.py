@@ -52,12 +52,12 @@ class Pose:
 
     @property
     def pivot(self) -> np.ndarray:
-        """(3,) m."""
+        """The point that the pose turns about, (3,) m."""
         return self.motion.pivot
 
     @property
     def translation(self) -> np.ndarray:
-        """(3,) m, of the pivot."""
+        """Shift of the pivot, (3,) m."""
         return self.motion.translation
 
     @property

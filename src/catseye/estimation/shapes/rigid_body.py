@@ -279,7 +279,7 @@ def turned_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np
 
 
 def _of_misclosure(qx: np.ndarray, qy: np.ndarray, c: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Covariance of y - L x."""
+    """Covariance of the misclosure y - L x."""
     shared = turned_covariance(c, matrix, columns=False)
     return (
         qy + turned_covariance(turned_covariance(qx, matrix, columns=True), matrix, columns=False) - shared - shared.T

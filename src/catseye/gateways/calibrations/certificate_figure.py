@@ -9,7 +9,7 @@ PANELS = {"residuals": "residual", "spectrum": "amplitude of residuals"}
 
 
 def calibration_figure(found: Calibration) -> str:
-    """SVG text."""
+    """The figure of a calibration as SVG text."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)

@@ -353,7 +353,7 @@ def _turn(
 
 
 def _head(tip: np.ndarray, along: np.ndarray, colour: str) -> str:
-    """An arrow's head."""
+    """The head of an arrow, as an SVG polygon."""
     unit = along / np.linalg.norm(along)
     side = np.array([-unit[1], unit[0]])
     corners = (tip + 3 * unit, tip - 6 * unit + 3.5 * side, tip - 6 * unit - 3.5 * side)

@@ -33,7 +33,7 @@ CONTENTS = {
 
 
 def report(reduction: Reduction, when: datetime) -> str:
-    """The whole page."""
+    """The whole page of a reduction, HTML."""
     drawn = figures(reduction)
     name = reduction.campaign.site.campaign.name
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())

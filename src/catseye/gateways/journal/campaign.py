@@ -46,7 +46,7 @@ class LeftOut:
             self.examples.setdefault(reason, []).append(which)
 
     def notes(self) -> list[str]:
-        """One line a reason."""
+        """What was left out, a line for each reason."""
         return [
             f"left out {count}: {reason} ({', '.join(self.examples[reason])}{', ...' if count > MOST_TOLD else ''})"
             for reason, count in sorted(self.counts.items())

@@ -227,7 +227,7 @@ def rows_of(
 
 
 def ticks_of(entry: Entry) -> int:
-    """When an entry was."""
+    """The instant of an entry, ticks."""
     return entry.shot.ticks if hasattr(entry, "shot") else entry.ticks
 
 

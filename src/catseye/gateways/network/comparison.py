@@ -61,7 +61,7 @@ class ComparedEpochs:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(n, 3, 3) m^2 likewise."""
+        """Covariance of the displacements, (n, 3, 3) m^2."""
         return in_file_axes(self.first.network, self.deformation.displacement, self.deformation.covariance)[1]
 
     @cached_property

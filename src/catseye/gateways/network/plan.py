@@ -113,7 +113,7 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
 
 
 def plan_json(told: PlanFindings) -> Iterator[str]:
-    """Its text, on one line."""
+    """A plan as JSON text on one line."""
     yield json.dumps(plan_object(told), allow_nan=False)
 
 
@@ -205,7 +205,7 @@ def _cell(text: str) -> str:
 
 
 def plan_report(told: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page."""
+    """The whole page of a plan, HTML."""
     from catseye.gateways.network.figures import network_figures
     from catseye.gateways.network.report import provenance_section
 

@@ -231,7 +231,7 @@ def _points(found: Findings, file: str) -> str:
 
 
 def _relative(found: Findings) -> str:
-    """The pairs asked for."""
+    """The section on the pairs of points that were asked for."""
     if not found.relative:
         return ""
     rows = [

@@ -44,7 +44,7 @@ class Dimensions:
     reflectance: float = 0.97
 
     def targets(self) -> tuple[HollowCube, SolidPrism, BallCatsEye]:
-        """The three of them."""
+        """The three retroreflectors that are drawn."""
         about = air(20.0, 933.0, 50.0, wavelength_um=self.vacuum_um, model="rueger1990")
         n = index_over_air(self.vacuum_um, self.glass, air_phase=about.phase_index, air_group=about.group_index)
         index = {"group": float(n.group), "phase": float(n.phase)}

@@ -78,7 +78,7 @@ def points_csv(found: PoseResult) -> str:
 
 
 def pose_report(found: PoseResult, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page."""
+    """The whole page of a pose, HTML."""
     from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
 
     drawn = pose_figures(found)

@@ -87,7 +87,7 @@ def observations_csv(fit: PointingFit, observed: Observed) -> str:
 
 
 def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, when: datetime) -> str:
-    """The whole page."""
+    """The whole page of a pointing model's fit, HTML."""
     from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
 
     drawn = fit_figures(fit)
@@ -197,7 +197,7 @@ def track_words(found: TrackProfile) -> list[tuple[str, str]]:
 
 
 def track_report(found: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
-    """The whole page."""
+    """The whole page of a series along a track, HTML."""
     from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
 
     drawn = track_figures(found)

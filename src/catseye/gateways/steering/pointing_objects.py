@@ -76,7 +76,7 @@ def _verdict_object(verdict: GuardAnswer) -> dict[str, Any]:
 
 
 def pointing_table(found: Pointings) -> str:
-    """Columns for people."""
+    """Counts and sights as columns of text for people."""
     rows: list[tuple[str, ...]] = [HEADINGS, UNITS]
     for k, to in enumerate(found.to):
         counts = (*found.counts[k], found.autocollimation[k], found.back_retro[k], *found.prime[k])

@@ -184,7 +184,7 @@ def _spread(columns: TextColumns, name: str) -> np.ndarray:
 
 
 def _covariance(columns: TextColumns, single: bool) -> np.ndarray:
-    """(k, 3, 3) m^2."""
+    """Covariance of each point, (k, 3, 3) m^2."""
     spreads: Sequence[str] = ("u_mm",) * 3 if single else SPREADS
     u = np.column_stack([_spread(columns, name) for name in spreads])
     made = u[:, :, None] * np.eye(3) * u[:, None, :]

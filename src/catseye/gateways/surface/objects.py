@@ -24,7 +24,7 @@ def root(square: float) -> float | None:
 
 
 def shape_object(shape: SurfaceShape) -> dict[str, Any]:
-    """One epoch."""
+    """One epoch's shape as a plain object for JSON."""
     fit = shape.fit
     u = np.sqrt(np.diag(fit.deviation_covariance))
     return {
@@ -129,7 +129,7 @@ def zernike_object(expansion: Expansion, numbering: Numbering) -> dict[str, Any]
 
 
 def lookup_object(lookup: Lookup) -> dict[str, Any]:
-    """Terms by elevation."""
+    """Terms by elevation as a plain object for JSON."""
     numbering = lookup.shapes[0].settings.numbering
     return {
         "columns": list(lookup.columns),

@@ -52,7 +52,7 @@ def change_csv(change: Change) -> str:
 
 
 def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
-    """A row a term."""
+    """Zernike terms as CSV text, a row a term."""
     u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
     columns = [
         values / MILLIMETRE

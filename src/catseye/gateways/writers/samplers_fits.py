@@ -198,7 +198,7 @@ def read_samplers(path: Path) -> dict[str, SamplerTable]:
 
 
 def _page(table: SamplerTable) -> Any:
-    """One extension."""
+    """One extension of the FITS file."""
     from astropy.io import fits
 
     columns = dict(table.columns)

@@ -139,7 +139,7 @@ class PostureTerms:
         return len(self.names)
 
     def rows(self, posture: TelescopePosture) -> NDArray[np.float64]:
-        """Their values (..., k)."""
+        """Values of the functions of posture, (..., k)."""
         columns = []
         for name in self.names:
             value: NDArray[np.float64] = np.ones(posture.shape)

@@ -28,7 +28,7 @@ TOUCH = 5e-5  # rad, 10": the last clearance, less than a count of the elevation
 
 
 class EntryStatus(IntEnum):
-    """What becomes of a path."""
+    """What becomes of a path beside the zones."""
 
     FREE = 0
     ENTERS = 1
@@ -95,7 +95,7 @@ class ConeZone:
         return 2.0 * np.tan(0.5 * _angle(self.direction, self.later)) / np.where(total > 0.0, total, np.inf)
 
     def __getitem__(self, index: Any) -> "ConeZone":
-        """Of some of the paths."""
+        """The entries of some of the paths."""
         direction = self.direction if self.direction.ndim == 1 else self.direction[index]
         later = self.later if self.later is None or self.later.ndim == 1 else self.later[index]
         half = self.half_angle if self.half_angle.ndim == 0 else self.half_angle[index]

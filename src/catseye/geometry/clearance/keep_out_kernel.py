@@ -42,7 +42,7 @@ def _dot(ax, ay, az, b):
 
 @_inlined
 def _hits(at, d, half, length):
-    """As `keep_out._hits`."""
+    """Whether a step enters a zone, as `keep_out._hits`."""
     first, last = -np.inf, np.inf
     for k in range(3):
         if d[k] == 0.0:

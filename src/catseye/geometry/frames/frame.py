@@ -73,7 +73,7 @@ class Transform:
         return vectors @ self.rotation.T
 
     def inverse(self) -> "Transform":
-        """The transform back."""
+        """The way back: from the second frame to the first."""
         return Transform(self.from_, self.to, self.rotation.T, -self.rotation.T @ self.translation)
 
     def __matmul__(self, other: "Transform") -> "Transform":
@@ -155,7 +155,7 @@ class Transforms:
         return np.einsum("...ij,...j->...i", self.rotation, vectors)
 
     def inverse(self) -> "Transforms":
-        """The transforms back."""
+        """The way back: from the second frame to the first."""
         back = np.swapaxes(self.rotation, -1, -2)
         return Transforms(self.from_, self.to, back, -np.einsum("...ij,...j->...i", back, self.translation))
 

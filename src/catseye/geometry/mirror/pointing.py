@@ -89,7 +89,7 @@ class MirrorStation:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Batch shape."""
+        """Shape of the batch of mirrors."""
         return np.broadcast_shapes(*(getattr(self, name).shape[:-1] for name in SIZES))
 
     @property
@@ -130,7 +130,7 @@ class MirrorStation:
 
     @cached_property
     def scan_point(self) -> NDArray[np.float64]:
-        """(..., 3), m, ground."""
+        """The scan points in the ground frame, (..., 3) m."""
         return scan_point(self.fixed_point, self.gamma, self.offset)
 
 

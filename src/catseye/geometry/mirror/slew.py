@@ -61,7 +61,7 @@ class MirrorSlew:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Batch shape."""
+        """Shape of the batch of moves."""
         return self.start.shape[:-1]
 
     @property
@@ -76,7 +76,7 @@ class MirrorSlew:
         return (self.end - self.start) / np.where(running > 0.0, running, np.inf)
 
     def __getitem__(self, index: Any) -> "MirrorSlew":
-        """Some of the batch."""
+        """Some of the batch of moves."""
         return MirrorSlew(self.start[index], self.end[index], self.ramp[index], self.duration[index])
 
     def position(self, time: ArrayLike) -> NDArray[np.float64]:

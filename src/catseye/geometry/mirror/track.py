@@ -45,7 +45,7 @@ class CountLine:
 
     @property
     def rate(self) -> Array:
-        """(..., 2) counts/s."""
+        """Speed of both axes, (..., 2) counts/s."""
         return (self.end - self.start) / self.interval[..., None]
 
     def at(self, since: ArrayLike) -> Array:

@@ -61,7 +61,7 @@ class BackMirrorCube:
 
     @property
     def acceptance(self) -> float:
-        """The cube's."""
+        """Acceptance of the cube behind the mirror."""
         return self.cube.acceptance
 
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
@@ -72,13 +72,13 @@ class BackMirrorCube:
         return np.where(angle < RIGHT, self.cube.range_change(angle, turn) + lever, np.nan)
 
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """The cube's."""
+        """Clear area of the cube behind the mirror."""
         return self.cube.clear_area(incidence, azimuth)
 
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """The cube's."""
+        """Returned share of the cube behind the mirror."""
         return self.cube.return_share(incidence, azimuth)
 
     def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
-        """The cube's."""
+        """Sectors of the cube behind the mirror."""
         return self.cube.sectors(incidence, azimuth)

@@ -35,12 +35,12 @@ class HollowCube:
 
     @property
     def fiducial(self) -> tuple[float, float, float]:
-        """The corner: the origin."""
+        """Where ranges end: the corner, which is the origin."""
         return (0.0, 0.0, 0.0)
 
     @property
     def range_constant(self) -> float:
-        """0: all is air."""
+        """The range constant: 0, since all the way is air."""
         return 0.0
 
     @property

@@ -71,7 +71,7 @@ class SolidPrism:
 
     @property
     def range_constant(self) -> float:
-        """-(n - 1/n) height."""
+        """The range constant -(n - 1/n) height, m."""
         return float(prism.range_constant(self.height, self.group))
 
     @property

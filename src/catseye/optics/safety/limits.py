@@ -58,7 +58,7 @@ class ExposureLimit:
 
     @property
     def power(self) -> float:
-        """W through the aperture."""
+        """The limit as a power, W, through its aperture."""
         return self.irradiance * 0.25 * np.pi * self.aperture**2
 
 
@@ -234,7 +234,7 @@ def _cornea(nm: float, duration: float) -> float:
 
 
 def _corneal_aperture(duration: float) -> float:
-    """m, [ANSI14] table 8."""
+    """Limiting aperture at the cornea, m, [ANSI14] table 8."""
     return 1e-3 if duration <= 0.3 else (1.5e-3 * duration**0.375 if duration < 10.0 else 3.5e-3)
 
 

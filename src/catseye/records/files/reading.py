@@ -110,7 +110,7 @@ def read_record(path: Path | str, kind: type[R]) -> R:
 
 
 def column(values: Sequence[float], kind: type[np.number]) -> np.ndarray:
-    """A read-only array."""
+    """One column of a table as a read-only array."""
     array = np.array(values, dtype=kind)
     array.setflags(write=False)
     return array

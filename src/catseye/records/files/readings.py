@@ -109,7 +109,7 @@ class SheetReadings:
 
     @property
     def active(self) -> np.ndarray:
-        """(m,) bool: takes part."""
+        """Whether each reading takes part, (m,) bool."""
         return np.array([not reason for reason in self.left_out])
 
     def has(self, name: str) -> bool:

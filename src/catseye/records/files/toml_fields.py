@@ -116,7 +116,7 @@ class Fields:
         return array
 
     def vector(self, stem: str, units: dict[str, float], default: Sequence[float] | None = None) -> np.ndarray:
-        """(3,) in SI."""
+        """Three numbers of a key in SI, (3,)."""
         key = self.keyed(stem, units)
         if key is None:
             if default is None:

@@ -189,7 +189,7 @@ class Baseline(Certificate):
 
     @property
     def covariance(self) -> np.ndarray:
-        """(r, r) m²."""
+        """Covariance of the pillars' places, (r, r) m²."""
         c = np.array(self.covariance_mm2) * 1e-6
         return 0.5 * (c + c.T)
 
@@ -200,7 +200,7 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(baseline: Baseline) -> str:
-    """The record as TOML."""
+    """The record of a baseline as TOML text."""
     lines = ["# Pillars of an EDM baseline, by catseye baseline: observed = (1 + scale) distance + zero"]
     for key, value in baseline.model_dump(exclude_none=True).items():
         if key == "inputs_sha256":

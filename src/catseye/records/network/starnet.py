@@ -89,7 +89,7 @@ class _Reader:
         return self.draft.refuse(line.place, problem)
 
     def read(self, line: StarnetLine) -> None:
-        """One line, by its code."""
+        """Take in one line, by its code."""
         if not self.settings.data and not line.code.startswith(".DAT"):
             return
         if line.code.startswith("."):
@@ -101,7 +101,7 @@ class _Reader:
             raise self.refuse(line, f"{shown(line.text)} is not known here (expected one of the codes {known})")
 
     def network(self) -> ObservationNetwork:
-        """All lines together."""
+        """The network of all lines together."""
         if self.orientation >= 0:
             raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
         for name, known in self.coordinates.items():

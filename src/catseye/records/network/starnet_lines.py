@@ -107,7 +107,7 @@ def lines_of(text: str) -> list[StarnetLine]:
 
 
 def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:
-    """A word as a number."""
+    """The number that a word is."""
     if not NUMBER.fullmatch(word):
         raise refuse(line, f"{line.code}: {shown(word)} (expected a number)")
     return float(word)

@@ -41,7 +41,7 @@ class LiveShot:
 
     @property
     def duration(self) -> float:
-        """Of the buffer, s."""
+        """How long the buffer took, s."""
         return self.cycles / self.if_hz
 
     @property

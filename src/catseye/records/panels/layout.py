@@ -70,7 +70,7 @@ class PanelLayout:
         )
 
     def rows(self) -> Iterable[tuple[str, int, str, float, float, float]]:
-        """The rows of the table."""
+        """The rows of the table of corners."""
         for p, name in enumerate(self.panels):
             for place in range(4):
                 c = self.quad[p, place]
@@ -78,7 +78,7 @@ class PanelLayout:
                 yield name, place + 1, self.corners[c], round(x, 3), round(y, 3), round(self.offset[p, place] * 1e6, 2)
 
     def csv(self) -> str:
-        """The table as text."""
+        """The table of corners as CSV text."""
         return "\n".join([",".join(COLUMNS), *(",".join(map(str, row)) for row in self.rows())]) + "\n"
 
 

@@ -110,7 +110,7 @@ class WeatherStation(Record):
 
 
 class SiteRecord(Certificate):
-    """The whole of site.toml."""
+    """Everything that site.toml holds."""
 
     format: Annotated[int | str, Version("site")] = 1
     campaign: PostureRecord

@@ -74,7 +74,7 @@ class Basis(Record):
 
     @property
     def size(self) -> int:
-        """How many functions."""
+        """How many functions of posture there are."""
         return len(self.terms or self.elevation_deg or ()) * len(self.temperature_c or (0,))
 
     def refuse_shape(self, key: str, values: Any, limit: float) -> None:

@@ -51,7 +51,7 @@ class LineAir:
 
     @property
     def u_temperature_c(self) -> np.ndarray:
-        """(t,) °C."""
+        """Standard uncertainty of each temperature, (t,) °C."""
         return np.sqrt(np.diag(self.covariance_c2))
 
 

@@ -62,7 +62,7 @@ class CurvedFit:
         return [p.name for p in self.parameters].index(name)
 
     def value(self, name: str) -> float:
-        """Of a parameter."""
+        """The estimate of a parameter by its name."""
         return float(self.values[self.index(name)])
 
     def u(self, name: str) -> float:
@@ -146,7 +146,7 @@ def fit_curved(
 def _slopes(
     predict: Callable[[np.ndarray], np.ndarray], values: np.ndarray, parameters: Sequence[ModelParameter]
 ) -> np.ndarray:
-    """(m, p) derivatives."""
+    """Derivatives of the predicted values, (m, p)."""
     columns = []
     for k, p in enumerate(parameters):
         aside = np.zeros(len(values))

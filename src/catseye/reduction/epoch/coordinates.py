@@ -132,7 +132,7 @@ class AdjustedCoordinates:
     sound: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def index(self, name: str) -> int:
-        """Row of a point."""
+        """Row of a point by its name."""
         return self.points.index(name)
 
     def block(self, names: Sequence[str]) -> np.ndarray:

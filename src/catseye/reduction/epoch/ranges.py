@@ -54,12 +54,12 @@ class Phases:
 
     @property
     def amplitude(self) -> np.ndarray:
-        """V."""
+        """Amplitude of each shot's return, V."""
         return np.abs(self.phasor)
 
     @property
     def phase(self) -> np.ndarray:
-        """rad in [0, 2 pi)."""
+        """Phase of each shot's return, rad in [0, 2 pi)."""
         return fraction(np.angle(self.phasor), 0.0)
 
     @property
@@ -135,7 +135,7 @@ class Detected:
 
     @staticmethod
     def empty(n: int) -> "Detected":
-        """Room for n buffers."""
+        """Detections of n buffers, to be filled."""
         one, three = np.zeros(n), np.zeros((n, 3))
         return Detected(
             np.zeros(n, dtype=complex),

@@ -39,7 +39,7 @@ class DishFit:
 
     @property
     def u_deviation(self) -> np.ndarray:
-        """(k,) m."""
+        """Standard uncertainty of each deviation, (k,) m."""
         return np.sqrt(np.diag(self.fit.deviation_covariance))
 
     def pose(self) -> dict[str, Any]:

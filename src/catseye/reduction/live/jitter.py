@@ -38,7 +38,7 @@ class Jitter:
 
     @property
     def mm(self) -> dict[str, float]:
-        """Body: mm."""
+        """Jitter of each body by its name, mm."""
         found = {body: (s / w) ** 0.5 / MILLIMETRE if s > 0.0 else 0.0 for body, (s, w) in self._sums.items()}
         return {body: max(u, LEAST * self.usual_mm[body]) for body, u in found.items()}
 

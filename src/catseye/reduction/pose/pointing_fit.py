@@ -214,7 +214,7 @@ class SeriesComparison:
 
     @property
     def rms_on_the_sky(self) -> float:
-        """rad, over the grid."""
+        """Root mean square error over the grid, rad."""
         return float(np.sqrt(np.mean(np.sum(self.on_the_sky**2, axis=1))))
 
 

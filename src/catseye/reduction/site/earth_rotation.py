@@ -43,7 +43,7 @@ class Rotation:
 
     @property
     def status(self) -> RotationStatus:
-        """The worst of them."""
+        """The worst status of all instants."""
         return STATUSES[int(np.max(self.code, initial=0))]
 
 

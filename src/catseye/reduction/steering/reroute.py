@@ -33,7 +33,7 @@ THINNED = (50, 150)  # nodes of a way that are tried first when it is shortened
 
 
 class RouteStatus(StrEnum):
-    """What was found."""
+    """What the search for a way came to."""
 
     DIRECT = "one slew"
     AROUND = "a way round the zones"
@@ -59,7 +59,7 @@ class Route:
 
     @property
     def found(self) -> bool:
-        """Whether there is a way."""
+        """Whether a way was found."""
         return self.status in (RouteStatus.DIRECT, RouteStatus.AROUND)
 
 

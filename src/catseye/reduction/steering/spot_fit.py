@@ -186,7 +186,7 @@ class _Sheet:
         return np.asarray(p[4] + p[3] * (self.shapes(p) @ self.around[1]))
 
     def jacobian(self, p: Array) -> Array:
-        """(n, 6)."""
+        """Derivatives by the six parameters, (n, 6)."""
         places, weight = self.around
         d, s2, f = places - p[:2], np.exp(2.0 * p[2]), 1.0 + p[5] ** 2
         u, shape = np.sum(d**2, axis=-1) / s2, self.shapes(p)
@@ -199,7 +199,7 @@ class _Sheet:
         return np.column_stack([moved, (slope * u) @ weight, shape @ weight, ones, by_g @ weight])
 
     def sigma(self, p: Array) -> Array:
-        """(n,) V."""
+        """Standard uncertainty of each sample, (n,) V."""
         shape = self.shapes(p)
         mean = shape @ self.around[1]
         stands = np.maximum(shape**2 @ self.around[1] - mean**2, 0.0)

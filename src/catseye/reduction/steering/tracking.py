@@ -65,7 +65,7 @@ class Drive:
 
     @property
     def duration(self) -> float:
-        """s from rest to rest."""
+        """Time from rest to rest, s."""
         way = abs(self.end - self.start)
         return way / self.peak + self.peak / self.acceleration if way > 0.0 else 0.0
 
@@ -240,7 +240,7 @@ class CountTrack:
     status: NDArray[np.int64]
 
     def reason(self, ranger: int, target: int) -> str:
-        """One line on a pair."""
+        """Why a ranger can or cannot follow a target, one line."""
         return REASONS[Following(int(self.status[ranger, target]))]
 
 

@@ -72,7 +72,7 @@ ACCEPTANCE: Mapping[str, Acceptance] = {
 
 
 class Sight(IntEnum):
-    """What becomes of a pair."""
+    """What becomes of a pair of ranger and target."""
 
     SEEN = 0
     TOO_NEAR = 1
@@ -134,11 +134,11 @@ class Visibility:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """(r, t)."""
+        """Whether each ranger sees each target, (r, t)."""
         return self.code == Sight.SEEN
 
     def reason(self, ranger: int, target: int) -> str:
-        """One line on a pair."""
+        """Why a ranger sees a target or not, one line."""
         code, distance = Sight(int(self.code[ranger, target])), self.range[ranger, target]
         if code is Sight.TOO_NEAR:
             return f"too near: {distance:.1f} m under {self.limits.near:g}"

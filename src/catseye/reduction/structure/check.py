@@ -49,7 +49,7 @@ class LeaveOut:
 
     @property
     def rms(self) -> float:
-        """m, of the coordinates."""
+        """Root mean square of the coordinates' differences, m."""
         return float(np.sqrt(np.nanmean(self.residual**2)))
 
 

@@ -146,7 +146,7 @@ class EpochScatter:
 
     @property
     def u_six(self) -> Array:
-        """(6,) m and rad."""
+        """Standard uncertainties of shift and turn, (6,) m and rad."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -198,7 +198,7 @@ class StructureFit:
 
     @property
     def arms(self) -> Array:
-        """(n, 3) m."""
+        """Points from their body's pivot, (n, 3) m."""
         return self.rest - self.series.pivot
 
     def six_of(self) -> tuple[Array, Array]:

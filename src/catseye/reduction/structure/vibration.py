@@ -54,12 +54,12 @@ class RangeSeries:
 
     @property
     def name(self) -> str:
-        """Ranger and target."""
+        """Names of ranger and target."""
         return f"{self.ranger}:{self.target}"
 
     @property
     def rate_hz(self) -> float:
-        """Ranges a second, mean."""
+        """Mean number of ranges a second."""
         return float((len(self.seconds) - 1) / (self.seconds[-1] - self.seconds[0]))
 
 

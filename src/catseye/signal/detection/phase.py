@@ -216,7 +216,7 @@ class _Codes:
         )
 
     def rows(self, start: int, count: int) -> "_Codes":
-        """Views of some rows."""
+        """The detections of some rows, as views."""
         return _Codes(**{f.name: getattr(self, f.name)[start : start + count] for f in fields(self)})
 
     def count_clipped(self, block: NDArray[np.generic], ends: tuple[float, float] | None) -> None:

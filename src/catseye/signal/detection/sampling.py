@@ -79,7 +79,7 @@ class SamplingPlan:
 
     @property
     def sample_rate_hz(self) -> float:
-        """Samples a second."""
+        """Samples taken in a second."""
         return self.samples_per_cycle * self.intermediate_hz
 
     @property

@@ -77,7 +77,7 @@ class Mode:
 
     @property
     def angular(self) -> float:
-        """rad/s."""
+        """Angular frequency of the mode, rad/s."""
         return TWO_PI * self.frequency_hz
 
     @property

@@ -44,7 +44,7 @@ class Spectrum:
 
     @property
     def density(self) -> Array:
-        """(F, A) m^2/Hz."""
+        """Power density of each channel, (F, A) m^2/Hz."""
         return np.einsum("faa->fa", self.cross).real.copy()
 
     @property

@@ -65,12 +65,12 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return float(self._scheduled[0]._when)  # type: ignore[attr-defined]
 
     def time(self) -> float:
-        """s of virtual time."""
+        """Seconds of virtual time since the start."""
         return self._jumping.now_ns / PER_SECOND
 
     @property
     def now_ns(self) -> int:
-        """The same, whole ns."""
+        """Virtual time in whole nanoseconds."""
         return self._jumping.now_ns
 
     @contextmanager

@@ -10,7 +10,7 @@ UNIX_EPOCH_DAY = 40_587  # MJD of 1970-01-01
 
 
 class Clock(Protocol):
-    """True UTC of a world."""
+    """A clock that tells the true UTC of a world."""
 
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0; never backwards."""

@@ -112,7 +112,7 @@ class ServoAxis:
 
     @property
     def time(self) -> float:
-        """Since power came on, s."""
+        """Seconds since power came on."""
         return self.samples * self.motor.sample
 
     def run(self, samples: int) -> AxisTrace:
@@ -225,15 +225,15 @@ class ServoAxis:
         return self.chip.loaded_filter
 
     def fkp(self, value: int | None = None) -> int:
-        """FKP: proportional gain."""
+        """The proportional gain, FKP."""
         return self.flt(kp=value)[0]
 
     def fki(self, value: int | None = None) -> int:
-        """FKI: integral gain."""
+        """The integral gain, FKI."""
         return self.flt(ki=value)[1]
 
     def fkd(self, value: int | None = None) -> int:
-        """FKD: derivative gain."""
+        """The derivative gain, FKD."""
         return self.flt(kd=value)[2]
 
     def fil(self, value: int | None = None) -> int:

@@ -203,7 +203,7 @@ def advance(ints, reals, fixed, normals, samples):
 
 @_inlined
 def _step(s, f, c, normal):
-    """ServoAxis._step."""
+    """One sample, as `ServoAxis._step`."""
     raw = np.int64(floor(f[ANGLE] * c[PER_RADIAN] + 0.5)) - s[START]
     if s[SEEKING] and not s[BLIND]:
         low, high = min(s[RAW], raw), max(s[RAW], raw)
@@ -248,7 +248,7 @@ def _drive_word(s, raw):
 
 @_inlined
 def _move_on(s):
-    """MotionChip._move_on."""
+    """The profile's next sample, as `MotionChip._move_on`."""
     if s[ON_TARGET]:
         return
     speed, rate = s[SPEED], s[ACCELERATION]
@@ -303,7 +303,7 @@ def _product(gain, signal, wraps):
 
 @_inlined
 def _advance_motor(s, f, c, normal):
-    """Motor.advance."""
+    """The motor over one sample, as `Motor.advance`."""
     torque = f[DRIVE] * c[TORQUE]
     if c[RIPPLE] != 0.0:
         torque *= 1.0 + c[RIPPLE] * sin(c[RIPPLE_CYCLES] * f[ANGLE])
@@ -331,7 +331,7 @@ def _advance_motor(s, f, c, normal):
 
 @_inlined
 def _through_rest(f, c, torque):
-    """Motor._through_rest."""
+    """Through a standstill, as `Motor._through_rest`."""
     left, decay = c[SAMPLE], c[DAMPING] / c[INERTIA]
     for _ in range(MOST_EVENTS):
         velocity = f[RATE]

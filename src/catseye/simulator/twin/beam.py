@@ -44,7 +44,7 @@ class TracedDish:
 
     @property
     def focus(self) -> Array:
-        """(3,) m, at rest."""
+        """Where the feed is at rest, (3,) m."""
         return np.array([0.0, 0.0, self.focal_length])
 
     def beam(self, turn: Array, shift: Array, feed: Array) -> Array:

@@ -97,7 +97,7 @@ class FaultBoard:
         self.faults: list[Fault] = list(faults)
 
     def add(self, fault: Fault) -> None:
-        """One more."""
+        """Add one fault to the plan."""
         self.faults.append(fault)
 
     def clear(self, kind: str = "*", whom: str = "*") -> int:

@@ -23,7 +23,7 @@ class Gate:
     open: set[asyncio.Transport] = field(default_factory=set)
 
     def cut(self) -> None:
-        """Break every connection."""
+        """Break every connection at once."""
         for transport in tuple(self.open):
             transport.abort()
 

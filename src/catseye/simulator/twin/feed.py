@@ -46,7 +46,7 @@ class FeedWorld(Protocol):
         ...
 
     def weather(self, station: str, seconds: float, /) -> LiveWeather:
-        """What a station reads."""
+        """What a station reads at an instant."""
         ...
 
 
@@ -146,7 +146,7 @@ class SiteFeed:
 
 
 class FeedConnection(asyncio.Protocol):
-    """One client of the feed."""
+    """A connection of one client of the feed."""
 
     def __init__(self, feed: SiteFeed):
         self._feed = feed

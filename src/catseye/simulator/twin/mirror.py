@@ -71,7 +71,7 @@ class CountSegment:
     counts: tuple[NDArray[np.float64], NDArray[np.float64]]
 
     def at(self, sample: float, axis: int) -> float:
-        """Counts of an axis."""
+        """Counts of an axis at a sample."""
         (t0, t1), (n0, n1) = self.samples, self.counts
         share = min(max((sample - t0) / (t1 - t0), 0.0), 1.0)
         return float(n0[axis] + share * (n1[axis] - n0[axis]))
@@ -208,7 +208,7 @@ class TwinMirror:
             axis.axis(on)
 
     def enabled(self, k: int) -> bool:
-        """Whether it is on."""
+        """Whether an axis is switched on."""
         return self.axes.enabled(k)
 
     def set_filter(self, k: int, values: tuple[int, int, int, int, int]) -> None:

@@ -195,7 +195,7 @@ class TwinSite:
 
 
 async def _halt(one: Served) -> None:
-    """No more turns."""
+    """Take no more turns."""
     task, one.task = one.task, None
     if task is not None:
         task.cancel()

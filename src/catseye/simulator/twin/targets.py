@@ -102,7 +102,7 @@ class Drawing:
 
 
 def drawing(site: SiteFolder, streams: Streams, planted: Planted) -> Drawing:
-    """The drawing of a site."""
+    """What a site's targets are drawn with: streams of chance, planted effects, the true surface."""
     return Drawing(streams, planted, TrueSurface.of(site, streams, planted))
 
 

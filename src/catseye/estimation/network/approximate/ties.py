@@ -184,5 +184,5 @@ class Ties:
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Angles in [-pi, pi)."""
+    """The angles brought into [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

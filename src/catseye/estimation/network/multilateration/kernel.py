@@ -84,14 +84,14 @@ class KernelBlocks:
         return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
 
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
-        """See `NumpyBlocks.back`."""
+        """Back-substitution, as `NumpyBlocks.back`."""
         moved = np.empty((len(self._free), 3))
         points = (state.stations, state.targets, state.zero, state.scale)
         _back(*self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
         return moved
 
     def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
-        """See `NumpyBlocks.felt`."""
+        """Redundancy numbers, as `NumpyBlocks.felt`."""
         out = np.zeros((own.shape[2], self.problem.free_stations.size))
         points = (at.stations, at.targets, at.zero, at.scale)
         _felt(*self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
@@ -225,7 +225,7 @@ def _solve_targets(order, b, v, free, inverse, own, condition, local):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _times(local, row, out):
-    """V^-1 a of one slot."""
+    """The product V^-1 a of one slot's block."""
     for lane in range(LANES):
         x, y, z = row[lane], row[LANES + lane], row[2 * LANES + lane]
         xx, xy, xz = local[lane], local[LANES + lane], local[2 * LANES + lane]
@@ -531,7 +531,7 @@ def _back(slots, ends, order, distance, root, points, inverse, own, step, width,
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _share(root, claimed, row):
-    """phi^2 of one slot."""
+    """The weighted square phi^2 of one slot."""
     for lane in range(LANES):
         phi = root[lane] / claimed[lane] if claimed[lane] > 0.0 else 0.0
         row[6 * LANES + lane] = phi * phi

@@ -73,7 +73,7 @@ class PriorTerms:
         return _whitening(self.targets)
 
     def count(self) -> int:
-        """Number of observations."""
+        """Number of observations in all terms."""
         points = sum(3 * len(p.index) for p in (self.stations, self.targets) if p is not None)
         between = len(self.between.distance) if self.between is not None else 0
         return points + between + sum(len(g.index) for g in self.gauges)

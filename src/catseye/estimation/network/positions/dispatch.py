@@ -70,7 +70,7 @@ class _Chunk:
     near: np.ndarray | None
 
     def of(self, lanes: np.ndarray | slice) -> "_Chunk":
-        """Some of them."""
+        """The inputs of some of the targets."""
         u, near = (a if a is None or len(a) == 1 else a[lanes] for a in (self.u, self.near))
         assert u is not None
         return _Chunk(np.ascontiguousarray(self.d[lanes]), u, near)

@@ -114,7 +114,7 @@ def _fitted(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, si
 
 
 def _none(s: int, t: int, status: str) -> Unfolding:
-    """No figure, and why."""
+    """An answer without a figure, and why."""
     nowhere = np.full((s, 3), np.nan), np.full((t, 3), np.nan)
     return Unfolding(*nowhere, np.zeros(s + t, dtype=bool), float("nan"), status)
 

@@ -42,7 +42,7 @@ class PointsOnSphere(ObservationKind):
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
-        """The point, the centre."""
+        """Columns of the point and of the centre."""
         return self.point, self.centre
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

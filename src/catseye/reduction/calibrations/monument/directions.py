@@ -70,7 +70,7 @@ class DirectionSights:
     share: np.ndarray
 
     def are(self, kind: str) -> np.ndarray:
-        """(m,) bool."""
+        """Whether each sight is of a kind, (m,) bool."""
         return self.kind == kind
 
 
@@ -190,7 +190,7 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightCondition
 
 
 def star_of(entry: Any) -> Star:
-    """A star of a sheet."""
+    """The star that a sheet names."""
     return Star(
         entry.name,
         entry.ra_deg * DEGREE,
@@ -218,5 +218,5 @@ def leaning(
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """The angle in [-pi, pi)."""
+    """The angles brought into [-pi, pi)."""
     return np.mod(angle + np.pi, TWO_PI) - np.pi
