@@ -43,7 +43,7 @@ def test_the_first_shot_of_a_list_is_fired_however_long_its_way(begins, shot):
         clock = ManualClock(NOW)
         link = Link(clock)
         firing = Firing(
-            site(), {"ZY101": link}, intake=SimpleNamespace(take=None), live=None, herald=None, clock=clock,
+            site(), {"ZY101": link}, intake=SimpleNamespace(take=None), live=None, event_log=None, clock=clock,
             allowed=lambda: True, telescope_known=lambda: True,
         )  # fmt: skip
         now = clock.now_ns() // 864_000

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 
 import pytest
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.intake import Intake
 from catseye.coordinator.parts import NotDurable
 from catseye.records.night.live import Happening, LiveWeather
@@ -33,8 +33,8 @@ class SlowJournal:
 
 
 def intake_of(journal, published):
-    herald = Herald("journal", CLOCK, lambda said: None)
-    return Intake(None, journal, judged=None, publish=published.append, herald=herald)
+    event_log = EventLog("journal", CLOCK, lambda said: None)
+    return Intake(None, journal, judged=None, publish=published.append, event_log=event_log)
 
 
 async def settled():
@@ -85,7 +85,11 @@ def test_a_mistake_while_what_came_is_handled_ends_the_coordinator_and_is_not_ju
 
     async def story():
         intake = Intake(
-            Mistaken(), SlowJournal(), judged=None, publish=None, herald=Herald("journal", CLOCK, lambda said: None)
+            Mistaken(),
+            SlowJournal(),
+            judged=None,
+            publish=None,
+            event_log=EventLog("journal", CLOCK, lambda said: None),
         )
         intake.broken = asyncio.get_running_loop().create_future()
         intake.take(LiveWeather("WX1", 1, 10.0, 930.0, 50.0))

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
@@ -74,11 +74,11 @@ class FeedClient:
     ):
         self.host, self.port, self._settings = host, port, settings or FeedSettings()
         self._clock, self._weather, self._posture = clock, weather, posture
-        self._tell, self._herald = tell, Herald("feed", clock, tell)
+        self._tell, self._event_log = tell, EventLog("feed", clock, tell)
         self._rng = random.Random(f"{seed} feed")
         self._network = {} if network is None else {"network": network}
-        self._stations = {name: Herald(name, clock, tell) for name in stations}
-        self._telescope = Herald("telescope", clock, tell)
+        self._stations = {name: EventLog(name, clock, tell) for name in stations}
+        self._telescope = EventLog("telescope", clock, tell)
         self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
         self._stamps: dict[str, int] = {}
         self._began: float | None = None
@@ -111,9 +111,9 @@ class FeedClient:
                 except TimeoutError:
                     why = f"{self.host} port {self.port} does not answer"
                 if client is not None:
-                    self._herald.standing("feed-lost", None, over="the site's feed is connected")
+                    self._event_log.standing("feed-lost", None, over="the site's feed is connected")
                     why, wait = await self._listen(client), self._settings.first_wait
-                self._herald.standing("feed-lost", f"{why}; trying again", "warning")
+                self._event_log.standing("feed-lost", f"{why}; trying again", "warning")
                 await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
                 wait = min(self._settings.growth * wait, self._settings.longest_wait)
         finally:
@@ -147,12 +147,12 @@ class FeedClient:
         text = f"no posture for {limit:g} s: tracking stops, fixed targets go on" if silent > limit else None
         self._telescope.standing("telescope-silent", text, "alarm", over="the telescope tells its posture again")
         limit = self._settings.weather_silent
-        for name, herald in self._stations.items():
+        for name, event_log in self._stations.items():
             silent = now - self._heard.get(name, began)
             text = (
                 f"{name} has said nothing for {limit:g} s (see to the station or its line)" if silent > limit else None
             )
-            herald.standing("weather-silent", text, over=f"{name} speaks again")
+            event_log.standing("weather-silent", text, over=f"{name} speaks again")
 
     def hear(self, reply: Reply) -> None:
         """A line of the feed; what cannot be read is told, and not used."""
@@ -162,7 +162,7 @@ class FeedClient:
             elif reply.command == "TEL":
                 self._take_posture(posture_of(reply))
         except InputError as problem:
-            self._herald.tell("bad-reading", str(problem), "warning", about=reply.command)
+            self._event_log.tell("bad-reading", str(problem), "warning", about=reply.command)
 
     def _take_weather(self, read: LiveWeather) -> None:
         if not self._fresh(read.station, read.ticks):
@@ -170,7 +170,7 @@ class FeedClient:
         if read.station not in self._stations:
             if len(self._stations) >= MOST_STATIONS:
                 raise InputError(f"WX: station {read.station} is one too many (expected at most {MOST_STATIONS})")
-            self._stations[read.station] = Herald(read.station, self._clock, self._tell)
+            self._stations[read.station] = EventLog(read.station, self._clock, self._tell)
         if not math.isnan(read.temperature_c + read.pressure_hpa + read.humidity_percent):
             self._heard[read.station] = asyncio.get_running_loop().time()
         self._weather(read)
@@ -184,7 +184,7 @@ class FeedClient:
         """Whether a stamp is later than the last and not far from now."""
         skew = (ticks - ticks_now(self._clock)) / TICKS_PER_SECOND
         text = f"{who or 'the telescope'}'s stamps are {skew:+.1f} s from now (limit {SKEW:g} s): not used"
-        self._herald.standing(f"feed-clock-{who or 'telescope'}", text if abs(skew) > SKEW else None)
+        self._event_log.standing(f"feed-clock-{who or 'telescope'}", text if abs(skew) > SKEW else None)
         if abs(skew) > SKEW or ticks <= self._stamps.get(who, -1):
             return False
         self._stamps[who] = ticks

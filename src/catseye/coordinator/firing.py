@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.intake import Intake
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.link.ranger import RangerLink
@@ -50,13 +50,13 @@ class Firing:
         *,
         intake: Intake,
         live: LiveReduction,
-        herald: Herald,
+        event_log: EventLog,
         clock: Clock,
         allowed: Callable[[], bool],
         telescope_known: Callable[[], bool],
     ):
         self._site, self._links, self._live, self._intake = site, links, live, intake
-        self._herald, self._clock = herald, clock
+        self._event_log, self._clock = event_log, clock
         self._allowed, self._telescope_known = allowed, telescope_known
         self.dropped: set[str] = set()
         self.streams: dict[str, str] = {}
@@ -113,7 +113,7 @@ class Firing:
         elif answered.status in OF_THE_LINE:
             line = f"{shot.ranger} {shot.target}"
             text = f"{line}: {answered.text or answered.status}"
-            self._herald.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+            self._event_log.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
             self._line_failed(shot.ranger, shot.target, answered.status)
 
     def fitted(self, used: Iterable[int], rejected: Mapping[int, Reason]) -> None:
@@ -128,7 +128,7 @@ class Firing:
             elif reason is not None and reason.status is ShotStatus.REFLECTED:
                 line = f"{ranger} {target}"
                 text = f"{line}: {reason} (light from elsewhere, or one of them has moved)"
-                self._herald.tell("wrong-range", text, "warning", about=line, ranger=ranger, target=target)
+                self._event_log.tell("wrong-range", text, "warning", about=line, ranger=ranger, target=target)
                 self._line_failed(ranger, target, "of a wrong range", self._misfits)
 
     def resting(self, now: int) -> frozenset[tuple[str, str]]:
@@ -175,7 +175,7 @@ class Firing:
             try:
                 planned = self._aim(ranger, target)
             except CatseyeError as problem:
-                self._herald.tell("no-place", f"{ranger} {target}: {problem}", "warning", about=ranger)
+                self._event_log.tell("no-place", f"{ranger} {target}: {problem}", "warning", about=ranger)
                 return
             if not self._telescope_known() and not self._stands(planned):
                 return
@@ -199,7 +199,7 @@ class Firing:
         rest = self.suspensions.failed(ranger, "", now) if link.failures >= FAILURES else None
         if rest is not None:
             text = f"{ranger} failed {link.failures} times in a row: left alone for {rest:g} s"
-            self._herald.tell("ranger-suspended", text, "alarm", about=ranger, ranger=ranger)
+            self._event_log.tell("ranger-suspended", text, "alarm", about=ranger, ranger=ranger)
         return not self.suspensions.resting(ranger, "", now)
 
     def _weigh(self, answered: AnsweredShot) -> None:
@@ -212,14 +212,14 @@ class Firing:
         if shot.amplitude < WEAK * level:
             line, share = f"{shot.ranger} {shot.target}", 100.0 * shot.amplitude / level
             text = f"{line}: return {shot.amplitude:.3f} V, {share:.0f} % of usual: dew, or partly in the way"
-            self._herald.tell("weak-return", text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+            self._event_log.tell("weak-return", text, "warning", about=line, ranger=shot.ranger, target=shot.target)
 
     def _line_failed(self, ranger: str, target: str, how: str, records: Suspensions | None = None) -> None:
         rest = (records or self.suspensions).failed(ranger, target, ticks_now(self._clock))
         if rest is not None:
             line = f"{ranger} {target}"
             text = f"{line} is {how} again and again: left alone for {rest:g} s"
-            self._herald.tell("line-suspended", text, "warning", about=line, ranger=ranger, target=target)
+            self._event_log.tell("line-suspended", text, "warning", about=line, ranger=ranger, target=target)
 
     def _aim(self, ranger: str, target: str) -> PlannedShot:
         """A shot as soon as it can be, on where the target is predicted; on the feed arm, where the records have it."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution, SentCommand
 from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
 from catseye.errors import CatseyeError, InputError
@@ -31,7 +31,7 @@ class Intake:
 
     judged     called with each shot and what the reduction said of it, at once
     publish    called with each entry when it is durable
-    herald     says what goes wrong with the journal; that itself is journalled when it can be
+    event_log     says what goes wrong with the journal; that itself is journalled when it can be
     doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
     solver     solves an epoch beside the loop; None: in a thread
 
@@ -45,13 +45,13 @@ class Intake:
         *,
         judged: Callable[[AnsweredShot], None],
         publish: Callable[[Entry], None],
-        herald: Herald,
+        event_log: EventLog,
         doubted: Callable[[LiveWeather, str], None] = lambda read, why: None,
         solver: Solver | None = None,
     ):
         self._solver = solver or _in_a_thread
         self.broken: asyncio.Future[None] | None = None
-        self._live, self._journal, self._herald = live, journal, herald
+        self._live, self._journal, self._event_log = live, journal, event_log
         self._judged, self._publish, self._doubted = judged, publish, doubted
         self._arrived: list[Entry] = []
         self._timer: asyncio.TimerHandle | None = None
@@ -113,7 +113,7 @@ class Intake:
             return None
         job = self._live.begin(ticks)
         if job is None:
-            self._herald.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "warning")
+            self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "warning")
             return None
         self._fresh, self._solving = 0, True
         self._write((Document(ticks, EPOCH_BEGUN, ""),))
@@ -125,7 +125,7 @@ class Intake:
         answer = self._live.take_in(job, found)
         self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
-            self._herald.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
+            self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
         return answer
 
     def _fed(self, item: Any) -> Entry | None:
@@ -142,7 +142,7 @@ class Intake:
         last = self._last.get(shot.ranger, -1)
         if shot.ticks <= last:  # a clock that was set back; a journal has each shot once
             text = f"{shot.ranger}: a shot's stamp is {last - shot.ticks} ticks before the last one's: not used"
-            self._herald.tell("stamp-not-later", text, "warning", about=shot.ranger)
+            self._event_log.tell("stamp-not-later", text, "warning", about=shot.ranger)
             return None
         self._last[shot.ranger] = shot.ticks
         self.numbered += 1
@@ -181,7 +181,7 @@ class Intake:
             self._late.append(entries)
             self._away(str(problem))
         else:
-            self._herald.tell("not-journalled", f"the journal refused {len(entries)} entries: {problem}", "alarm")
+            self._event_log.tell("not-journalled", f"the journal refused {len(entries)} entries: {problem}", "alarm")
 
     def _acknowledge(self, entries: tuple[Entry, ...]) -> None:
         for entry in entries:
@@ -194,7 +194,7 @@ class Intake:
             self._acknowledge(entries)
 
     def _away(self, why: str) -> None:
-        self._herald.standing("journal-away", f"{why}: measuring stops", "alarm")
+        self._event_log.standing("journal-away", f"{why}: measuring stops", "alarm")
         self._see_to_journal()
 
     def _see_to_journal(self) -> None:
@@ -220,7 +220,7 @@ class Intake:
         self._acknowledge_late()
         self._send()
         if self.trouble is None:
-            self._herald.standing("journal-away", None, over="the journal is back: measuring goes on")
+            self._event_log.standing("journal-away", None, over="the journal is back: measuring goes on")
         else:
             self._see_to_journal()
 

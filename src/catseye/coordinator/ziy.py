@@ -10,10 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
-from catseye.coordinator.guard.vigil import Vigil
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.guard.watchdog import BeamWatchdog
 from catseye.coordinator.intake import Entry, Intake, Solver
 from catseye.coordinator.link.decode import measurement_of, shot_of
 from catseye.coordinator.link.ranger import RangerLink
@@ -91,14 +91,14 @@ class Coordinator:
         self._live, self._planner, self._journal = live, planner, journal
         self._guard = guard
         self.listeners: list[Callable[[Entry], None]] = []
-        self._herald = Herald("coordinator", clock, self._happened)
-        self._stations: dict[str, Herald] = {}
+        self._event_log = EventLog("coordinator", clock, self._happened)
+        self._stations: dict[str, EventLog] = {}
         self.intake = Intake(
             live,
             journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
-            herald=Herald("journal", clock, self._happened),
+            event_log=EventLog("journal", clock, self._happened),
             doubted=self._doubted,
             solver=solver,
         )
@@ -127,7 +127,7 @@ class Coordinator:
             self.links,
             intake=self.intake,
             live=live,
-            herald=self._herald,
+            event_log=self._event_log,
             clock=clock,
             allowed=lambda: self.mode == "active" and self.intake.trouble is None,
             telescope_known=lambda: self.telescope_known,
@@ -158,7 +158,7 @@ class Coordinator:
 
     async def run(self) -> None:
         """Measure until cancelled; then lasers off that were switched on here, and the journal closed, within 5 s."""
-        self._herald.tell(
+        self._event_log.tell(
             "started", f"coordinator of {self.site.site.campaign.name}, {len(self.links)} rangers, {self.mode}"
         )
         for name, link in self.links.items():
@@ -167,7 +167,9 @@ class Coordinator:
             self._spawn(self.feed.run(), "feed")
         if self._script is not None:
             self._spawn(play(self._script, self.clock, self._posed, self.settings.posture_every), "script")
-        self._spawn(Vigil(self.links, self._guard, clock=self.clock, herald=self._herald).run(), "vigil")
+        self._spawn(
+            BeamWatchdog(self.links, self._guard, clock=self.clock, event_log=self._event_log).run(), "watchdog"
+        )
         self._spawn(self._rounds(), "rounds")
         self.firing.broken, self.intake.broken = (asyncio.get_running_loop().create_future() for _ in range(2))
         try:
@@ -195,7 +197,7 @@ class Coordinator:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._herald.tell("stopped", f"{self.intake.numbered} shots, {self.intake.acknowledged} acknowledged")
+        self._event_log.tell("stopped", f"{self.intake.numbered} shots, {self.intake.acknowledged} acknowledged")
         self.intake.flush()
         with suppress(InputError):  # what could not be written has been told
             await asyncio.to_thread(self._journal.close)
@@ -236,7 +238,7 @@ class Coordinator:
         try:
             return self._planner.round(state)
         except CatseyeError as problem:
-            self._herald.tell("not-planned", f"no round could be planned: {problem}", "alarm")
+            self._event_log.tell("not-planned", f"no round could be planned: {problem}", "alarm")
             return None
 
     def state(self, now: int) -> SiteState | None:
@@ -276,8 +278,8 @@ class Coordinator:
 
     def _doubted(self, read: LiveWeather, why: str) -> None:
         """What the reduction thinks of a station's reading."""
-        herald = self._stations.setdefault(read.station, Herald(read.station, self.clock, self._happened))
-        herald.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
+        event_log = self._stations.setdefault(read.station, EventLog(read.station, self.clock, self._happened))
+        event_log.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
         """Another client's shot, in passive mode."""
@@ -287,7 +289,7 @@ class Coordinator:
             found = measurement_of(reply)
             self.intake.take(shot_of(link.ranger, link.names.get(found.cube, found.name), found, None, link.sampling))
         except InputError as problem:
-            self._herald.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
+            self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 
     def _happened(self, happening: Happening) -> None:
         self.intake.take(happening)
@@ -303,21 +305,21 @@ class Coordinator:
         self.mode = mode
         for name, link in self.links.items():
             link.wanted = "hold" if name in self.firing.dropped and mode == "active" else WANTED[mode]
-        self._herald.tell("mode", f"mode is {mode}", always=True)
+        self._event_log.tell("mode", f"mode is {mode}", always=True)
 
     def drop(self, ranger: str) -> None:
         """Leave a ranger out; it stays connected. Raises InputError: no such ranger."""
         self._known(ranger)
         self.firing.dropped.add(ranger)
         self.links[ranger].wanted = "hold" if self.mode == "active" else WANTED[self.mode]
-        self._herald.tell("dropped", f"{ranger} is left out on purpose", always=True, ranger=ranger)
+        self._event_log.tell("dropped", f"{ranger} is left out on purpose", always=True, ranger=ranger)
 
     def take(self, ranger: str) -> None:
         """Use a ranger again. Raises InputError: no such ranger."""
         self._known(ranger)
         self.firing.dropped.discard(ranger)
         self.links[ranger].wanted = WANTED[self.mode]
-        self._herald.tell("taken", f"{ranger} is used again", always=True, ranger=ranger)
+        self._event_log.tell("taken", f"{ranger} is used again", always=True, ranger=ranger)
 
     def stream(self, ranger: str, target: str | None) -> None:
         """Have a ranger measure one target again and again; None ends it. Raises InputError: not known."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.link.clock_watch import LONGEST_TRIP, ClockWatch
 from catseye.coordinator.parts import TICKS_PER_SECOND, ticks_now
 from catseye.simulator.clock.world_clock import ManualClock
@@ -13,7 +13,7 @@ LIMIT = 0.002  # s
 @pytest.fixture
 def watched():
     clock, happenings = ManualClock(60_000.1), []
-    return ClockWatch(clock, Herald("ZY101", clock, happenings.append), LIMIT), clock, happenings
+    return ClockWatch(clock, EventLog("ZY101", clock, happenings.append), LIMIT), clock, happenings
 
 
 def stamp(clock, seconds):

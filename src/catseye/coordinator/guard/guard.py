@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.guard.memory import Memory
-from catseye.coordinator.guard.resting import AHEAD, Alarm, in_words, resting
+from catseye.coordinator.guard.parked import AHEAD, Alarm, in_words, parked_alarms
 from catseye.coordinator.plan.candidates import leaves
 from catseye.coordinator.visibility.surroundings import PERHAPS, SUN, KeepClear, Surroundings, instants, later
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between, vantages_of
@@ -147,7 +147,7 @@ class SafetyGuard:
         """
         alarms: list[Alarm] = []
         for name in sorted(counts):
-            alarms += resting(self.keep_clear, self.vantages[name], counts[name], now_ticks, self._posture)
+            alarms += parked_alarms(self.keep_clear, self.vantages[name], counts[name], now_ticks, self._posture)
             for each in self.interlocks:
                 within = self._opens(each, name, now_ticks, AHEAD)
                 if within is not None and "shine" in each.forbids and self._memory[name].shining:

@@ -11,10 +11,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import SentCommand
 from catseye.coordinator.link.clock_watch import ClockWatch
-from catseye.coordinator.link.greeting import Greeting, first_of
+from catseye.coordinator.link.handshake import Handshake, first_of
 from catseye.coordinator.link.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
 from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.link.shooting import Shooter
@@ -77,14 +77,14 @@ class RangerLink:
         self.round_trip = float("nan")
         self._guard, self._clock, self._heard_by, self._commanded = guard, clock, heard, commanded
         self.settings = settings or LinkSettings()
-        self._herald = Herald(ranger, clock, tell)
-        self._shooter = Shooter(self, self._herald, clock)
-        self._status = StatusWatch(ranger, self._herald, self._restarted)
-        self._watch = ClockWatch(clock, self._herald, self.settings.clock_limit)
+        self._event_log = EventLog(ranger, clock, tell)
+        self._shooter = Shooter(self, self._event_log, clock)
+        self._status = StatusWatch(ranger, self._event_log, self._restarted)
+        self._watch = ClockWatch(clock, self._event_log, self.settings.clock_limit)
         self._rng = random.Random(f"{seed} {ranger}")
         self._network = {} if network is None else {"network": network}
         self._client: ZyClient | None = None
-        self._greeting = Greeting()
+        self._handshake = Handshake()
         self._doubt = asyncio.Event()
         self._probed_at = 0.0
         self._heard_at = 0.0
@@ -104,7 +104,7 @@ class RangerLink:
     @property
     def troubles(self) -> tuple[str, ...]:
         """What is wrong with it and lasts."""
-        return self._herald.standings
+        return self._event_log.standings
 
     @property
     def ready(self) -> bool:
@@ -122,7 +122,7 @@ class RangerLink:
             if self._left:
                 return
             self.state, self._client, self._shooter.aimed = "down", None, None
-            self._herald.standing("lost", f"{self.ranger}: {why}; trying again", "warning")
+            self._event_log.standing("lost", f"{self.ranger}: {why}; trying again", "warning")
             if self._was_ready:
                 wait = self.settings.first_wait
             await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
@@ -141,7 +141,7 @@ class RangerLink:
         if client is None:
             return why
         self.state = "connected"
-        self._herald.standing("lost", None, over=f"{self.ranger} is connected")
+        self._event_log.standing("lost", None, over=f"{self.ranger} is connected")
         try:
             return await self._supervise(client)
         finally:
@@ -151,7 +151,7 @@ class RangerLink:
     async def _connect(self, port: int, first_tid: int) -> str | None:
         """Connect and be greeted by the right ranger; what was wrong."""
         loop, limit = asyncio.get_running_loop(), self.settings.probe_timeout
-        self._greeting = Greeting()
+        self._handshake = Handshake()
         try:
             async with asyncio.timeout(limit):
                 client = await ZyClient.connect(
@@ -163,14 +163,14 @@ class RangerLink:
             return f"{self.address.host} port {port} does not answer within {limit:g} s"
         said: str | None = "given up"
         try:
-            said = await self._greeting.verdict(self.ranger, port, client.closed, limit)
+            said = await self._handshake.verdict(self.ranger, port, client.closed, limit)
         finally:
             if said is not None:
                 client.close()
         if said is None:
             self._client = client
-        elif self._greeting.stranger:
-            self._herald.tell("wrong-ranger", said, "alarm")
+        elif self._handshake.stranger:
+            self._event_log.tell("wrong-ranger", said, "alarm")
         return said
 
     async def _supervise(self, client: ZyClient) -> str:
@@ -207,7 +207,7 @@ class RangerLink:
         self._was_ready = self._was_ready or self.wanted != "measure"
         limit = self.settings.slow
         slow = f"a round trip takes {self.round_trip:.2f} s (limit {limit:g} s)" if self.round_trip > limit else None
-        self._herald.standing("slow", slow, over=f"a round trip takes {self.round_trip:.3f} s again")
+        self._event_log.standing("slow", slow, over=f"a round trip takes {self.round_trip:.3f} s again")
         right = self._watch.look(reply.ticks, self.round_trip)
         if self.wanted == "measure" and (idle or not self.busy):
             if right is not None:
@@ -235,14 +235,14 @@ class RangerLink:
             if self.connected:
                 kind = problem.kind if isinstance(problem, Refused) else "not-initialised"
                 text = f"{self.ranger}: {problem}; again in {self._patience:g} s"
-                self._herald.tell(kind, text, "warning")
+                self._event_log.tell(kind, text, "warning")
                 await first_of(client.closed, self._doubt, self._patience)
                 self._patience = min(2.0 * self._patience, LONGEST_PATIENCE)
             return
         if self.state == "preparing" and self.connected:
             self.state, self._was_ready, self._patience = "ready", True, self.settings.probe_every
             what = "made ready" if sent else "was ready still"
-            self._herald.tell("ready", f"{self.ranger} {what} in {loop.time() - began:.1f} s", always=True)
+            self._event_log.tell("ready", f"{self.ranger} {what} in {loop.time() - began:.1f} s", always=True)
 
     def _teach_guard(self) -> None:
         """What the ranger knows already the guard must know, too, to understand CIL n."""
@@ -302,7 +302,7 @@ class RangerLink:
             self._doubt.set()
             if command != "VER":
                 text = f"{self.ranger} did not answer {command} within {timeout:.1f} s"
-                self._herald.tell("no-reply", text, "warning", about=command)
+                self._event_log.tell("no-reply", text, "warning", about=command)
             return Reply(command, False, ("no reply",), tid, None)
         self._guard.heard(self.ranger, reply)
         return reply
@@ -313,11 +313,11 @@ class RangerLink:
         if self._shooter.hears(reply):
             return
         self._guard.heard(self.ranger, reply)
-        self._greeting.hear(reply)
+        self._handshake.hear(reply)
         if reply.command == "STW" and reply.ok is True:
             self._status.hear(reply.text)
         elif reply.command == "SUN" and reply.ok is False:
-            self._herald.tell("sun", f"{self.ranger}: {reply.text[:160]}", "alarm")
+            self._event_log.tell("sun", f"{self.ranger}: {reply.text[:160]}", "alarm")
             self._shooter.aimed = None
         elif reply.command in MOVERS:
             self._shooter.aimed = None
@@ -328,7 +328,7 @@ class RangerLink:
         if self.state == "ready":
             self.state, self._shooter.aimed = "connected", None
             self._doubt.set()
-            self._herald.tell("restarted", text, "warning", always=True)
+            self._event_log.tell("restarted", text, "warning", always=True)
 
     async def fire(self, planned: PlannedShot) -> LiveShot | None:
         """One shot; None where it failed, which has been told."""
@@ -379,6 +379,8 @@ class RangerLink:
         self._left = True
         if self._client is not None and not self._client.closed.done():
             if self._lit_here and (await self._ask(Request("PS", ("0",)), timeout)).ok is not True:
-                self._herald.tell("laser-left-on", f"{self.ranger} did not answer PS 0: its laser may shine", "alarm")
+                self._event_log.tell(
+                    "laser-left-on", f"{self.ranger} did not answer PS 0: its laser may shine", "alarm"
+                )
             self._client.close("the coordinator leaves")
         self._lit_here = False

@@ -7,7 +7,7 @@ from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing, suppress
 from dataclasses import dataclass
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.link.decode import BufferRead, Measurement, buffer_of, measurement_of, reals_of, shot_of
 from catseye.coordinator.link.preparation import Refused
 from catseye.coordinator.link.wire import Sent, Wire
@@ -47,8 +47,8 @@ class Shooter:
     `aimed` is the cube that the mirror rests on, None where it is not known or the mirror follows one.
     """
 
-    def __init__(self, link: Wire, herald: Herald, clock: Clock):
-        self._link, self._herald, self._clock = link, herald, clock
+    def __init__(self, link: Wire, event_log: EventLog, clock: Clock):
+        self._link, self._event_log, self._clock = link, event_log, clock
         self.aimed: int | None = None
         self._before: PlannedShot | None = None
         self._stream: int | None = None  # TID of the stream that runs
@@ -72,7 +72,7 @@ class Shooter:
             if link.connected:  # a connection that is gone has been told
                 kind = problem.kind if isinstance(problem, Refused) else "bad-shot"
                 text = f"{link.ranger} {planned.target}: {problem}"
-                self._herald.tell(kind, text, "warning", about=planned.target, target=planned.target)
+                self._event_log.tell(kind, text, "warning", about=planned.target, target=planned.target)
         return came
 
     async def _one_by_one(self, planned: PlannedShot, begin: int | None, count: int) -> AsyncGenerator[LiveShot, None]:
@@ -131,7 +131,7 @@ class Shooter:
             reply = await self._link.sure(Request("CIL", ("0",)), self._link.settings.move_timeout)
             self._pointed(reply)
         except InputError as problem:
-            self._herald.tell("not-parked", f"{self._link.ranger}: {problem}", "warning")
+            self._event_log.tell("not-parked", f"{self._link.ranger}: {problem}", "warning")
             return False
         self.aimed = 0
         return True
@@ -235,7 +235,7 @@ class Shooter:
         """
         if reply.ok is not True:
             text = f"{self._link.ranger}: BUF: {reply.text[:120]}; its own amplitude and phase are taken"
-            self._herald.tell("no-buffer", text, "warning")
+            self._event_log.tell("no-buffer", text, "warning")
             return None
         read = buffer_of(reply)
         if read.ticks != ticks or read.cube != cube:

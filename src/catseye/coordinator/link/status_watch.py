@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.ranger.status import StatusWord
 
 NEEDED = StatusWord.INITIALISED | StatusWord.AZIMUTH_HOMED | StatusWord.ELEVATION_HOMED | StatusWord.AUTO
@@ -14,8 +14,8 @@ class StatusWatch:
     lost   called when it cannot measure any more as it is: home or geometry gone
     """
 
-    def __init__(self, ranger: str, herald: Herald, lost: Callable[[str], None]):
-        self.ranger, self._herald, self._lost = ranger, herald, lost
+    def __init__(self, ranger: str, event_log: EventLog, lost: Callable[[str], None]):
+        self.ranger, self._event_log, self._lost = ranger, event_log, lost
         self.word = StatusWord(0)
 
     def hear(self, text: str) -> None:
@@ -23,18 +23,18 @@ class StatusWatch:
         try:
             word = StatusWord(int(text[:12], 16) & 0xFFFFFFFF)
         except ValueError:
-            self._herald.tell("bad-line", f"{self.ranger}: STW {text[:20]!a} is no status word", "warning")
+            self._event_log.tell("bad-line", f"{self.ranger}: STW {text[:20]!a} is no status word", "warning")
             return
         before, self.word = self.word, word
         for axis, bit in enumerate((StatusWord.AZIMUTH_OFF, StatusWord.ELEVATION_OFF)):
             text = f"the motor of axis {axis} went off: position error past its limit (see whether it turns freely)"
-            self._herald.standing(
+            self._event_log.standing(
                 f"motor-off-{axis}", text if word & bit else None, over=f"the motor of axis {axis} is on"
             )
         free = "its clock has no time signal" if word & StatusWord.CLOCK_FREE else None
-        self._herald.standing("clock-free", free, over="its clock follows the time signal")
+        self._event_log.standing("clock-free", free, over="its clock follows the time signal")
         if word & StatusWord.CLIPPED and not before & StatusWord.CLIPPED:
-            self._herald.tell(
+            self._event_log.tell(
                 "saturated", "its converter is at its ends (weaken the return, see the amplifier)", "warning"
             )
         if NEEDED & ~word:

@@ -1,1 +1,1 @@
-"""What to shoot next: candidates, their value, a tour."""
+"""What to shoot next: candidates, their value, a raster."""

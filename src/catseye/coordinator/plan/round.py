@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from catseye.coordinator.parts import PlannedShot, Round, SiteState
 from catseye.coordinator.plan.candidates import ShotCandidates, candidates
 from catseye.coordinator.plan.places import ChosenTarget, Places
-from catseye.coordinator.plan.tour import Tour
+from catseye.coordinator.plan.raster import DishRaster
 from catseye.coordinator.plan.value import SIGMA, Knowledge
 from catseye.coordinator.visibility.sights import VisibleSights
 from catseye.coordinator.visibility.surroundings import FREE, PERHAPS, KeepClear, Surroundings, instants, later
@@ -115,8 +115,8 @@ class RoundPlanner:
         seen = self._sights.at(Places.nominal(site)).targets
         riders = [v for v in self.vantages.values() if v.frame == "reflector"]
         in_dish = {r.name for r in dish}
-        self.tours = {
-            v.name: Tour(v, tuple(self.retros[n] for n in seen.get(v.name, ()) if n in in_dish)) for v in riders
+        self.rasters = {
+            v.name: DishRaster(v, tuple(self.retros[n] for n in seen.get(v.name, ()) if n in in_dish)) for v in riders
         }
         self._in_dish, self._started = in_dish, False
         self._visited: set[str] = set()
@@ -146,7 +146,7 @@ class RoundPlanner:
             self._due(turn, state, begin)
         self._by_worth(turns, know)
         for turn in turns.values():
-            if turn.vantage.name in self.tours:
+            if turn.vantage.name in self.rasters:
                 unseen.update(self._dish(turn, places, state))
         shots: dict[str, tuple[PlannedShot, ...]] = {
             name: places.shots(turn.vantage, turn.chosen, s.duration) for name, turn in turns.items()
@@ -165,13 +165,13 @@ class RoundPlanner:
 
         A new lap begins when all that the rangers at hand can see are visited.
         """
-        at_hand = [tour for name, tour in self.tours.items() if name in ready]
-        if self._visited.issuperset(n for tour in at_hand for n in tour.names):
+        at_hand = [raster for name, raster in self.rasters.items() if name in ready]
+        if self._visited.issuperset(n for raster in at_hand for n in raster.names):
             self._visited.clear()
         if self._started:
             return
-        for k, tour in enumerate(self.tours.values()):
-            tour.begin((k / len(self.tours) + (ticks % HOUR_TICKS) / HOUR_TICKS) % 1.0)
+        for k, raster in enumerate(self.rasters.values()):
+            raster.begin((k / len(self.rasters) + (ticks % HOUR_TICKS) / HOUR_TICKS) % 1.0)
         self._started = True
 
     def _wanted(self, vantage: Vantage, seen: tuple[str, ...], state: SiteState) -> tuple[str, ...]:
@@ -204,7 +204,7 @@ class RoundPlanner:
         variance = np.full(len(points), s.sigma**2)
         if own is not None:
             variance = variance + np.einsum("mi,ij,mj->m", table.units, own, table.units)
-        share = 1.0 - s.dish_share if vantage.name in self.tours and self.tours[vantage.name].names else 1.0
+        share = 1.0 - s.dish_share if vantage.name in self.rasters and self.rasters[vantage.name].names else 1.0
         counted = np.array([n in self.retros and self.retros[n].part != "benchmark" for n in table.names])
         return _Turn(vantage, around, table, points, variance, share * s.period, counted, counted.copy()), why
 
@@ -279,8 +279,8 @@ class RoundPlanner:
         s, name = self.settings, turn.vantage.name
         left = frozenset(t for r, t in state.suspended if r == name)
         here = turn.table.middle[turn.row]
-        tour = self.tours[name]
-        chosen, why = tour.stretch(
+        raster = self.rasters[name]
+        chosen, why = raster.stretch(
             here,
             s.period - turn.at,
             turn.around,
@@ -289,9 +289,9 @@ class RoundPlanner:
             left_alone=left,
             visited=self._visited,
         )
-        self._visited.update(tour.names[i] for i, _ in chosen)
+        self._visited.update(raster.names[i] for i, _ in chosen)
         turn.chosen += [
-            ChosenTarget(tour.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen
+            ChosenTarget(raster.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen
         ]
         return {(name, target): text for target, text in why.items()}
 

@@ -8,7 +8,7 @@ from catseye.ranger.line import Reply
 LINES = frozenset(["HELLO", "CONNECT", "STW"])
 
 
-class Greeting:
+class Handshake:
     """Of one new connection; `stranger` where another ranger answered."""
 
     def __init__(self) -> None:

@@ -15,7 +15,7 @@ class _Said:
     unsaid: int = 0
 
 
-class Herald:
+class EventLog:
     """What one of the coordinator's parts has to say.
 
     who     a ranger, "telescope", "feed" ...

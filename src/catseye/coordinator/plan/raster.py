@@ -13,7 +13,7 @@ WINDOW = 120  # prisms looked at in a round
 MOST_PASSED = 12  # of them, before the rest waits for the next round
 
 
-class Tour:
+class DishRaster:
     """One ranger's way over the prisms that it sees.
 
     vantage   of the ranger, on the feed arm

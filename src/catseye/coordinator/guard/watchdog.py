@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
 
-from catseye.coordinator.herald import Herald
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.link.ranger import RangerLink
 from catseye.coordinator.parts import Clock, SafetyGuard, ticks_now
 from catseye.errors import InputError
@@ -15,11 +15,11 @@ SUN_EVERY = 5.0  # s: a ranger of the feed arm refuses to move by a vector older
 ACT_WITHIN = 60.0  # s: what comes later is told, and the next shot will have moved the mirror
 
 
-class Vigil:
+class BeamWatchdog:
     """Of all links; it acts only on those that measure, and never while a shot is under way."""
 
-    def __init__(self, links: Mapping[str, RangerLink], guard: SafetyGuard, *, clock: Clock, herald: Herald):
-        self._links, self._guard, self._clock, self._herald = links, guard, clock, herald
+    def __init__(self, links: Mapping[str, RangerLink], guard: SafetyGuard, *, clock: Clock, event_log: EventLog):
+        self._links, self._guard, self._clock, self._event_log = links, guard, clock, event_log
 
     async def run(self) -> None:
         """Watch all beams until cancelled."""
@@ -44,7 +44,7 @@ class Vigil:
             for alarm in self._guard.watch(ticks_now(self._clock), known):
                 severity: Severity = "alarm" if alarm.within < ACT_WITHIN else "warning"
                 about = f"{alarm.ranger} {alarm.remedy}"
-                self._herald.tell(f"{alarm.cause}-comes", alarm.text, severity, about=about, ranger=alarm.ranger)
+                self._event_log.tell(f"{alarm.cause}-comes", alarm.text, severity, about=about, ranger=alarm.ranger)
                 if alarm.within < ACT_WITHIN and self._links[alarm.ranger].ready:
                     await self._act(self._links[alarm.ranger], alarm.remedy)
             await asyncio.sleep(EVERY)
