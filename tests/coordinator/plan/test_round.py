@@ -118,12 +118,15 @@ def test_references_and_benchmarks_come_in_their_time():
     planner = RoundPlanner(gbt())
     bench = {b.ranger: b.target for b in gbt().benchmarks}
     shot = {name: [] for name in gbt().rangers}
+    due = {name: [] for name in bench}
     since = {}
     for k in range(26):
         now = NIGHT + round(10.0 * k / TICK_SECONDS)
         planned = planner.round(state(now, since_reference=dict(since)))
         for name, shots in planned.shots.items():
             shot[name].append([s.target for s in shots])
+            if any(s.reason.startswith("benchmark") for s in shots):
+                due[name].append(k)
             since[name] = 10.0 if "ZRG" in shot[name][-1] else since.get(name, np.inf) + 10.0
     for name, rounds in shot.items():
         at = [k for k, names in enumerate(rounds) if "ZRG" in names]
@@ -135,6 +138,7 @@ def test_references_and_benchmarks_come_in_their_time():
             assert at[0] == 0
             assert np.all(np.diff([*at, 26]) <= 12)  # 120 s
             assert len(at) <= 3
+            assert np.diff(due[name]).max() <= 11, "by the end of the next round it would be older than 120 s"
         else:
             assert not any(t.startswith("ZBM") for names in rounds for t in names)
 
