@@ -113,11 +113,12 @@ def leverage(seed):
 def test_a_wrong_range_of_six_that_pulls_hard_is_found(error):
     alone = cases = 0
     for seed in range(20):
-        _, redundancy = leverage(seed)
-        for s, k in np.argwhere((redundancy > 0.06) & (redundancy < 0.2)):
+        field, redundancy = leverage(seed)
+        hard = np.argwhere((redundancy > 0.06) & (redundancy < 0.2))
+        if len(hard) and field.left_out(field.adjusted()):
+            continue  # one good range in 2000 looks wrong
+        for s, k in hard:
             field, _ = leverage(seed)
-            if field.left_out(field.adjusted()):
-                continue  # one good range in 2000 looks wrong
             field.observed[s][k] += error
             out = field.left_out(field.adjusted().require_converged())
             assert (s, k) in out
@@ -302,7 +303,7 @@ def test_the_cost_is_the_sum_of_squares_at_the_best_place():
 # it always ends
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=settings.default.max_examples // 5)  # 20, and 60 in `make test-all`
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(3, 6),
