@@ -17,7 +17,7 @@ from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.robustness import WEIGHTS, _Rows, estimate_robustly, snoop
 from draws import draws, same_sigmas
 
-quick = settings(deadline=None, max_examples=25)
+quick = settings(max_examples=settings.default.max_examples // 12)  # 8, and 25 in `make test-all`
 
 
 def fit_of(residual, sigma, inflation, spread):
