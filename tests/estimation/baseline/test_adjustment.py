@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import EstimationError
@@ -269,6 +269,7 @@ def test_known_uncertainties_have_no_degrees_of_freedom():
     assert adjust_baseline(s, SEVEN, np.zeros(7), noise=TINY).freedom_of("zero") == np.inf
 
 
+@settings(max_examples=settings.default.max_examples // 3)  # 33, and 100 in `make test-all`
 @given(st.permutations(range(7)))
 def test_places_follow_from_distances_in_any_numbering(order):
     order = np.array(order)

@@ -115,7 +115,7 @@ def test_tests_are_scipys_and_power_is_that_of_the_tables():
         pooled_variance_factor((1.0, 0.0), (1.0, 5.0))
 
 
-@draws(400)
+@draws(400, 200)
 @pytest.mark.parametrize("turned", [False, True])
 def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turned, runs):
     """Each epoch held in a way of its own, the second in other axes: inner constraints on five points, by hand."""

@@ -95,11 +95,12 @@ def test_the_detectable_displacement_is_detected_with_its_power(single, runs):
         np.testing.assert_allclose(size, moved_points(empty).detectable)
 
 
+@draws(40)
 @pytest.mark.parametrize("rule", ["global", "local"])
 @pytest.mark.parametrize("moved", [1, 2, 3])
-def test_planted_movements_of_one_to_three_points_are_found(moved, rule):
+def test_planted_movements_of_one_to_three_points_are_found(moved, rule, runs):
     rng = np.random.default_rng([7, moved])
-    right, runs = 0, 40
+    right = 0
     size = detectable_displacement(FIELD.epochs((np.zeros(len(FIELD.design)),) * 2))[0].max()
     for _ in range(runs):
         which = rng.choice(9, moved, replace=False)

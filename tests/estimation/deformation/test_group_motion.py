@@ -63,7 +63,7 @@ def test_the_tests_of_a_group_are_sums_of_squares_of_joint_adjustments():
     np.testing.assert_allclose(found.motion.p, stats.chi2.sf(found.motion.pvv, 6))
 
 
-@draws(400)
+@draws(400, 200)
 def test_the_covariance_of_group_motion_holds_and_its_strain_test_keeps_its_level(runs):
     rng = np.random.default_rng(13)
     true = group_movement([1e-4, 0, 0], [0, 0, 1e-6], np.zeros((3, 3)))

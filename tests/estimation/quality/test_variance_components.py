@@ -275,7 +275,7 @@ def test_components_scatter_about_the_truth_as_they_claim_in_a_thousand_draws():
     assert z.std(axis=0).min() > 0.6
 
 
-@draws(150)
+@draws(150, 100)
 def test_factors_of_groups_scatter_about_the_truth_as_they_claim(runs):
     rng = np.random.default_rng(17)
     sizes, dense, roots = correlated_groups(rng)
