@@ -35,7 +35,7 @@ def test_air_that_thins_at_half_a_degree_a_hundred_metres_has_the_surveyors_coef
     assert bending.curvature(bending.index_gradient(-1.0)) < 0.0  # hot ground: convex to it
 
 
-@settings(max_examples=12)
+@settings(max_examples=settings.default.max_examples // 25)  # 4, and 12 in `make test-all`
 @given(st.floats(-3e-6, 3e-6).filter(lambda g: abs(g) > 1e-9), st.floats(10.0, 400.0), st.floats(-0.5, 1.0))
 def test_closed_forms_are_the_rays_of_even_gradients(g, d, elevation):
     air = layered(lambda z: (2.6e-4 + g * z, g + 0 * z))

@@ -105,7 +105,7 @@ def by_difference(group, x, step=1e-3):
 
 
 @pytest.mark.parametrize("which", range(len(NAMES)), ids=NAMES)
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=settings.default.max_examples // 25)  # 4, and 12 in `make test-all`
 @given(seed=seeds)
 def test_derivatives_are_those_of_the_values(which, seed):
     made, x = groups(seed)

@@ -11,7 +11,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
 from catseye.estimation.quality import reliability as r
 
-quick = settings(deadline=None, max_examples=60)
+quick = settings(max_examples=settings.default.max_examples // 5)  # 20, and 60 in `make test-all`
 levels = st.floats(1e-4, 0.2)
 
 

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.stats import chi2, kstest
@@ -142,6 +142,7 @@ def test_the_status_in_words_says_what_and_how_much():
         got.require_found()
 
 
+@settings(max_examples=settings.default.max_examples // 3)  # 33, and 100 in `make test-all`
 @given(seeds)
 def test_near_takes_the_image_on_its_side_of_coplanar_stations(seed):
     rng = np.random.default_rng(seed)
