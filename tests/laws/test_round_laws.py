@@ -188,12 +188,11 @@ def test_the_walk_finds_a_sun_of_another_longitude():
     assert planned_violations(np.random.default_rng(605), 8, RoundPlanner(gbt(), keep_clear=wrong))[0] > 3
 
 
-def near_the_sun(rng, name, ticks, own, n):
+def near_the_sun(rng, name, ticks, own, sun, n):
     """Counts (n, 2) between the stops, half of them about where the mirror would look into the Sun."""
     v = stands()[name]
     zero = v.station.zeros[1]
     c = np.stack([rng.uniform(*v.stops, n), zero + rng.uniform(2_000, 23_000, n)], axis=-1)
-    sun = astropy_sun(np.array([ticks / DAY]))[0]
     if v.frame == "reflector":
         sun = sun @ axes(own, ticks)
     at = v.look(v.station.scan_point + 100.0 * sun)
@@ -214,9 +213,9 @@ def test_no_move_that_the_guard_lets_pass_comes_into_the_sun_or_a_box(times):
     for ticks in day_times(rng, times):
         own = posture_of(rng, ticks)
         guard.telescope(own)
-        moves = []
+        moves, sun = [], astropy_sun(np.array([ticks / DAY]))[0]
         for name in stands():
-            points = near_the_sun(rng, name, ticks, own, 24)
+            points = near_the_sun(rng, name, ticks, own, sun, 24)
             for here, there in zip(points[:12], points[12:], strict=True):
                 guard.stands(name, tuple(here))
                 request = Request("CIL", ("0", f"{there[0]:.0f}", f"{there[1]:.0f}"))
