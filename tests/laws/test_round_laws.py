@@ -179,13 +179,13 @@ class Blind(KeepClear):
 
 @pytest.mark.parametrize("bug", ["the ranger's own turn", "the boxes", "that the Sun is up", "half of the cone"])
 def test_the_walk_finds_a_planted_bug(bug):
-    sun, box, *_ = planned_violations(np.random.default_rng(604), 8, RoundPlanner(gbt(), keep_clear=Blind(bug)))
+    sun, box, *_ = planned_violations(np.random.default_rng(604), 4, RoundPlanner(gbt(), keep_clear=Blind(bug)))
     assert (box if bug == "the boxes" else sun) > 3
 
 
 def test_the_walk_finds_a_sun_of_another_longitude():
     wrong = clear_of(place=replace(PLACE, longitude=PLACE.longitude + 15 * DEGREE))
-    assert planned_violations(np.random.default_rng(605), 8, RoundPlanner(gbt(), keep_clear=wrong))[0] > 3
+    assert planned_violations(np.random.default_rng(605), 4, RoundPlanner(gbt(), keep_clear=wrong))[0] > 3
 
 
 def near_the_sun(rng, name, ticks, own, sun, n):
@@ -228,7 +228,7 @@ def test_no_move_that_the_guard_lets_pass_comes_into_the_sun_or_a_box(times):
     assert tuple(totals) == (0, 0)
 
 
-@draws(5_000, name="times")
+@draws(5_000, quick=1_000, name="times")
 def test_a_ranger_that_is_lied_to_refuses_every_move_into_the_sun(times):
     """Nobody asks a guard: the moves go straight to a ranger, whose own Sun is all that it has; SUN lies besides."""
     rng = np.random.default_rng(607)
