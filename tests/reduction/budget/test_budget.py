@@ -23,6 +23,7 @@ from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.buffers import inspect_buffers
 from catseye.signal.detection.cycle_scatter import _turned
+from few_scene import with_few_targets
 
 PRISM, BALL, HOLLOW, GROUND = 3, 700, 2, 700  # shots of night-01; 2 is between two feed-arm rangers
 
@@ -475,6 +476,7 @@ def test_what_the_sheet_does_not_say_is_named(night_01, reduced_night_01):
     sheet = night_01.mirror_of("ZY116")
     said = sheet.model_copy(update={"u_cyclic_mm": 0.01, "u_amplitude_to_phase_rad": 0.001})
     told = dataclasses.replace(night_01, mirrors={**night_01.mirrors, sheet.zp: said})
+    told = with_few_targets(told, "DP026")  # that of the shot among them
     assert explain_shot(told, PRISM, draws=0).notes == ()
 
 
