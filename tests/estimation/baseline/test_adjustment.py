@@ -5,14 +5,14 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import EstimationError
 from catseye.estimation.baseline.adjustment import adjust_baseline, places_in_line
 from catseye.estimation.baseline.iso17123 import full_test, is_nothing, same_precision, within_claim
 from catseye.estimation.baseline.model import Claim, Extra, Known, Sights
-from draws import draws, same_sigmas
+from draws import draws, examples, same_sigmas
 
 SEVEN = np.array([0.0, 21.0, 87.0, 160.0, 233.0, 402.0, 598.0])
 PAIRS = np.array(list(combinations(range(7), 2)))
@@ -269,7 +269,7 @@ def test_known_uncertainties_have_no_degrees_of_freedom():
     assert adjust_baseline(s, SEVEN, np.zeros(7), noise=TINY).freedom_of("zero") == np.inf
 
 
-@settings(max_examples=settings.default.max_examples // 3)  # 33, and 100 in `make test-all`
+@examples(100)
 @given(st.permutations(range(7)))
 def test_places_follow_from_distances_in_any_numbering(order):
     order = np.array(order)

@@ -6,13 +6,14 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
 from catseye.estimation.least_squares.conflict import LocalConflict
 from catseye.estimation.least_squares.robust import adjust_robustly
 from catseye.estimation.observations.kinds import Distances, Linear
+from draws import examples
 
 SIGMA = 25e-6  # m
 STATIONS = np.array([[90, 0, 0], [45, 78, 2], [-45, 78, -1], [-90, 0, 1], [-45, -78, 0], [45, -78, 3]], dtype=float)
@@ -306,7 +307,7 @@ def test_the_cost_is_the_sum_of_squares_at_the_best_place():
 # it always ends
 
 
-@settings(max_examples=settings.default.max_examples // 5)  # 20, and 60 in `make test-all`
+@examples(60)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(3, 6),

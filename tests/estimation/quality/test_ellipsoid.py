@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -22,8 +22,9 @@ from catseye.estimation.quality.ellipsoid import (
     relative_covariance,
     weakest_direction,
 )
+from draws import examples
 
-quick = settings(max_examples=settings.default.max_examples // 5)  # 20, and 60 in `make test-all`
+quick = examples(60)
 seeds = st.integers(0, 2**32 - 1)
 
 

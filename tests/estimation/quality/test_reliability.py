@@ -3,15 +3,16 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, Fit
 from catseye.estimation.quality import reliability as r
+from draws import examples
 
-quick = settings(max_examples=settings.default.max_examples // 5)  # 20, and 60 in `make test-all`
+quick = examples(60)
 levels = st.floats(1e-4, 0.2)
 
 

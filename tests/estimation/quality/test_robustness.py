@@ -5,7 +5,7 @@ The solvers here are small and dense, written for these tests; efficiencies are 
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import linprog
@@ -15,9 +15,9 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, Fit, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.robustness import WEIGHTS, _Rows, estimate_robustly, snoop
-from draws import draws, same_sigmas
+from draws import draws, examples, same_sigmas
 
-quick = settings(max_examples=settings.default.max_examples // 12)  # 8, and 25 in `make test-all`
+quick = examples(25)
 
 
 def fit_of(residual, sigma, inflation, spread):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.network.approximate.start import approximate
@@ -29,12 +29,13 @@ from catseye.estimation.observations.kinds import (
 )
 from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.any_file import read_network
+from draws import examples
 from repository import TESTS
 
 MONITORING = TESTS / "vectors" / "networks" / "monitoring"
 ANGLE = 5e-6  # rad, about one arcsecond
 LENGTH = 1e-3  # m
-FEW = settings(max_examples=settings.default.max_examples // 12)  # 8, and 25 in `make test-all`
+FEW = examples(25)
 
 
 class Survey:

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.stats import chi2, kstest
@@ -14,7 +14,7 @@ from catseye.estimation.network.positions import dispatch as module
 from catseye.estimation.network.positions.descent import CAP, Ranges, descend
 from catseye.estimation.network.positions.dispatch import positions
 from catseye.estimation.network.positions.status import Status
-from draws import draws
+from draws import draws, examples
 from repository import TESTS
 
 NETWORK = TESTS / "vectors" / "networks" / "ranging-18x500"
@@ -142,7 +142,7 @@ def test_the_status_in_words_says_what_and_how_much():
         got.require_found()
 
 
-@settings(max_examples=settings.default.max_examples // 3)  # 33, and 100 in `make test-all`
+@examples(100)
 @given(seeds)
 def test_near_takes_the_image_on_its_side_of_coplanar_stations(seed):
     rng = np.random.default_rng(seed)

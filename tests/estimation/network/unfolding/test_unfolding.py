@@ -10,10 +10,10 @@ from catseye.errors import ValidityError
 from catseye.estimation.network.unfolding.factors import classical_scaling, match_means
 from catseye.estimation.network.unfolding.location import locate
 from catseye.estimation.network.unfolding.unfold import UNFOLDED, unfold
-from draws import draws
+from draws import draws, examples
 
 SIGMA = 1e-3  # m, on figures of 100 m
-FEW = settings(max_examples=settings.default.max_examples // 12)  # 8, and 25 in `make test-all`
+FEW = examples(25)
 
 
 def scene(s, t, seed, *, height=20.0, target_height=1.0):
