@@ -28,11 +28,15 @@ def small_site() -> Path:
     return kept("small-site", write_site)
 
 
+ROUNDS = ("--round-s", "5")  # two epochs in some twelve seconds
+
+
 def recorded() -> Path:
-    """The journal of 24 s, in virtual time, to be read."""
+    """The journal of 13 s with two epochs, in virtual time, to be read."""
 
     def record(journal: Path) -> None:
-        words = ["simulate", str(small_site()), "--fast", "--minutes", "0.4", "--journal", str(journal), "--quiet"]
+        words = ["simulate", str(small_site()), "--fast", "--minutes", "0.22", *ROUNDS, "--journal", str(journal)]
+        words.append("--quiet")
         subprocess.run([*RUN, *words], check=True, timeout=PATIENCE, preexec_fn=ends_with_us())
 
     return kept("recorded.db", record)
