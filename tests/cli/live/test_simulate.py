@@ -12,7 +12,19 @@ import pytest
 from catseye.cli.live import simulate
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from cli.living_scene import PATIENCE, ROUNDS, RUN, ended, processes_with, recorded, small_site, started, write_site
+from cli.living_scene import (
+    PATIENCE,
+    ROUNDS,
+    RUN,
+    ended,
+    few_rangers,
+    processes_with,
+    recorded,
+    small_site,
+    smallest_site,
+    started,
+    write_site,
+)
 from process_scene import ends_with_us
 from sun_scene import astropy_sun
 
@@ -53,7 +65,7 @@ def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_leaves_nothing(catseye, words, said):
-    status, out, err = catseye("simulate", small_site(), "--fast", "--minutes", "0.1", "--json", *words)
+    status, out, err = catseye("simulate", smallest_site(), "--fast", "--minutes", "0.1", "--json", *words)
     assert (status, out) == (1, "")
     assert said in err
     assert err.count("\n") == 1
@@ -115,7 +127,7 @@ def test_a_run_in_real_time_ends_clean_while_it_measures(tmp_path, number, statu
     journal.parent.mkdir()
     (tmp_path / "tmp").mkdir()
     site = tmp_path / "site"  # of its own: other workers have processes of the shared one
-    write_site(site)
+    write_site(site, few_rangers())
     words = ["simulate", site, "--minutes", "0", "--port-base", "0", "--journal", journal]
     with started(*words, home=tmp_path / "tmp") as process:
         said = [process.stdout.readline(), process.stdout.readline()]
@@ -133,7 +145,7 @@ def test_a_run_in_real_time_ends_clean_while_it_measures(tmp_path, number, statu
 
 @pytest.mark.parametrize("moment", [0.0, 1.0, 4.0])
 def test_a_run_in_real_time_ends_clean_at_its_start(tmp_path, moment):
-    with started("simulate", small_site(), "--port-base", "0", "--quiet", home=tmp_path) as process:
+    with started("simulate", smallest_site(), "--port-base", "0", "--quiet", home=tmp_path) as process:
         try:
             process.wait(timeout=moment + 0.2)
         except subprocess.TimeoutExpired:
