@@ -8,13 +8,18 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import typer
+
 from catseye.records.site.folder import SiteFolder, site_files
+from command_scene import app, attempt
 from kept_scene import kept
 from process_scene import ends_with_us
 from simulator.living_scene import site
 
 RUN = (sys.executable, "-P", "-c", "from catseye.cli.main import run; run()")
 SOON = 5.0  # s, the contract's
+FEW = ("ZY101", "ZY102", "ZY103", "ZY104")
+ROUNDS = ("--round-s", "5")  # two epochs in some twelve seconds
 PATIENCE = 90.0  # s for a process to come up on a machine that is busy
 
 
@@ -44,17 +49,13 @@ def smallest_site() -> Path:
     return kept("smallest-site", lambda folder: write_site(folder, few_rangers()))
 
 
-FEW = ("ZY101", "ZY102", "ZY103", "ZY104")
-ROUNDS = ("--round-s", "5")  # two epochs in some twelve seconds
-
-
 def recorded() -> Path:
     """The journal of 13 s with two epochs, in virtual time, to be read."""
 
     def record(journal: Path) -> None:
         words = ["simulate", str(small_site()), "--fast", "--minutes", "0.22", *ROUNDS, "--journal", str(journal)]
-        words.append("--quiet")
-        subprocess.run([*RUN, *words], check=True, timeout=PATIENCE, preexec_fn=ends_with_us())
+        command = typer.main.get_command(app)
+        assert attempt(lambda: command.main([*words, "--quiet"], prog_name="catseye")) == 0
 
     return kept("recorded.db", record)
 
