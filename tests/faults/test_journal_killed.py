@@ -44,9 +44,7 @@ def killed_at(place, first, wanted, spin):
     )
     run = int(child.stdout.readline().split()[1])
     lines = [child.stdout.readline() for _ in range(wanted)]
-    until = time.monotonic() + spin
-    while time.monotonic() < until:  # not a wait for something: a moment at random
-        os.sched_yield()
+    time.sleep(spin)  # not a wait for something: a moment at random
     child.kill()
     lines += child.stdout.readlines()
     child.stdout.close()
@@ -133,7 +131,7 @@ def server_killed(server, name, times, seed):
         until = time.monotonic() + MOST_WAIT
         while sum(acknowledged.values()) < seen:
             assert time.monotonic() < until
-            os.sched_yield()
+            ends.wait(0.001)
         server.kill()
         server.start()
     ends.set()

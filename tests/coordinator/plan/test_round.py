@@ -6,13 +6,13 @@ import pytest
 from catseye.coordinator.plan.places import lagrange
 from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
 from catseye.coordinator.visibility.surroundings import KeepClear
-from catseye.coordinator.visibility.vantage import nominal_posture
+from catseye.coordinator.visibility.vantage import nominal_posture, retros_of
 from catseye.errors import InputError
 from catseye.geometry.mirror.slew import trapezoid
 from catseye.records.files.reading import read_record
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.solids import Solids
-from coordinator.round_scene import DEGREE, MORNING, NIGHT, ROOT, gbt, placed, posture, stands, state, targets
+from coordinator.round_scene import DEGREE, MORNING, NIGHT, ROOT, gbt, placed, posture, stands, state, targets, whole
 
 TRACKING = 15 / 3600 * DEGREE
 
@@ -144,8 +144,8 @@ def test_references_and_benchmarks_come_in_their_time():
 
 
 def test_all_2209_prisms_of_the_dish_are_visited_in_turn():
-    planner = RoundPlanner(gbt(), settings=RoundSettings(dish_share=0.9, period=20.0))
-    dish = {n for n, r in targets().items() if r.part == "dish"}
+    planner = RoundPlanner(whole(), settings=RoundSettings(dish_share=0.9, period=20.0))
+    dish = {n for n, r in retros_of(whole()).items() if r.part == "dish"}
     assert len(dish) == 2209
     riders = tuple(r for r in gbt().rangers if r not in gbt().monuments)
     seen, since = set(), dict.fromkeys(riders, 0.0)
@@ -253,7 +253,7 @@ def test_the_same_states_give_the_same_rounds():
 def test_a_round_of_the_whole_site_takes_a_tenth_of_a_second():
     import time
 
-    planner = RoundPlanner(gbt())
+    planner = RoundPlanner(whole())
     own = LivePosture(MORNING, 2.5, 0.6, TRACKING, TRACKING)
     told = state(MORNING, own)
     planner.round(told)
