@@ -8,10 +8,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import typer
-
 from catseye.records.site.folder import SiteFolder, site_files
-from command_scene import app, attempt
+from command_scene import COMMAND, attempt
 from kept_scene import kept
 from process_scene import ends_with_us
 from simulator.living_scene import site
@@ -54,8 +52,7 @@ def recorded() -> Path:
 
     def record(journal: Path) -> None:
         words = ["simulate", str(small_site()), "--fast", "--minutes", "0.22", *ROUNDS, "--journal", str(journal)]
-        command = typer.main.get_command(app)
-        assert attempt(lambda: command.main([*words, "--quiet"], prog_name="catseye")) == 0
+        assert attempt(lambda: COMMAND.main([*words, "--quiet"], prog_name="catseye")) == 0
 
     return kept("recorded.db", record)
 
