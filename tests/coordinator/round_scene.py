@@ -27,17 +27,16 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # moun
 
 
 @cache
-def whole():
-    """The site as it is bundled."""
+def gbt():
     return read_site(ROOT / "examples" / "sites" / "gbt")
 
 
 @cache
-def gbt():
+def few_prisms():
     """The same with 45 of its 2209 prisms on the dish: a planner finds how far each is seen before it begins."""
-    dish = [name for name in whole().targets if name.startswith("DP")]
+    dish = [name for name in gbt().targets if name.startswith("DP")]
     left_out = set(dish) - set(dish[::50])
-    return replace(whole(), targets={n: t for n, t in whole().targets.items() if n not in left_out})
+    return replace(gbt(), targets={n: t for n, t in gbt().targets.items() if n not in left_out})
 
 
 @cache
