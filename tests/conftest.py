@@ -22,6 +22,11 @@ def pytest_configure(config):
         compile_once()
 
 
+def pytest_collection_modifyitems(items):
+    """First those that wait for processes most of their time, while types are checked beside them."""
+    items.sort(key=lambda item: not item.nodeid.startswith(("tests/faults/", "tests/cli/live/")))
+
+
 def pytest_collection_finish():
     """What was imported stays: the collector need not walk over it again and again."""
     gc.collect()

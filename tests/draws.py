@@ -6,6 +6,7 @@ seldom as those of all draws.
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from scipy.stats import chi2
 
 
@@ -15,6 +16,11 @@ def draws(full, quick=None, name="runs"):
     return pytest.mark.parametrize(
         name, [pytest.param(few, id="quick"), pytest.param(full, id="full", marks=pytest.mark.slow)]
     )
+
+
+def examples(full):
+    """The settings of a law of which `make test` tries a third of the examples, and `make test-all` all."""
+    return settings(deadline=None, max_examples=full if settings.default.max_examples > 100 else max(full // 3, 2))
 
 
 def same_sigmas(bound, full, runs):

@@ -32,6 +32,14 @@ def gbt():
 
 
 @cache
+def few_prisms():
+    """The same with 45 of its 2209 prisms on the dish: a planner finds how far each is seen before it begins."""
+    dish = [name for name in gbt().targets if name.startswith("DP")]
+    left_out = set(dish) - set(dish[::50])
+    return replace(gbt(), targets={n: t for n, t in gbt().targets.items() if n not in left_out})
+
+
+@cache
 def stands():
     return vantages_of(gbt())
 

@@ -21,7 +21,7 @@ from catseye.records.site.folder import read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 from catseye.simulator.clock.world_clock import SystemClock
-from cli.living_scene import PATIENCE, RUN, small_site
+from cli.living_scene import PATIENCE, RUN, smallest_site
 from process_scene import ends_with_us
 
 START = 60_635.125  # MJD; night at Green Bank
@@ -159,7 +159,7 @@ class LivingSite:
     """
 
     def __init__(self, journal: object, folder: Path):
-        site = small_site()
+        site = smallest_site()
         self.journal, self.base = journal, free_base()
         offset = SystemClock.starting_at(START).offset
         ranger_words = ("--twin", f"--start={START}", f"--clock-offset-s={offset!r}", "--json")
@@ -238,7 +238,7 @@ def addresses_toml(base: int) -> str:
     """Where the coordinator finds its rangers and the feed."""
     lines = ['format = "catseye-addresses-1"', f'feed = "127.0.0.1:{base}"']
     for names, shift in zip(GROUPS.values(), (0, OTHER), strict=True):
-        where = ranger_addresses(read_site(small_site()), base + shift)
+        where = ranger_addresses(read_site(smallest_site()), base + shift)
         for name in names:
             host, *ports = where[name]
             lines += ["[[ranger]]", f'name = "{name}"', f'host = "{host}"', f"ports = {ports}"]

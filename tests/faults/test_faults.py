@@ -61,12 +61,12 @@ NIGHTS = {
     "silence": [
         Expected("dead-ranger ZY105 22 30", ("lost",), 0.5, over="ready", back=45.0, most=0.0),
         Expected("network-slow ZY109 22 60", ("slow",), 6.0, over="slow-over", least=0.15),
-        Expected("silent-telescope telescope 75 90", ("telescope-silent",), 3, over="telescope-silent-over", back=2),
+        Expected("silent-telescope telescope 62 77", ("telescope-silent",), 3, over="telescope-silent-over", back=2),
     ],
     "no answer": [
-        Expected("hung-ranger ZY105 22 45", ("lost",), 8.0, over="lost-over", back=45.0, most=0.1),
-        Expected("drifting-clock ZY109 22 70", ("clock-free",), 0.5, over="clock-free-over", back=2.0, least=0.4),
-        Expected("lying-station WX2 42 75", ("weather-doubted",), 12.0, over="weather-doubted-over", back=12.0),
+        Expected("hung-ranger ZY105 22 40", ("lost",), 8.0, over="lost-over", back=45.0, most=0.1),
+        Expected("drifting-clock ZY109 22 55", ("clock-free",), 0.5, over="clock-free-over", back=2.0, least=0.4),
+        Expected("lying-station WX2 42 65", ("weather-doubted",), 12.0, over="weather-doubted-over", back=12.0),
     ],
     "mirror": [
         Expected("stuck-axis ZY105:0 22 60", ("motor-off-0",), ROUND, over="motor-off-0-over", back=45.0, most=0.3),
@@ -81,7 +81,7 @@ NIGHTS = {
         Expected("lost-index ZY105:0 22 60", ("lost-index",), 20.0, over="ready", back=35.0, most=0.0),
     ],
 }  # fmt: skip
-SECONDS = {"light": 125.0, "silence": 105.0, "no answer": 120.0, "mirror": 110.0, "network": 120.0, "index": 130.0}
+SECONDS = {"light": 125.0, "silence": 90.0, "no answer": 88.0, "mirror": 110.0, "network": 120.0, "index": 130.0}
 QUICK = ("silence", "no answer")
 ROWS = [
     pytest.param(name, row, id=row.fault.partition(" ")[0], marks=() if name in QUICK else pytest.mark.slow)

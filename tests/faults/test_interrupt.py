@@ -43,7 +43,8 @@ def wait_until_in_charge(process):
         caught = next(line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
         if int(caught.split()[1], 16) & TERM_BIT:
             return
-        os.sched_yield()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=0.001)
 
 
 def interrupt(process, number):

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -44,9 +45,8 @@ def killed_at(place, first, wanted, spin):
     )
     run = int(child.stdout.readline().split()[1])
     lines = [child.stdout.readline() for _ in range(wanted)]
-    until = time.monotonic() + spin
-    while time.monotonic() < until:  # not a wait for something: a moment at random
-        os.sched_yield()
+    with suppress(subprocess.TimeoutExpired):
+        child.wait(spin)  # a moment at random
     child.kill()
     lines += child.stdout.readlines()
     child.stdout.close()
@@ -133,7 +133,7 @@ def server_killed(server, name, times, seed):
         until = time.monotonic() + MOST_WAIT
         while sum(acknowledged.values()) < seen:
             assert time.monotonic() < until
-            os.sched_yield()
+            ends.wait(0.001)
         server.kill()
         server.start()
     ends.set()

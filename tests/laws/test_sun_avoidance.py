@@ -5,6 +5,7 @@ shown to fail where the guard is wrong.
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -43,12 +44,14 @@ def days(rng, n):
     return found
 
 
+@cache
 def suns(mjd):
     """astropy's Sun as a function of seconds after mjd, a straight line over two minutes: 2" at most beside it."""
     a, b = astropy_sun(np.array([mjd, mjd + 120 / 86_400]))
     return lambda s: a + (b - a) * (s / 120)[..., None]
 
 
+@cache
 def seen_at(mjd):
     return counts(STATION, STATION.scan_point + 100 * astropy_sun(np.array([mjd]))[0])
 

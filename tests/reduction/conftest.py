@@ -1,25 +1,12 @@
 """Night-01 taken apart: its electronics and network, and campaigns made of a part of it."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from catseye.records.night.campaign import REFERENCE
+from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.unknowns import build_network
-
-
-def with_shots(campaign, rows, **columns):
-    """The campaign with some rows of its shots, in that order, and columns replaced."""
-    shots, rows = campaign.shots, np.asarray(rows)
-    rows = np.flatnonzero(rows) if rows.dtype == bool else rows
-    picked = {
-        f.name: tuple(getattr(shots, f.name)[k] for k in rows)
-        if isinstance(getattr(shots, f.name), tuple)
-        else getattr(shots, f.name)[rows]
-        for f in dataclasses.fields(shots)
-    }
-    return dataclasses.replace(campaign, shots=dataclasses.replace(shots, **(picked | columns)))
+from few_scene import with_few_targets, with_shots
 
 
 @pytest.fixture(scope="session")
@@ -50,3 +37,33 @@ def references_01(targets_01):
 def network_01(night_01, reduced_night_01):
     r = reduced_night_01
     return build_network(night_01, r.phases, r.electronics, r.settings)
+
+
+@pytest.fixture(scope="session")
+def few_01(night_01):
+    """Night-01 with 42 of its 107 targets."""
+    return with_few_targets(night_01)
+
+
+@pytest.fixture(scope="session")
+def reduced_few_01(few_01):
+    """Its reduction with default settings."""
+    return reduce_epoch(few_01)
+
+
+@pytest.fixture(scope="session")
+def few_rangers(few_01):
+    """Ranger of every shot."""
+    return np.array(few_01.shots.ranger)
+
+
+@pytest.fixture(scope="session")
+def few_targets(few_01):
+    """Target of every shot."""
+    return np.array(few_01.shots.target)
+
+
+@pytest.fixture(scope="session")
+def few_references(few_targets):
+    """Which shots are on the internal cube."""
+    return few_targets == REFERENCE

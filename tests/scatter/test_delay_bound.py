@@ -12,7 +12,7 @@ from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import chirp, maximum_length_sequence, pulse, sampled
 
 FS = 48e3
-TIME = np.arange(2400) / FS
+TIME = np.arange(1600) / FS  # the longest signal, begun at the window's end, is over 2 ms before
 CHIRP = {"start_hz": 2e3, "stop_hz": 8e3, "duration": 10e-3}
 SIGNALS = {
     "chirp": (chirp, CHIRP),

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from catseye.records.night.campaign import read_campaign
+from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.faults import Faults
 from catseye.simulator.night.sheets import write_night
+from few_scene import with_few_targets
 from kept_scene import night_directory, night_of, reduction_of
 
 SEED = 4711
@@ -48,6 +50,30 @@ def clear_night():
 def clear():
     """Its campaign and reduction."""
     return read_campaign(night_directory(SEED, faults=CLEAR)), reduction_of(SEED, faults=CLEAR)
+
+
+def of_few_targets(campaign):
+    """The campaign with shots on 44 of its targets, those that the stories name among them."""
+    return with_few_targets(campaign, "DP017", "DP021")
+
+
+@pytest.fixture(scope="session")
+def written_few(written):
+    """Function night -> campaign with few targets."""
+    return lambda night: of_few_targets(written(night))
+
+
+@pytest.fixture(scope="session")
+def few(campaign):
+    """Reduction of the night with all the usual faults, of few targets."""
+    return reduce_epoch(of_few_targets(campaign))
+
+
+@pytest.fixture(scope="session")
+def few_clear():
+    """Campaign and reduction of the clear night, of few targets."""
+    campaign = of_few_targets(read_campaign(night_directory(SEED, faults=CLEAR)))
+    return campaign, reduce_epoch(campaign)
 
 
 @pytest.fixture(scope="session")

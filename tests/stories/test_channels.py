@@ -7,17 +7,7 @@ import pytest
 
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import reduce_epoch
-
-
-def with_shots(campaign, rows):
-    shots, rows = campaign.shots, np.flatnonzero(rows) if np.asarray(rows).dtype == bool else np.asarray(rows)
-    columns = {
-        f.name: tuple(getattr(shots, f.name)[k] for k in rows)
-        if isinstance(getattr(shots, f.name), tuple)
-        else getattr(shots, f.name)[rows]
-        for f in dataclasses.fields(shots)
-    }
-    return dataclasses.replace(campaign, shots=type(shots)(**columns))
+from few_scene import with_shots
 
 
 def removals(campaign):
@@ -48,12 +38,12 @@ NAMES = (
 
 
 @pytest.mark.parametrize("channel", NAMES)
-def test_a_channel_removed_moves_nothing_beyond_the_uncertainties(clear, channel):
+def test_a_channel_removed_moves_nothing_beyond_the_uncertainties(few_clear, channel):
     """The variance of such a difference is u_without^2 - u_with^2; five of its roots, 3 um for linearisation."""
-    campaign, reduction = clear
+    campaign, reduction = few_clear
     whole, rest = reduction.coordinates, reduce_epoch(removals(campaign)[channel]).coordinates
     names = [n for n in rest.places if n in whole.places]
-    assert len(names) > 90
+    assert len(names) > 55
     more, less = whole.block(names), rest.block(names)
     gained = np.diag(less) - np.diag(more)
     assert np.all(gained > -2e-4 * np.diag(more))  # a share of rejected good shots aside, never more certain
@@ -63,8 +53,8 @@ def test_a_channel_removed_moves_nothing_beyond_the_uncertainties(clear, channel
     assert abs(difference[worst]) < limit[worst], (names[worst // 3], difference[worst], limit[worst])
 
 
-def test_the_upper_weather_station_removed_costs_certainty_and_not_more(clear, clear_night):
-    campaign, reduction = clear
+def test_the_upper_weather_station_removed_costs_certainty_and_not_more(few_clear, clear_night):
+    campaign, reduction = few_clear
     w = campaign.weather
     mine = np.array(w.station) == "WX1"
     weather = dataclasses.replace(
@@ -86,8 +76,8 @@ def test_the_upper_weather_station_removed_costs_certainty_and_not_more(clear, c
 
 
 @pytest.mark.parametrize("shots", [1, 2])
-def test_a_point_with_one_or_two_good_ranges_keeps_a_large_covariance(clear, clear_night, shots):
-    campaign, _ = clear
+def test_a_point_with_one_or_two_good_ranges_keeps_a_large_covariance(few_clear, clear_night, shots):
+    campaign, _ = few_clear
     target = np.array(campaign.shots.target)
     on_it = np.flatnonzero(target == "DP021")
     keep = np.ones(len(target), dtype=bool)
@@ -101,17 +91,17 @@ def test_a_point_with_one_or_two_good_ranges_keeps_a_large_covariance(clear, cle
     assert np.all(np.abs(error) < 4 * u)
 
 
-def test_the_same_shots_in_another_order_give_the_same_answer(clear):
-    campaign, reduction = clear
+def test_the_same_shots_in_another_order_give_the_same_answer(few_clear):
+    campaign, reduction = few_clear
     order = np.random.default_rng(3).permutation(len(campaign.shots))
     again = reduce_epoch(with_shots(campaign, order)).coordinates
     np.testing.assert_allclose(again.x, reduction.coordinates.x, atol=1e-7)  # rounding, and where the passes end
     np.testing.assert_allclose(again.covariance, reduction.coordinates.covariance, rtol=1e-4, atol=1e-14)
 
 
-def test_a_shot_taken_twice_is_not_two_paths(clear):
+def test_a_shot_taken_twice_is_not_two_paths(few_clear):
     """Noise halves its variance, the air of the path does not: u of the point falls by less than a root of two."""
-    campaign, reduction = clear
+    campaign, reduction = few_clear
     target = np.array(campaign.shots.target)
     rows = np.sort(np.concatenate([np.arange(len(target)), np.flatnonzero(target == "TR05-L")]))
     twice = with_shots(campaign, rows)
@@ -122,8 +112,8 @@ def test_a_shot_taken_twice_is_not_two_paths(clear):
     assert np.all(np.abs(moved) < np.sqrt(was2))
 
 
-def test_a_reference_with_a_foreign_reflection_is_rejected_with_its_reason_and_the_coordinates_hold(clear):
-    campaign, reduction = clear
+def test_a_reference_with_a_foreign_reflection_is_rejected_with_its_reason_and_the_coordinates_hold(few_clear):
+    campaign, reduction = few_clear
     ranger, target = np.array(campaign.shots.ranger), np.array(campaign.shots.target)
     rows = np.flatnonzero((ranger == "ZY113") & (target == REFERENCE))
     frames = np.array(campaign.frames)

@@ -50,14 +50,14 @@ def test_with_every_effect_in_twin_and_reduction_errors_are_those_claimed(clear,
     assert 0.65 < c.variance_factor < 1.35
 
 
-def test_a_mirrors_offset_taken_as_247_mm_straight_up_spoils_the_ground_rangers(clear, monkeypatch):
+def test_a_mirrors_offset_taken_as_247_mm_straight_up_spoils_the_ground_rangers(few_clear, monkeypatch):
     monkeypatch.setattr(
         places, "scan_point", lambda fixed, gamma, offset: np.add(fixed, [0.0, 0.0, np.linalg.norm(offset)])
     )
-    wrong = reduce_epoch(clear[0])
+    wrong = reduce_epoch(few_clear[0])
     # dz is -0.8 mm along a horizontal axis: 0.8 / sqrt(3) a coordinate, of which the ranges between them take some back
-    assert 0.2e-3 < moved(clear[1], wrong, "ground") < 0.8e-3
-    assert moved(clear[1], wrong, "ball") > 20e-6
+    assert 0.2e-3 < moved(few_clear[1], wrong, "ground") < 0.8e-3
+    assert moved(few_clear[1], wrong, "ball") > 20e-6
 
 
 def test_a_twin_whose_h_corr_has_the_other_sign_is_seen_wrong_by_a_tenth_of_a_millimetre(
@@ -72,8 +72,8 @@ def test_a_twin_whose_h_corr_has_the_other_sign_is_seen_wrong_by_a_tenth_of_a_mi
         assert 1.2 * right < rms(errors(c, night.truth, names)) < 500e-6
 
 
-def test_h_corr_of_the_wrong_sign_in_the_sheets_moves_the_dish_as_a_whole(clear, clear_night):
-    campaign, right = clear
+def test_h_corr_of_the_wrong_sign_in_the_sheets_moves_the_dish_as_a_whole(few_clear, clear_night):
+    campaign, right = few_clear
     turned = {n: t.model_copy(update={"h_corr_mm": -t.h_corr_mm}) for n, t in campaign.triplets.items()}
     wrong = reduce_epoch(dataclasses.replace(campaign, triplets=turned))
     h = rms([t.h_corr_mm for t in campaign.triplets.values()])
@@ -84,41 +84,43 @@ def test_h_corr_of_the_wrong_sign_in_the_sheets_moves_the_dish_as_a_whole(clear,
     assert wrong.coordinates.variance_factor < 2.0
 
 
-def test_without_obliquity_the_prisms_go_wrong(clear, monkeypatch):
+def test_without_obliquity_the_prisms_go_wrong(few_clear, monkeypatch):
     monkeypatch.setattr(shots, "obliquity_correction", lambda height, n, c, **_: np.zeros(np.shape(c)))
     monkeypatch.setattr(shots, "obliquity_slope", lambda height, n, c, **_: np.zeros(np.shape(c)))
-    wrong = reduce_epoch(clear[0])
+    wrong = reduce_epoch(few_clear[0])
     apart = [
-        np.linalg.norm(wrong.coordinates.x[wrong.coordinates.index(n)] - clear[1].coordinates.x[k])
-        for k, n in enumerate(clear[1].coordinates.points)
+        np.linalg.norm(wrong.coordinates.x[wrong.coordinates.index(n)] - few_clear[1].coordinates.x[k])
+        for k, n in enumerate(few_clear[1].coordinates.points)
         if n.startswith("DP")
     ]
     assert max(apart) > 50e-6
 
 
-def test_a_twin_without_obliquity_is_not_what_the_reduction_expects(clear, written, errors):
+def test_a_twin_without_obliquity_is_not_what_the_reduction_expects(few_clear, written_few, errors):
     night = simulate_night(SEED, faults=CLEAR, planted=Planted(ignore={"obliquity"}))
-    c = reduce_epoch(written(night)).coordinates
+    c = reduce_epoch(written_few(night)).coordinates
     names = named(c, "dish")
     assert np.max(np.abs(errors(c, night.truth, names))) > 100e-6 or c.variance_factor > 1.35
 
 
-def test_air_taken_as_the_stations_mean_spoils_the_scale(clear, monkeypatch):
+def test_air_taken_as_the_stations_mean_spoils_the_scale(few_clear, monkeypatch):
     def averaged(field, z):
         return np.full((*z.shape, len(field.heights)), 1.0 / len(field.heights)), np.zeros(z.shape)
 
     monkeypatch.setattr(AirField, "_shares", averaged)
     monkeypatch.setattr("catseye.reduction.epoch.air.pressure_at", lambda pressure, z_from, z_to: pressure + 0.0 * z_to)
-    wrong = reduce_epoch(clear[0])
-    assert 50e-6 < moved(clear[1], wrong, "ball") < 500e-6
-    assert 50e-6 < moved(clear[1], wrong, "dish") < 500e-6
+    wrong = reduce_epoch(few_clear[0])
+    assert 50e-6 < moved(few_clear[1], wrong, "ball") < 500e-6
+    assert 50e-6 < moved(few_clear[1], wrong, "dish") < 500e-6
 
 
 @pytest.mark.parametrize(("name", "error_mm"), [("ZY114", 0.3), ("ZY106", -0.3)])
-def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong(clear, written, name, error_mm):
+def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong(
+    few_clear, written_few, name, error_mm
+):
     """Thirty of its sigmas. Held to the sheet, good shots were once rejected and the ranger went 0.26 mm wrong."""
     planted = Planted(d0_error_mm={name: error_mm})
-    reduction = reduce_epoch(written(simulate_night(SEED, faults=CLEAR, planted=planted)))
+    reduction = reduce_epoch(written_few(simulate_night(SEED, faults=CLEAR, planted=planted)))
     c = reduction.coordinates
     value, uncertainty = c.zeros[name]
     assert value == pytest.approx(error_mm * 1e-3, abs=4 * uncertainty + 10e-6)  # the sheet is off by 10 um besides
@@ -128,23 +130,23 @@ def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong
     assert any(n.startswith(f"{name}'s zero is not the sheet's") for n in reduction.notes)
     assert not reduction.rejected
     for kind in ("dish", "ball", "arm"):
-        assert moved(clear[1], reduction, kind) < 30e-6
+        assert moved(few_clear[1], reduction, kind) < 30e-6
 
 
-def test_a_zero_wrong_by_0_3_mm_and_held_to_its_sheet_spoils_its_ranger(clear, written, monkeypatch):
+def test_a_zero_wrong_by_0_3_mm_and_held_to_its_sheet_spoils_its_ranger(few_clear, written_few, monkeypatch):
     night = simulate_night(SEED, faults=CLEAR, planted=Planted(d0_error_mm={"ZY114": 0.3}))
     monkeypatch.setattr("catseye.reduction.epoch.coordinates.ZEROS", "held")
-    held = reduce_epoch(written(night))
-    assert 50e-6 < moved(clear[1], held, "arm") < 500e-6
-    assert held.coordinates.variance_factor > clear[1].coordinates.variance_factor + 0.1 or held.rejected
+    held = reduce_epoch(written_few(night))
+    assert 50e-6 < moved(few_clear[1], held, "arm") < 500e-6
+    assert held.coordinates.variance_factor > few_clear[1].coordinates.variance_factor + 0.1 or held.rejected
 
 
-def test_a_lower_thermometer_that_lies_by_1_2_degrees_is_found_by_the_benchmarks(written, clear, errors, u):
+def test_a_lower_thermometer_that_lies_by_1_2_degrees_is_found_by_the_benchmarks(written_few, few_clear, errors, u):
     night = simulate_night(
         SEED,
         faults=Faults(0.0, 0.0, weak_ranger=None, wrong_position_mm=0.0, lying_thermometer_c=1.2, lying_station="WX1"),
     )
-    reduction = reduce_epoch(written(night))
+    reduction = reduce_epoch(written_few(night))
     c = reduction.coordinates
     true = night.truth.thermometer_offsets_c["WX1"]
     value, uncertainty = c.air["WX1"]

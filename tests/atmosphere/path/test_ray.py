@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
@@ -17,6 +17,7 @@ from catseye.atmosphere.sound.velocity import (
     second_velocity_correction,
 )
 from catseye.errors import ValidityError
+from draws import examples
 
 N0 = 1.00025
 FROM_CENTRE = np.array([0.0, 0.0, EARTH_RADIUS])  # of the origin, from the Earth's centre
@@ -191,7 +192,7 @@ def waves(seed):
     return air, largest
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(st.integers(0, 10_000), st.floats(20.0, 200.0))
 def test_no_air_bends_the_optical_path_beyond_the_bound_nor_above_the_chords(seed, d):
     air, largest = waves(seed)
@@ -205,7 +206,7 @@ def test_no_air_bends_the_optical_path_beyond_the_bound_nor_above_the_chords(see
     assert np.all(np.linalg.norm(found.leaving, axis=1) <= bending.pointing_offset(largest, d) * (1 + 1e-6))
 
 
-@settings(max_examples=6)
+@examples(6)
 @given(st.integers(0, 10_000))
 def test_a_ray_goes_back_the_way_it_came_and_knows_no_directions_of_the_compass(seed):
     air, _ = waves(seed)

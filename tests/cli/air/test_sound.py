@@ -1,25 +1,16 @@
 """`catseye sound`: the notes' numbers by default, today's beside them, refusals."""
 
 import json
+from functools import partial
 
 import pytest
-import typer
-
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
 
 NOTES = ["--temperature-c", 20, "--pressure-hpa", 933, "--humidity-percent", 50]
 
 
 @pytest.fixture
-def command(capsys):
-    def run(*arguments):
-        main = typer.main.get_command(app)
-        status = attempt(lambda: main.main(["sound", *(str(a) for a in arguments)], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
+def command(catseye):
+    return partial(catseye, "sound")
 
 
 def answer(command, *arguments):

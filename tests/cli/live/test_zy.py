@@ -35,6 +35,7 @@ five = 5
         (["--twin", "--fault", "dead-ranger"], "expected KIND WHOM"),
         (["--twin", "--conditions", "nice"], "'nice' is not one of night, windy-day, dewy-night"),
         (["--twin", "--ports", "5240"], "'5240' is not two ports"),
+        (["--twin", "--ports", "5240,65536"], "'5240,65536' is not two ports"),
         (["--twin", "--loopback", "--host", "127.0.0.1"], "--host and --ports say otherwise"),
         (["--twin", "--start", "yesterday"], "yesterday"),
         (["--twin", "--port-base", "99999"], "99999 is not 0 to 65000"),

@@ -1,27 +1,18 @@
 """`catseye glass`: the table, one glass, and one line for what cannot be."""
 
 import json
+from functools import partial
 
 import pytest
-import typer
 
-from catseye.cli.commands import app
-from catseye.cli.terminal import attempt
 from catseye.optics.glass import GLASSES, group_index
 from catseye.optics.retroreflector import prism
 
 
 @pytest.fixture
-def asked(capsys):
+def asked(catseye):
     """`catseye glass` run in this process: exit status, what it said, what it complained of."""
-
-    def run(*arguments):
-        command = typer.main.get_command(app)
-        status = attempt(lambda: command.main(["glass", *map(str, arguments)], prog_name="catseye"))
-        said = capsys.readouterr()
-        return status, said.out, said.err
-
-    return run
+    return partial(catseye, "glass")
 
 
 def test_without_a_name_it_lists_every_glass_with_its_source(asked):

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from command_scene import COMMAND, attempt
 from panel_scene import EXAMPLE
 
 TOOL = ["--instrument", EXAMPLE / "tool.toml"]
@@ -28,17 +29,11 @@ def whole(tmp_path_factory):
     import contextlib
     import io
 
-    import typer
-
-    from catseye.cli.commands import app, join_commands
-    from catseye.cli.terminal import attempt
-
-    join_commands()
     out = tmp_path_factory.mktemp("panels") / "out"
     said, complained = io.StringIO(), io.StringIO()
     arguments = ["panels", *map(str, ALL), "--reject", "--json", "--out", str(out)]
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
-        status = attempt(lambda: typer.main.get_command(app).main(arguments, prog_name="catseye"))
+        status = attempt(lambda: COMMAND.main(arguments, prog_name="catseye"))
     return status, said.getvalue(), complained.getvalue(), out
 
 

@@ -83,10 +83,10 @@ def test_two_epochs_are_a_change(catseye, tmp_path):
 
 
 def test_an_elevation_series_gives_gravity_and_hysteresis(catseye, tmp_path):
-    elevations = [10, 25, 40, 55, 70, 85, 70, 55, 40, 25, 10]
+    elevations = [10, 35, 60, 85, 60, 35, 10]
     paths = []
     for k, e in enumerate(elevations):
-        way = 0.5 if k <= 5 else -0.5
+        way = 0.5 if k <= 3 else -0.5
         size = 1e-4 + 2e-4 * np.sin(np.radians(e)) - 1e-4 * np.cos(np.radians(e)) + 6e-5 * way
         paths.append(table(tmp_path / f"{k}.csv", half_path_of(Term(2, 2), size), k, np.arange(0, 2209, 30)))
     angles = [word for e in elevations for word in ("--elevation-deg", e)]

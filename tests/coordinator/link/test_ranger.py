@@ -36,6 +36,16 @@ def test_a_cold_ranger_is_made_ready_and_its_shot_comes_whole():
     run(story)
 
 
+def test_only_failures_in_a_row_count():
+    async def story():
+        async with Linked() as (_, link):
+            link.failures = 2
+            await link.fire(planned("ZG11"))
+            assert link.failures == 0
+
+    run(story)
+
+
 def test_the_same_over_real_sockets_in_real_time():
     async def story():
         async with Linked() as (served, link):

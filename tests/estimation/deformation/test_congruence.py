@@ -13,6 +13,7 @@ from catseye.estimation.deformation.congruence import (
     differences,
     pooled_variance_factor,
 )
+from draws import draws
 from epoch_scene import FIELD, SIGMA, movement
 
 
@@ -49,9 +50,10 @@ def check_level(p):
     assert stats.kstest(p, "uniform").pvalue > 1e-3
 
 
+@draws(400)
 @pytest.mark.parametrize("factor", [None, 12])
-def test_false_alarms_come_at_their_level_in_400_runs(factor):
-    check_level(p_values(400, 3, factor))
+def test_false_alarms_come_at_their_level_in_a_few_runs(factor, runs):
+    check_level(p_values(runs, 3, factor))
 
 
 @pytest.mark.slow
@@ -113,8 +115,9 @@ def test_tests_are_scipys_and_power_is_that_of_the_tables():
         pooled_variance_factor((1.0, 0.0), (1.0, 5.0))
 
 
+@draws(400, 200)
 @pytest.mark.parametrize("turned", [False, True])
-def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turned):
+def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turned, runs):
     """Each epoch held in a way of its own, the second in other axes: inner constraints on five points, by hand."""
     rng = np.random.default_rng(16)
     turn = Rotation.from_rotvec([0.3, -0.5, 1.0] if turned else [0.0, 0, 0]).as_matrix()
@@ -122,7 +125,7 @@ def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turn
     first, second = FIELD.held([0, 1, 2, 4, 5, 8]), FIELD.held([26, 25, 24, 12, 14, 9])
     chosen = np.repeat(stable, 3)[:, None] * FIELD.g
     onto = np.eye(27) - FIELD.g @ np.linalg.solve(chosen.T @ FIELD.g, chosen.T)
-    errors, runs = [], 400
+    errors = []
     for _ in range(runs):
         plain = FIELD.epochs(FIELD.ranges(rng), first=first, second=second)
         q2 = block @ plain.covariance_second @ block.T

@@ -67,20 +67,22 @@ def test_no_decision_depends_on_how_either_epoch_was_held(seed, turned):
     np.testing.assert_allclose(held.detectable, plain.detectable, rtol=1e-4)
 
 
+@draws(400)
 @pytest.mark.parametrize("rule", ["global", "local"])
-def test_where_nothing_moved_the_search_rarely_says_so(rule):
+def test_where_nothing_moved_the_search_rarely_says_so(rule, runs):
     rng = np.random.default_rng(5)
-    alarms = sum(moved_points(FIELD.epochs(FIELD.ranges(rng)), rule=rule).moved.any() for _ in range(400))
-    assert alarms / 400 < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / 400)
-    assert alarms / 400 > 0.01  # a test that never speaks has no power
+    alarms = sum(moved_points(FIELD.epochs(FIELD.ranges(rng)), rule=rule).moved.any() for _ in range(runs))
+    assert alarms / runs < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / runs)
+    assert alarms / runs > 0.01  # a test that never speaks has no power
 
 
+@draws(300)
 @pytest.mark.parametrize("single", [False, True])
-def test_the_detectable_displacement_is_detected_with_its_power(single):
+def test_the_detectable_displacement_is_detected_with_its_power(single, runs):
     rng = np.random.default_rng(6)
     empty = FIELD.epochs((np.zeros(len(FIELD.design)),) * 2)
     size, direction = detectable_displacement(empty, single=single)
-    runs, hits = 300, 0
+    hits = 0
     true = movement({5: size[5] * direction[5]})
     for _ in range(runs):
         epochs = FIELD.epochs(FIELD.ranges(rng, true))
@@ -93,11 +95,12 @@ def test_the_detectable_displacement_is_detected_with_its_power(single):
         np.testing.assert_allclose(size, moved_points(empty).detectable)
 
 
+@draws(40)
 @pytest.mark.parametrize("rule", ["global", "local"])
 @pytest.mark.parametrize("moved", [1, 2, 3])
-def test_planted_movements_of_one_to_three_points_are_found(moved, rule):
+def test_planted_movements_of_one_to_three_points_are_found(moved, rule, runs):
     rng = np.random.default_rng([7, moved])
-    right, runs = 0, 40
+    right = 0
     size = detectable_displacement(FIELD.epochs((np.zeros(len(FIELD.design)),) * 2))[0].max()
     for _ in range(runs):
         which = rng.choice(9, moved, replace=False)

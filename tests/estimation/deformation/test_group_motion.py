@@ -8,6 +8,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.deformation.congruence import Epochs
 from catseye.estimation.deformation.group_motion import group_motion
 from catseye.estimation.shapes.rigid_body import motion_columns
+from draws import draws
 from epoch_scene import FIELD, SIGMA
 
 GROUP = tuple(f"P{i}" for i in range(5))
@@ -62,10 +63,11 @@ def test_the_tests_of_a_group_are_sums_of_squares_of_joint_adjustments():
     np.testing.assert_allclose(found.motion.p, stats.chi2.sf(found.motion.pvv, 6))
 
 
-def test_the_covariance_of_group_motion_holds_and_its_strain_test_keeps_its_level():
+@draws(400, 200)
+def test_the_covariance_of_group_motion_holds_and_its_strain_test_keeps_its_level(runs):
     rng = np.random.default_rng(13)
     true = group_movement([1e-4, 0, 0], [0, 0, 1e-6], np.zeros((3, 3)))
-    errors, p_rigid, p_fit, runs = [], [], [], 400
+    errors, p_rigid, p_fit = [], [], []
     for _ in range(runs):
         found = group_motion(FIELD.epochs(FIELD.ranges(rng, true)), GROUP, stable=STABLE, strain_axes=np.eye(3))
         values = np.concatenate(

@@ -1,16 +1,19 @@
 """Wrong ranges are found where few meet, good ones stay, and where nobody can tell both are left out."""
 
+from copy import deepcopy
+from functools import cache
 from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
 from catseye.estimation.least_squares.conflict import LocalConflict
 from catseye.estimation.least_squares.robust import adjust_robustly
 from catseye.estimation.observations.kinds import Distances, Linear
+from draws import examples
 
 SIGMA = 25e-6  # m
 STATIONS = np.array([[90, 0, 0], [45, 78, 2], [-45, 78, -1], [-90, 0, 1], [-45, -78, 0], [45, -78, 3]], dtype=float)
@@ -93,8 +96,9 @@ def test_wrong_ranges_at_many_points_and_from_one_station_are_all_found():
     assert field.left_out(field.adjusted().require_converged()) == planted
 
 
+@cache
 def leverage(seed):
-    """Three stations side by side and three anywhere: some ranges pull hard, their residual hardly shows an error."""
+    """Three stations side by side and three anywhere, and the ranges that pull hard: residuals hardly show an error."""
     rng = np.random.default_rng(seed)
     beside = [80, 0, 0] + rng.normal(size=(3, 3)) * [1, 4, 4]
     field = Field(seed, targets=3, stations=np.concatenate([beside, rng.uniform(-80, 80, (3, 3))]))
@@ -106,18 +110,19 @@ def leverage(seed):
         ],
         free=field.free,
     )
-    return field, np.array([f.redundancy for f in plain.fits])
+    redundancy = np.array([f.redundancy for f in plain.fits])
+    hard = np.argwhere((redundancy > 0.06) & (redundancy < 0.2))
+    looks_wrong = len(hard) and field.left_out(field.adjusted())  # one good range in 2000
+    return field, [] if looks_wrong else hard.tolist()
 
 
 @pytest.mark.parametrize("error", [0.02, -0.2])
 def test_a_wrong_range_of_six_that_pulls_hard_is_found(error):
     alone = cases = 0
     for seed in range(20):
-        _, redundancy = leverage(seed)
-        for s, k in np.argwhere((redundancy > 0.06) & (redundancy < 0.2)):
-            field, _ = leverage(seed)
-            if field.left_out(field.adjusted()):
-                continue  # one good range in 2000 looks wrong
+        good, hard = leverage(seed)
+        for s, k in hard:
+            field = deepcopy(good)
             field.observed[s][k] += error
             out = field.left_out(field.adjusted().require_converged())
             assert (s, k) in out
@@ -302,7 +307,7 @@ def test_the_cost_is_the_sum_of_squares_at_the_best_place():
 # it always ends
 
 
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(3, 6),

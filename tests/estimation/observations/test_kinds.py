@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.observations import kinds
+from draws import examples
 
 POINTS, OTHERS = 6, 12
 N = 3 * POINTS + OTHERS
@@ -105,7 +106,7 @@ def by_difference(group, x, step=1e-3):
 
 
 @pytest.mark.parametrize("which", range(len(NAMES)), ids=NAMES)
-@settings(deadline=None, max_examples=12)
+@examples(12)
 @given(seed=seeds)
 def test_derivatives_are_those_of_the_values(which, seed):
     made, x = groups(seed)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
@@ -13,10 +13,11 @@ from catseye.estimation.observations import kinds
 from catseye.estimation.observations.bodies.pose import right_jacobian
 from catseye.estimation.observations.unit_direction import direction
 from catseye.geometry.frames.rotation import from_vector, skew
+from draws import examples
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-20.0, 20.0)
-quick = settings(deadline=None, max_examples=60)
+quick = examples(60)
 FROM, TO, THIRD = np.array([0, 3, 6]), np.array([3, 6, 0]), np.array([6, 0, 3])
 ONE, THREE = np.ones(3), np.zeros(3)
 PARAMETER = np.array([9, 9, 9])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -22,8 +22,9 @@ from catseye.estimation.quality.ellipsoid import (
     relative_covariance,
     weakest_direction,
 )
+from draws import examples
 
-quick = settings(deadline=None, max_examples=60)
+quick = examples(60)
 seeds = st.integers(0, 2**32 - 1)
 
 

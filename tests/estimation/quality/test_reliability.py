@@ -3,15 +3,16 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 from catseye.estimation.quality import reliability as r
+from draws import examples
 
-quick = settings(deadline=None, max_examples=60)
+quick = examples(60)
 levels = st.floats(1e-4, 0.2)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.estimation.quality.repeatability import repeatability
+from draws import draws, same_sigmas
 
 
 def test_the_ratio_is_that_of_another_librarys_analysis_of_variance():
@@ -15,19 +16,21 @@ def test_the_ratio_is_that_of_another_librarys_analysis_of_variance():
     assert repeatability(np.concatenate(sets), names).f == pytest.approx(f_oneway(*sets).statistic, rel=1e-12)
 
 
-def test_both_components_and_the_mean_come_out_with_the_scatter_claimed():
+@draws(2000)
+def test_both_components_and_the_mean_come_out_with_the_scatter_claimed(runs):
     rng = np.random.default_rng(2)
     names = np.repeat(np.arange(12), [3, 4, 5, 3, 4, 5, 3, 4, 5, 3, 4, 5])
     within, between, off = [], [], []
-    for _ in range(2000):
+    for _ in range(runs):
         y = 10.0 + 0.5 * rng.normal(size=12)[names] + 0.2 * rng.normal(size=names.size)
         found = repeatability(y, names.tolist())
         within.append(found.within**2)
         between.append(found.between**2)
         off.append((found.mean - 10.0) / found.u_mean)
-    assert np.mean(within) == pytest.approx(0.04, rel=0.02)
-    assert np.mean(between) == pytest.approx(0.25, rel=0.05)
-    assert np.std(off) == pytest.approx(1.1, abs=0.08)  # Student's t of 11 degrees of freedom: root of 11/9
+    assert np.mean(within) == pytest.approx(0.04, rel=same_sigmas(0.02, 2000, runs))
+    assert np.mean(between) == pytest.approx(0.25, rel=same_sigmas(0.05, 2000, runs))
+    # Student's t of 11 degrees of freedom: root of 11/9
+    assert np.std(off) == pytest.approx(1.1, abs=same_sigmas(0.08, 2000, runs))
 
 
 def test_the_alarm_rate_is_the_level():

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.rigid_body import CONVERGED, MIRRORED, closed_form, fit_transformation, motion_columns
+from draws import draws
 
 KINDS = ("rigid", "similarity", "affine")
 
@@ -147,8 +148,9 @@ def check_scatter(runs, seed):
     assert np.all(np.abs(white.mean(axis=0)) < 4.0 / np.sqrt(runs))
 
 
-def test_the_claimed_covariance_holds_in_300_seeded_runs():
-    check_scatter(300, 21)
+@draws(300)
+def test_the_claimed_covariance_holds_in_seeded_runs(runs):
+    check_scatter(runs, 21)
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import pytest
 
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Scale, line_covariance, tomogram
+from draws import draws
 
 ROOM = (Scale(1.0, (30.0, 20.0, 5.0)), Scale(0.3, (6.0, 6.0, 3.0)))
 
@@ -146,8 +147,9 @@ def check_scatter(runs, seed):
     assert np.mean(standard**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (40 * runs)))
 
 
-def test_claims_hold_when_fields_are_drawn_from_their_priors():
-    check_scatter(60, 3)
+@draws(60)
+def test_claims_hold_when_fields_are_drawn_from_their_priors(runs):
+    check_scatter(runs, 3)
 
 
 @pytest.mark.slow

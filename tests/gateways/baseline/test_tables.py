@@ -5,6 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from catseye.gateways.baseline.objects import baseline_object
 from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
 from catseye.records.laboratory.baseline import read_heights, read_observations
 from catseye.reduction.baseline.instrument import calibrate_baseline
@@ -87,3 +88,15 @@ def test_every_column_of_the_shots_has_the_unit_of_its_name(found):
         "place": lambda k: seen.where[k],
     }
     assert_columns(observations_csv(found), told, range(len(seen)))
+
+
+def test_standard_deviations_are_as_uncertain_as_their_variances_say(found):
+    """u of a root, by differences."""
+    told, (noise, u) = baseline_object(found)["noise"], (found.solution.noise, found.solution.u_noise)
+    for k, (key, unit) in enumerate((("shot", 1.0), ("set", 1.0), ("air_ppm", 1e-6))):
+        variance = (noise.shot, noise.set, noise.air)[k]
+        if variance > 0.0:
+            step = 1e-4 * variance
+            slope = (np.sqrt(variance + step) - np.sqrt(variance - step)) / (2.0 * step)
+            assert told[f"u_{key}"] == pytest.approx(u[k] * slope / unit, rel=1e-6)
+    assert told["u_shot"] is not None

@@ -16,6 +16,7 @@ from catseye.geometry.clearance.keep_out import (
 )
 from catseye.geometry.mirror.pointing import ray
 from catseye.geometry.mirror.slew import straight, trapezoid
+from draws import draws
 from sun_scene import PACE, STATION, apart, random_counts
 
 DEGREE = np.pi / 180
@@ -217,10 +218,11 @@ def test_the_kernel_answers_as_the_plain_form(monkeypatch):
     assert set(plain.zone) == {-1, 0, 1, 2}
 
 
-def test_dense_looks_find_the_same_entries():
-    moves, zones = batch(150, seed=8)
+@draws(150)
+def test_dense_looks_find_the_same_entries(runs):
+    moves, zones = batch(runs, seed=8)
     found = first_entry(STATION, moves, zones)
-    for i in range(150):
+    for i in range(runs):
         time = np.linspace(0, moves.total[i], 3001)
         d = ray(STATION, moves[i].position(time)).direction
         gap = np.min(

@@ -59,6 +59,12 @@ def inverted(time, u_time=1e-5, **change):
     return sound_field(STATIONS, SOURCE, RECEIVER, time, u_time, **given)
 
 
+@pytest.fixture(scope="module")
+def field():
+    """What comes of the field of another kind, by the usual priors."""
+    return inverted(heard(STATIONS))
+
+
 def test_a_uniform_field_and_wind_come_back():
     wind = np.array([5.0, -3.0, 0.5])
     times = heard(STATIONS, lambda p: np.full(p.shape[:-1], 17.3), lambda p: np.broadcast_to(wind, p.shape))
@@ -69,8 +75,8 @@ def test_a_uniform_field_and_wind_come_back():
     assert found.group_refractivity[0] == pytest.approx(float(group_refractivity(17.3, P, H)), abs=3e-9)
 
 
-def test_a_lasers_path_through_a_field_of_another_kind():
-    found = inverted(heard(STATIONS)).along(*LASER)
+def test_a_lasers_path_through_a_field_of_another_kind(field):
+    found = field.along(*LASER)
     u = found.u_temperature_c[0]
     assert u < 0.16
     assert abs(found.temperature_c[0] - on_laser(warm)) < 2.0 * u
@@ -115,31 +121,32 @@ def test_claims_hold_over_some_fields():
         assert np.max(np.abs(z)) < 3.5
 
 
+def of_even_air(places=STATIONS, late=0.0, **weather):
+    """Observations of air and wind that are the same everywhere, as the priors take them."""
+    wind = np.array([4.0, -2.0, 0.5])
+    even = heard(places, lambda q: np.full(q.shape[:-1], 17.0), lambda q: np.broadcast_to(wind, q.shape), **weather)
+    return inverted(even + late, temperature=FieldPrior(15.0, 8.0), wind=FieldPrior(0.0, 6.0)).tomogram.observations
+
+
 @pytest.mark.parametrize("cause", ["place", "delay", "pressure", "humidity", "formula"])
 def test_every_cause_moves_the_observations_by_its_column(cause):
     rng = np.random.default_rng(23)
-    wind = np.array([4.0, -2.0, 0.5])
-
-    def seen(places=STATIONS, late=0.0, **weather):
-        even = heard(places, lambda q: np.full(q.shape[:-1], 17.0), lambda q: np.broadcast_to(wind, q.shape), **weather)
-        return inverted(even + late, wind=FieldPrior(0.0, 6.0)).tomogram.observations
-
-    base, beta = seen(), np.zeros(27 + len(COMMON))
+    base, beta = of_even_air(), np.zeros(27 + len(COMMON))
     if cause == "place":
         shift = 1e-3 * rng.standard_normal(STATIONS.shape)
-        beta[:27], moved = shift.ravel(), seen(STATIONS + shift)
+        beta[:27], moved = shift.ravel(), of_even_air(STATIONS + shift)
     else:
         size = {"delay": 1e-5, "pressure": 1.0, "humidity": 1.0, "formula": 0.02}[cause]
         change = {"delay": "late", "pressure": "p", "humidity": "h", "formula": "formula"}[cause]
         start = {"pressure": P, "humidity": H}.get(cause, 0.0)
-        beta[27 + list(COMMON).index(cause)], moved = size, seen(**{change: start + size})
+        beta[27 + list(COMMON).index(cause)], moved = size, of_even_air(**{change: start + size})
     predicted = base.design @ beta
     # the point of linearisation moves with the estimate of the wind: second order
     assert moved.observed - base.observed == pytest.approx(predicted, rel=0.02, abs=0.02 * np.max(np.abs(predicted)))
 
 
-def test_index_and_temperature_hang_together_through_humidity():
-    found = inverted(heard(STATIONS)).along(*LASER)
+def test_index_and_temperature_hang_together_through_humidity(field):
+    found = field.along(*LASER)
     t, p, h = found.temperature_c[0], P, H
     up = (float(group_refractivity(t + 0.01, p, h)) - float(group_refractivity(t - 0.01, p, h))) / 0.02
     of_pressure = 0.3 * (float(group_refractivity(t, p + 0.5, h)) - float(group_refractivity(t, p - 0.5, h)))
@@ -158,18 +165,18 @@ def test_a_wrong_time_is_named_and_bad_ones_are_left_out():
     assert len(field.used) == 69
 
 
-def test_a_prior_that_does_not_fit_is_said_to_claim_too_little():
-    assert inverted(heard(STATIONS)).fit == "fits"
+def test_a_prior_that_does_not_fit_is_said_to_claim_too_little(field):
+    assert field.fit == "fits"
     stiff = FieldPrior(15.0, 8.0, (Scale(0.05, (80.0, 80.0, 40.0)),))
     said = inverted(heard(STATIONS), temperature=stiff).fit
     assert said.startswith("chi-square")
     assert "give larger scales" in said
 
 
-def test_dispersion_and_carbon_dioxide_are_uncertain_too():
+def test_dispersion_and_carbon_dioxide_are_uncertain_too(field):
     """At 1 kHz in 17 °C a tenth of 60 ppm is 3.5e-3 °C; 200 ppm of carbon dioxide 0.0096 m/s a hundred, 0.033 °C."""
     times = heard(STATIONS)
-    plain = inverted(times).along(*LASER).u_temperature_c[0]
+    plain = field.along(*LASER).u_temperature_c[0]
     assert inverted(times, frequency_hz=1e3).along(*LASER).u_temperature_c[0] > plain
     more = inverted(times, u_co2_ppm=2000.0).along(*LASER).u_temperature_c[0]
     per_ppm = 0.0096 / 100.0 / 0.6  # °C
@@ -228,11 +235,10 @@ def test_what_would_be_answered_wrongly_or_not_at_all_is_refused(change, complai
     assert complaint in str(caught.value)
 
 
-def test_times_of_no_air_are_refused_as_times_and_lines_to_nowhere_as_lines():
+def test_times_of_no_air_are_refused_as_times_and_lines_to_nowhere_as_lines(field):
     length = np.linalg.norm(STATIONS[RECEIVER] - STATIONS[SOURCE], axis=1)
     with pytest.raises(EstimationError, match="no travel time of 72 is that of sound in air"):
         inverted(length / 370.0)
-    field = inverted(heard(STATIONS))
     for end in ([np.nan, 0.0, 0.0], [1e9, 0.0, 0.0]):
         with pytest.raises(ValidityError, match="length of the line"):
             field.along([0.0, 0.0, 0.0], end)

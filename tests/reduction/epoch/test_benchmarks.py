@@ -75,12 +75,10 @@ def test_each_benchmark_path_shows_its_index_beside_the_weathers(lied):
     assert mean == pytest.approx(night.truth.thermometer_offsets_c["WX1"], abs=0.4)
 
 
-def test_night_01_has_six_such_paths_and_they_halve_the_uncertainty_of_its_lower_thermometer(
-    night_01, reduced_night_01
-):
-    assert len(benchmark_refractometers(reduced_night_01)) == 6
-    without = reduce_epoch(dataclasses.replace(night_01, benchmarks=()))
-    assert without.coordinates.air["WX1"][1] > 1.8 * reduced_night_01.coordinates.air["WX1"][1]
+def test_night_01_has_six_such_paths_and_they_halve_the_uncertainty_of_its_lower_thermometer(few_01, reduced_few_01):
+    assert len(benchmark_refractometers(reduced_few_01)) == 6
+    without = reduce_epoch(dataclasses.replace(few_01, benchmarks=()))
+    assert without.coordinates.air["WX1"][1] > 1.8 * reduced_few_01.coordinates.air["WX1"][1]
 
 
 @pytest.fixture(scope="module")
@@ -140,28 +138,28 @@ def sounded(campaign, rows):
     return dataclasses.replace(campaign, path_temperatures=path_temperature_columns(records))
 
 
-def test_sound_far_from_any_shot_changes_nothing_and_says_so(night_01, reduced_night_01):
-    start = float(night_01.shots.mjd_utc[0])
-    far = sounded(night_01, [(start - 0.04, "ZY101", "ZEG41040L", 25.0, 0.1)])
+def test_sound_far_from_any_shot_changes_nothing_and_says_so(few_01, reduced_few_01):
+    start = float(few_01.shots.mjd_utc[0])
+    far = sounded(few_01, [(start - 0.04, "ZY101", "ZEG41040L", 25.0, 0.1)])
     reduction = reduce_epoch(far)
-    np.testing.assert_allclose(reduction.coordinates.x, reduced_night_01.coordinates.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(reduction.coordinates.x, reduced_few_01.coordinates.x, rtol=0, atol=1e-12)
     assert any("they do nothing" in note for note in reduction.notes)
     assert reduction.coordinates.sound["ZEG41040L - ZY101"] == pytest.approx((0.0, 0.1))
 
 
-def test_a_line_whose_sound_is_far_off_is_contradicted_and_its_shots_stay(night_01, reduced_night_01):
+def test_a_line_whose_sound_is_far_off_is_contradicted_and_its_shots_stay(few_01, reduced_few_01):
     """At 30 °C the index is 17 ppm lower, the range 2.4 mm too long: four shots blame the sound, not themselves."""
-    shots = night_01.shots
+    shots = few_01.shots
     mine = [k for k, pair in enumerate(zip(shots.ranger, shots.target, strict=True)) if pair == ("ZY112", "ZBM06")]
     rows = [(float(shots.mjd_utc[k]), "ZY112", "ZBM06", 30.0, 0.2) for k in mine]
-    reduction = reduce_epoch(sounded(night_01, rows))
+    reduction = reduce_epoch(sounded(few_01, rows))
     note = next(n for n in reduction.notes if n.startswith("ZBM06 - ZY112"))
     assert "the ranges contradict it" in note
     assert {reduction.status[k] for k in mine} == {"used"}
     value, u = reduction.coordinates.sound["ZBM06 - ZY112"]
     assert value == pytest.approx(30.0 - 11.6, abs=1.5)  # the other paths' air is some 11.6 °C
     assert u < 0.5
-    np.testing.assert_allclose(reduction.coordinates.x, reduced_night_01.coordinates.x, rtol=0, atol=30e-6)
+    np.testing.assert_allclose(reduction.coordinates.x, reduced_few_01.coordinates.x, rtol=0, atol=30e-6)
 
 
 ROW = "52889.14,ZY101,ZEG41040L,11.2,0.15"

@@ -1,4 +1,4 @@
-"""Points typed to decimetres in night-01: found where they were, or refused; nothing else changes."""
+"""Points typed to decimetres in night-01 or a part of it: found where they were, or refused; nothing else changes."""
 
 import dataclasses
 
@@ -39,11 +39,20 @@ def triplet_off(campaign, name, by=WRONG, u=300.0):
     return dataclasses.replace(campaign, triplets={**campaign.triplets, name: moved})
 
 
+def adjusting(reduction):
+    """Function campaign -> coordinates, from the phases of a reduction."""
+    r = reduction
+    return lambda campaign, settings=None: adjust_coordinates(campaign, r.phases, r.electronics, settings or r.settings)
+
+
 @pytest.fixture(scope="module")
 def adjusted(reduced_night_01):
-    """Function campaign -> coordinates, from night-01's phases."""
-    r = reduced_night_01
-    return lambda campaign, settings=None: adjust_coordinates(campaign, r.phases, r.electronics, settings or r.settings)
+    return adjusting(reduced_night_01)
+
+
+@pytest.fixture(scope="module")
+def few_adjusted(reduced_few_01):
+    return adjusting(reduced_few_01)
 
 
 def compare(one, other):
@@ -55,15 +64,15 @@ def compare(one, other):
     return np.abs(one.x - other.x).max()
 
 
-def test_a_target_typed_three_decimetres_off_comes_out_where_it_was(night_01, reduced_night_01, adjusted):
-    found = adjusted(target_off(night_01, "DP050"))
-    assert compare(found, reduced_night_01.coordinates) < 1e-6
+def test_a_target_typed_three_decimetres_off_comes_out_where_it_was(few_01, reduced_few_01, few_adjusted):
+    found = few_adjusted(target_off(few_01, "DP050"))
+    assert compare(found, reduced_few_01.coordinates) < 1e-6
     notes = [n for n in found.notes if n.startswith("DP050")]
     assert len(notes) == 1
     assert notes[0].startswith("DP050: position known to 300 mm only; whole cycles found jointly from 6 shots, next")
     assert not found.unresolved
     assert not found.ranges.thin.any()
-    assert found.variance_factor == pytest.approx(reduced_night_01.coordinates.variance_factor, abs=1e-4)
+    assert found.variance_factor == pytest.approx(reduced_few_01.coordinates.variance_factor, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -76,10 +85,10 @@ def test_only_the_weight_of_the_typed_position_makes_a_difference(night_01, adju
 
 
 def test_a_ranger_on_the_feed_arm_typed_three_decimetres_off_comes_out_where_it_was(
-    night_01, reduced_night_01, adjusted
+    few_01, reduced_few_01, few_adjusted
 ):
-    found = adjusted(arm_off(night_01, "ZY113"))
-    assert compare(found, reduced_night_01.coordinates) < 1e-6
+    found = few_adjusted(arm_off(few_01, "ZY113"))
+    assert compare(found, reduced_few_01.coordinates) < 1e-6
     assert any(n.startswith("ZY113: position known to 300 mm only; whole cycles found jointly") for n in found.notes)
 
 
@@ -94,18 +103,18 @@ def test_a_triplet_typed_three_decimetres_off_is_found_by_its_prisms_and_their_p
     assert not found.unresolved
 
 
-def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_guessed(night_01, reduced_night_01):
-    reduction = reduce_epoch(target_off(night_01, "DP005"))
-    before = reduced_night_01.status
-    mine = [k for k, t in enumerate(night_01.shots.target) if t == "DP005" and before[k] == "used"]
+def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_guessed(few_01, reduced_few_01):
+    reduction = reduce_epoch(target_off(few_01, "DP005"))
+    before = reduced_few_01.status
+    mine = [k for k, t in enumerate(few_01.shots.target) if t == "DP005" and before[k] == "used"]
     assert len(mine) == 4
     for k in mine:
         assert reduction.status[k] == "whole cycles unknown"
-        reason = reduction.rejected[int(night_01.shots.shot[k])]
+        reason = reduction.rejected[int(few_01.shots.shot[k])]
         assert reason.startswith("whole cycles unknown: DP005 is typed to 300 mm only; of ")
         assert "range it from more stations" in reason
     assert "DP005" not in reduction.coordinates.points
-    assert len(reduction.rejected) == len(reduced_night_01.rejected) + 4
+    assert len(reduction.rejected) == len(reduced_few_01.rejected) + 4
 
 
 @pytest.mark.slow
@@ -118,12 +127,12 @@ def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, 
     assert any("points known too badly for the nearest integer: whole cycles found jointly" in n for n in found.notes)
 
 
-def test_a_certified_distance_is_as_good_as_a_position(night_01, reduced_night_01):
+def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
     # one ranger sees ZBM02, at a distance known to some hundredths of a millimetre
-    r = reduced_night_01
-    resolved = resolve_cycles(target_off(night_01, "ZBM02"), r.phases, r.electronics, r.settings)
+    r = reduced_few_01
+    resolved = resolve_cycles(target_off(few_01, "ZBM02"), r.phases, r.electronics, r.settings)
     assert (resolved.rejected, resolved.notes) == ({}, ())
-    (certified,) = (b for b in night_01.benchmarks if b.target == "ZBM02")
+    (certified,) = (b for b in few_01.benchmarks if b.target == "ZBM02")
     ranger = r.coordinates.x[r.coordinates.index(certified.ranger)]
     distance = np.linalg.norm(resolved.starts["ZBM02"] - ranger)
     assert distance == pytest.approx(certified.certified_distance_mm * 1e-3, abs=2e-4)
@@ -163,11 +172,11 @@ def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
             TargetRow.model_validate(fields | {"u_position_mm": bad})
 
 
-def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(night_01, reduced_night_01, part, targets_01, rangers_01):
+def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(few_01, reduced_few_01, part, few_targets, few_rangers):
     # one ranger only: nothing but the typed 10 mm predicts its range, and five of them reach a quarter wavelength
-    r = reduced_night_01
-    drop = (targets_01 == "DP050") & (rangers_01 != "ZY113")
-    reduction = reduce_epoch(part(night_01, ~drop))
+    r = reduced_few_01
+    drop = (few_targets == "DP050") & (few_rangers != "ZY113")
+    reduction = reduce_epoch(part(few_01, ~drop))
     ranges = reduction.coordinates.ranges
     mine = np.array(ranges.target) == "DP050"
     assert mine.sum() == 1
@@ -178,17 +187,17 @@ def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(night_01, reduced_
 
 
 def test_a_campaign_of_nothing_but_unknown_cycles_is_refused_with_the_reason(
-    night_01, reduced_night_01, part, targets_01, references_01
+    few_01, reduced_few_01, part, few_targets, few_references
 ):
-    only = part(target_off(night_01, "DP005"), (targets_01 == "DP005") | references_01)
+    only = part(target_off(few_01, "DP005"), (few_targets == "DP005") | few_references)
     with pytest.raises(
         InputError, match=r"^shots\.csv: whole cycles unknown: DP005 is typed to 300 mm only; .*; nothing to adjust$"
     ):
         reduce_epoch(only)
 
 
-def test_repeats_on_one_line_do_not_vouch_for_each_others_cycles(night_01, part, targets_01, rangers_01):
-    reduction = reduce_epoch(part(night_01, ~((targets_01 == "ZAG731P") & (rangers_01 != "ZY101"))))
+def test_repeats_on_one_line_do_not_vouch_for_each_others_cycles(few_01, part, few_targets, few_rangers):
+    reduction = reduce_epoch(part(few_01, ~((few_targets == "ZAG731P") & (few_rangers != "ZY101"))))
     ranges = reduction.coordinates.ranges
     mine = np.array(ranges.target) == "ZAG731P"
     assert mine.sum() == 2  # from one coarse length, good to the typed 10 mm
@@ -197,12 +206,12 @@ def test_repeats_on_one_line_do_not_vouch_for_each_others_cycles(night_01, part,
 
 
 def test_a_point_with_some_shots_safe_and_some_unknown_starts_where_the_safe_ones_put_it(
-    night_01, reduced_night_01, adjusted
+    few_01, reduced_few_01, few_adjusted
 ):
     # ZBM01: certified from ZY102, four shots; ZY103's two alone would not place it. The night must not notice
-    found, before = adjusted(target_off(night_01, "ZBM01")), reduced_night_01.coordinates
+    found, before = few_adjusted(target_off(few_01, "ZBM01")), reduced_few_01.coordinates
     assert len(found.unresolved) == 2
-    assert {night_01.shots.ranger[k] for k in found.unresolved} == {"ZY103"}
+    assert {few_01.shots.ranger[k] for k in found.unresolved} == {"ZY103"}
     both = np.isin(before.ranges.shot, found.ranges.shot)
     np.testing.assert_array_equal(before.ranges.cycles[both], found.ranges.cycles)
     np.testing.assert_array_equal(before.ranges.used[both], found.ranges.used)
@@ -210,16 +219,16 @@ def test_a_point_with_some_shots_safe_and_some_unknown_starts_where_the_safe_one
     assert np.abs(found.x - before.x)[others].max() < 5e-6  # two shots fewer
 
 
-def test_a_certified_distance_overrules_a_typed_position_that_contradicts_it(night_01, reduced_night_01, adjusted):
+def test_a_certified_distance_overrules_a_typed_position_that_contradicts_it(few_01, reduced_few_01, few_adjusted):
     # 0.3 m off and claiming 10 mm: four shots, alike by the same wrong cycles, used to outvote the certificate
-    found, before = adjusted(target_off(night_01, "ZBM02", u=None)), reduced_night_01.coordinates
+    found, before = few_adjusted(target_off(few_01, "ZBM02", u=None)), reduced_few_01.coordinates
     np.testing.assert_array_equal(before.ranges.cycles, found.ranges.cycles)
     np.testing.assert_array_equal(before.ranges.used, found.ranges.used)
     assert any(n.startswith("ZBM02: its typed position is") for n in found.notes)
 
 
-def test_a_point_none_of_whose_shots_fits_is_named(night_01, adjusted):
-    found = adjusted(target_off(night_01, "DP012", u=None))
+def test_a_point_none_of_whose_shots_fits_is_named(few_01, few_adjusted):
+    found = few_adjusted(target_off(few_01, "DP012", u=None))
     mine = np.array(found.ranges.target) == "DP012"
     assert not found.ranges.used[mine].any()
     assert any(n.startswith(f"DP012: none of its {mine.sum()} shots fits") for n in found.notes)

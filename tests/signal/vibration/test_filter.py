@@ -13,7 +13,7 @@ from scipy.special import erf
 from catseye.errors import EstimationError, ValidityError
 from catseye.optics.detector import quadrant_position
 from catseye.signal.vibration.filter import Mode, decay_of, driven, driven_within, follow, start, window_gain
-from catseye.signal.vibration.modes import find_modes
+from catseye.signal.vibration.modes import _innovations, find_modes
 
 W, D = 2 * np.pi * 1.3, 0.3
 
@@ -209,3 +209,11 @@ def test_what_modes_cannot_be_found_in_is_refused(change, message):
     told = {"times": np.arange(40.0), "samples": np.sin(np.arange(40.0))[:, None], "count": 1, "u_sample": 0.1} | change
     with pytest.raises(ValidityError, match=message):
         find_modes(told.pop("times"), told.pop("samples"), **told)
+
+
+def test_what_a_still_target_scatters_is_the_samples_noise_alone():
+    """A mode without force leaves an offset that k samples before give to u / sqrt(k): variance u^2 (1 + 1/k)."""
+    t, u = 0.1 * np.arange(40), 2e-3
+    still = np.array([[W, np.log(0.05), -40.0]])  # sigma of the force e^-40
+    _, variances = _innovations(still, t, np.zeros((40, 1)), u, 0.01, 1)
+    np.testing.assert_allclose(variances[0, 1:], u**2 * (1.0 + 1.0 / np.arange(1, 40)), rtol=1e-6)

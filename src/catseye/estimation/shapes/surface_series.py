@@ -79,7 +79,7 @@ def fit_series(
         raise EstimationError(f"points of a series have the shape {points.shape} (expected epochs, points, 3)")
     epochs, k, _ = points.shape
     weights = np.ones(k) if weights is None else np.ascontiguousarray(weights, dtype=float)
-    variance = np.ascontiguousarray(np.broadcast_to(np.asarray(variance, dtype=float), (epochs, k)))
+    variance = np.array(np.broadcast_to(variance, (epochs, k)), dtype=float, order="C")  # writable: one kernel for all
     if compiled is None:
         compiled = epochs * k >= LARGE
     if not compiled:

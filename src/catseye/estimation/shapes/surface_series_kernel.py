@@ -138,7 +138,9 @@ def series(local, variance, weights, columns, focal, squared):
         here, noise, off = local[t], variance[t], deviation[t]
         for turn in range(ITERATIONS):
             # the normal matrix of the first step serves the others: their right sides decide where they end
-            points[t] = _pass(here, weights, noise, six, columns, focal, squared, turn == 0, off, normal, spread, right)
+            points[t] = _pass(
+                here, weights, noise, six, columns, focal, squared, 1 if turn == 0 else 0, off, normal, spread, right
+            )
             if points[t] < p:
                 status[t] = TOO_FEW
                 break

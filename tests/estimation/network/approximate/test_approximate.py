@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.network.approximate.start import approximate
@@ -29,11 +29,13 @@ from catseye.estimation.observations.kinds import (
 )
 from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.any_file import read_network
+from draws import examples
 from repository import TESTS
 
 MONITORING = TESTS / "vectors" / "networks" / "monitoring"
 ANGLE = 5e-6  # rad, about one arcsecond
 LENGTH = 1e-3  # m
+FEW = examples(25)
 
 
 class Survey:
@@ -182,7 +184,7 @@ def test_a_point_is_found_by_every_classical_construction(observe, seed):
     survey.found("P")
 
 
-@settings(deadline=None, max_examples=30)
+@FEW
 @given(st.integers(0, 10**6), st.integers(5, 9))
 def test_a_point_in_sight_of_any_five_stations_off_a_plane_is_found_from_ranges(seed, number):
     rng = np.random.default_rng(seed)
@@ -197,7 +199,7 @@ def test_a_point_in_sight_of_any_five_stations_off_a_plane_is_found_from_ranges(
         np.testing.assert_allclose(answer.xyz, survey.true, rtol=0.0, atol=0.1)
 
 
-@settings(deadline=None, max_examples=25)
+@FEW
 @given(st.floats(-np.pi, np.pi), st.floats(-1e4, 1e4), st.integers(0, 1000))
 def test_a_network_that_is_turned_and_moved_is_found_turned_and_moved(angle, shift, seed):
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])

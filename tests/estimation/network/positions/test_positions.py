@@ -14,7 +14,7 @@ from catseye.estimation.network.positions import dispatch as module
 from catseye.estimation.network.positions.descent import CAP, Ranges, descend
 from catseye.estimation.network.positions.dispatch import positions
 from catseye.estimation.network.positions.status import PositionStatus
-from draws import draws
+from draws import draws, examples
 from repository import TESTS
 
 NETWORK = TESTS / "vectors" / "networks" / "ranging-18x500"
@@ -144,6 +144,7 @@ def test_the_status_in_words_says_what_and_how_much():
         got.require_found()
 
 
+@examples(100)
 @given(seeds)
 def test_near_takes_the_image_on_its_side_of_coplanar_stations(seed):
     rng = np.random.default_rng(seed)

@@ -10,8 +10,10 @@ from catseye.errors import ValidityError
 from catseye.estimation.network.unfolding.factors import classical_scaling, match_means
 from catseye.estimation.network.unfolding.location import locate
 from catseye.estimation.network.unfolding.unfold import UNFOLDED, unfold
+from draws import draws, examples
 
 SIGMA = 1e-3  # m, on figures of 100 m
+FEW = examples(25)
 
 
 def scene(s, t, seed, *, height=20.0, target_height=1.0):
@@ -59,7 +61,7 @@ def test_missing_ranges_are_made_up_by_trilateration_from_a_complete_part(missin
     check(*scene(18, 100, seed), seed, missing=missing, within=0.02)
 
 
-@settings(deadline=None, max_examples=25)
+@FEW
 @given(st.integers(0, 10**6), st.floats(-3, 3))
 def test_scaling_all_ranges_scales_the_figure(seed, power):
     stations, targets = scene(8, 12, seed)
@@ -69,7 +71,7 @@ def test_scaling_all_ranges_scales_the_figure(seed, power):
     np.testing.assert_allclose(large.targets / factor, small.targets, rtol=0.0, atol=1e-5)
 
 
-@settings(deadline=None, max_examples=25)
+@FEW
 @given(st.integers(0, 10**6))
 def test_the_order_of_the_targets_does_not_matter(seed):
     rng = np.random.default_rng(seed)
@@ -79,7 +81,7 @@ def test_the_order_of_the_targets_does_not_matter(seed):
     np.testing.assert_allclose(first.targets[order], second.targets, rtol=0.0, atol=1e-5)
 
 
-@settings(deadline=None, max_examples=20)
+@FEW
 @given(st.integers(0, 10**6))
 def test_the_axes_are_those_that_are_stated(seed):
     found = check(*scene(12, 20, seed), seed, within=0.1)
@@ -214,12 +216,13 @@ def test_three_anchors_give_both_mirror_images_and_two_none():
     assert np.isnan(locate(line, np.linalg.norm(line - [1.0, 2.0, 0.0], axis=1)[None])[0]).all()
 
 
-def test_the_residuals_of_an_unfolded_figure_are_those_of_the_noise_over_many_draws():
+@draws(60)
+def test_the_residuals_of_an_unfolded_figure_are_those_of_the_noise_over_many_draws(runs):
     """rms^2 / sigma^2 is chi-square over its S T - 3 (S + T) + 6 degrees of freedom: mean within 4 standard errors."""
     stations, targets = scene(8, 14, 6)
     degrees = 8 * 14 - 3 * 22 + 6
-    rms2 = [unfold(measured(stations, targets, k), SIGMA).rms ** 2 for k in range(60)]
-    assert abs(np.mean(rms2) / SIGMA**2 - 1.0) < 4 * np.sqrt(2 / degrees / 60)
+    rms2 = [unfold(measured(stations, targets, k), SIGMA).rms ** 2 for k in range(runs)]
+    assert abs(np.mean(rms2) / SIGMA**2 - 1.0) < 4 * np.sqrt(2 / degrees / runs)
 
 
 def test_the_upgrade_descends_to_the_true_map_from_one_that_is_a_tenth_off():
