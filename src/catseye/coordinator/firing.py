@@ -13,12 +13,13 @@ from catseye.coordinator.intake import Intake
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.link.ranger import RangerLink
 from catseye.coordinator.modes import Suspensions
-from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, LiveReduction, PlannedShot, Round, ticks_now
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, PlannedShot, Round, ticks_now
 from catseye.errors import CatseyeError
 from catseye.ranger.initialisation import frame_of
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.reduction.epoch.reason import Reason, ShotStatus
+from catseye.reduction.live.live import Live
 from catseye.reduction.site.motion import frames_of
 
 GOOD = frozenset([ShotStatus.USED, ShotStatus.REFERENCE])
@@ -49,7 +50,7 @@ class Firing:
         links: Mapping[str, RangerLink],
         *,
         intake: Intake,
-        live: LiveReduction,
+        live: Live,
         event_log: EventLog,
         clock: Clock,
         allowed: Callable[[], bool],

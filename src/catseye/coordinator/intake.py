@@ -14,10 +14,11 @@ from typing import Any
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution, SentCommand
-from catseye.coordinator.parts import EpochJob, JournalWriter, LiveReduction, NotDurable
+from catseye.coordinator.parts import JournalWriter, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.reduction.epoch.reason import ShotStatus
+from catseye.reduction.live.live import EpochJob, Live
 
 TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back
@@ -40,7 +41,7 @@ class Intake:
 
     def __init__(
         self,
-        live: LiveReduction,
+        live: Live,
         journal: JournalWriter,
         *,
         judged: Callable[[AnsweredShot], None],

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request
-from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather
+from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture
+from catseye.simulator.clock.world_clock import Clock
 
 TICKS_PER_SECOND = TICKS_PER_DAY / SECONDS_PER_DAY
 
@@ -73,14 +74,6 @@ class SiteState:
     u: dict[str, NDArray[Any]]
 
 
-class Clock(Protocol):
-    """UTC, as `simulator.clock.world_clock`."""
-
-    def now_ns(self) -> int:
-        """Nanoseconds since MJD 0."""
-        ...
-
-
 class Planner(Protocol):
     """What chooses the shots of the next round."""
 
@@ -102,8 +95,8 @@ class SafetyAlarm(Protocol):
     def text(self) -> str: ...
 
 
-class SafetyGuard(Protocol):
-    """The last word before each request; it must hear what rangers answer, and how the telescope stands."""
+class RequestGuard(Protocol):
+    """What has the last word before each request; it must hear what rangers answer, and how the telescope stands."""
 
     def refusal(self, ranger: str, request: Request, now_ticks: int) -> str | None:
         """Why a request must not be sent, None where it may."""
@@ -117,55 +110,6 @@ class SafetyGuard(Protocol):
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> Sequence[SafetyAlarm]:
         """What comes to beams at rest."""
-        ...
-
-
-class ShotVerdict(Protocol):
-    """What the reduction says of one shot; m, NaN where it has none."""
-
-    @property
-    def status(self) -> str: ...
-    @property
-    def text(self) -> str: ...
-    @property
-    def range_(self) -> float: ...
-    @property
-    def u_range(self) -> float: ...
-    @property
-    def misfit(self) -> float: ...
-
-
-class EpochJob(Protocol):
-    """An epoch by itself; a thread may solve it."""
-
-    def solve(self) -> Any: ...
-
-
-class LiveReduction(Protocol):
-    """`reduction.live.live.Live`: pure, and fed in one order."""
-
-    @property
-    def failed(self) -> str:
-        """Why the last epoch gave nothing."""
-        ...
-
-    def weather(self, read: LiveWeather) -> str | None:
-        """Why a reading is not believed; nothing where it is."""
-        ...
-
-    def posture(self, read: LivePosture) -> None: ...
-    def shot(self, shot: LiveShot) -> ShotVerdict: ...
-    def begin(self, ticks: int) -> "EpochJob | None":
-        """The epoch of all shots since the last, to be solved; None where there is nothing to solve."""
-        ...
-
-    def take_in(self, job: Any, found: Any) -> Any | None:
-        """The answer of an epoch whose job has been solved; None where it found nothing."""
-        ...
-
-    def place(self, name: str, mjd: ArrayLike) -> NDArray[Any]: ...
-    def uncertainty(self) -> dict[str, NDArray[Any]]:
-        """Covariances (3, 3), m^2, of points as known by now."""
         ...
 
 

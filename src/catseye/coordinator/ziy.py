@@ -23,10 +23,9 @@ from catseye.coordinator.parts import (
     TICKS_PER_SECOND,
     Clock,
     JournalWriter,
-    LiveReduction,
     Planner,
+    RequestGuard,
     Round,
-    SafetyGuard,
     SiteState,
     ticks_now,
 )
@@ -35,6 +34,7 @@ from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.live.live import Live
 
 WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 
@@ -72,9 +72,9 @@ class Coordinator:
         site: SiteFolder,
         *,
         addresses: Mapping[str, Address],
-        live: LiveReduction,
+        live: Live,
         planner: Planner,
-        guard: SafetyGuard,
+        guard: RequestGuard,
         journal: JournalWriter,
         clock: Clock,
         feed: tuple[str, int] | MotionScript | None = None,

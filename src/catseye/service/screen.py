@@ -33,16 +33,16 @@ class SilentView:
     """A view that shows nothing."""
 
     def tell(self, text: str) -> None:
-        """Drop what a person would be told."""
+        """Tell a person: there is no screen."""
 
     def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
-        """Begin without a screen."""
+        """Begin to show: there is no screen."""
 
     def entry(self, entry: Any) -> None:
-        """Drop an entry."""
+        """Show an entry: there is no screen."""
 
     def end(self) -> None:
-        """End without a screen."""
+        """End to show: there is no screen."""
 
 
 class LinesView(SilentView):

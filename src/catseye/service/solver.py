@@ -15,8 +15,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, BinaryIO
 
-from catseye.coordinator.parts import EpochJob
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.live.live import EpochJob
 
 PROGRAM = (sys.executable, "-P", "-c", "from catseye.service.solver import serve; serve()")
 NICE = 5

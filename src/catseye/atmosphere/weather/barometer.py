@@ -200,7 +200,7 @@ class GravityStation:
 
     @property
     def gravity(self) -> float:
-        """Local gravity, m/s²."""
+        """Gravity at the place, m/s²."""
         return self.gravity_gal * GAL
 
     @property

@@ -146,7 +146,7 @@ class ZiyServer:
             await self._listener.close()
 
     def now_ticks(self) -> int:
-        """Ticks of this instant."""
+        """Ticks of the clock at this instant."""
         return ticks_now(self.coordinator.clock)
 
     def joined(self, client: Client) -> None:

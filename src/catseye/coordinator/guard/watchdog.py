@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.link.ranger import RangerLink
-from catseye.coordinator.parts import Clock, SafetyGuard, ticks_now
+from catseye.coordinator.parts import Clock, RequestGuard, ticks_now
 from catseye.errors import InputError
 from catseye.records.night.live import Severity
 
@@ -18,7 +18,7 @@ ACT_WITHIN = 60.0  # s: what comes later is told, and the next shot will have mo
 class BeamWatchdog:
     """Of all links; it acts only on those that measure, and never while a shot is under way."""
 
-    def __init__(self, links: Mapping[str, RangerLink], guard: SafetyGuard, *, clock: Clock, event_log: EventLog):
+    def __init__(self, links: Mapping[str, RangerLink], guard: RequestGuard, *, clock: Clock, event_log: EventLog):
         self._links, self._guard, self._clock, self._event_log = links, guard, clock, event_log
 
     async def run(self) -> None:

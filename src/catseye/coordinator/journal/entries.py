@@ -16,7 +16,7 @@ from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWea
 from catseye.records.site.folder import SiteFolder, site_files
 
 if TYPE_CHECKING:
-    from catseye.coordinator.parts import ShotVerdict
+    from catseye.reduction.live.shots import ShotAnswer
 
 NAN = float("nan")
 EPOCH_BEGUN = "epoch-begun"  # name of the document that says when an epoch's shots were taken out
@@ -38,7 +38,7 @@ class AnsweredShot:
     misfit: float = NAN
 
     @classmethod
-    def of(cls, shot: LiveShot, verdict: "ShotVerdict") -> "AnsweredShot":
+    def of(cls, shot: LiveShot, verdict: "ShotAnswer") -> "AnsweredShot":
         """The shot with the answer that `Live.shot` gave."""
         return cls(shot, str(verdict.status), verdict.text, verdict.range_, verdict.u_range, verdict.misfit)
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
-from catseye.coordinator.parts import EpochJob, LiveReduction
 from catseye.errors import CatseyeError
 from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.live.live import EpochJob, Live
 
-LiveFactory = Callable[[SiteFolder, StoredRun], LiveReduction]
+LiveFactory = Callable[[SiteFolder, StoredRun], Live]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def replay(
             shots, differing, job = 0, [], None
 
 
-def _asked(live: LiveReduction, shot: LiveShot) -> AnsweredShot:
+def _asked(live: Live, shot: LiveShot) -> AnsweredShot:
     """As the coordinator asks: a shot that the reduction refuses has the refusal for its answer."""
     try:
         return AnsweredShot.of(shot, live.shot(shot))

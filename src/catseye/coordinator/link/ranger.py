@@ -20,7 +20,7 @@ from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.link.shooting import Shooter
 from catseye.coordinator.link.status_watch import StatusWatch
 from catseye.coordinator.link.wire import Sent
-from catseye.coordinator.parts import Clock, PlannedShot, SafetyGuard, Tell, ticks_now
+from catseye.coordinator.parts import Clock, PlannedShot, RequestGuard, Tell, ticks_now
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
@@ -56,7 +56,7 @@ class RangerLink:
         *,
         commands: Sequence[Request],
         later: Collection[str] = (),
-        guard: SafetyGuard,
+        guard: RequestGuard,
         clock: Clock,
         tell: Tell,
         wanted: Wanted = "measure",

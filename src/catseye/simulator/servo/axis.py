@@ -229,7 +229,7 @@ class ServoAxis:
         return self.flt(kp=value)[0]
 
     def fki(self, value: int | None = None) -> int:
-        """The integral gain, FKI."""
+        """The gain of the integral, FKI."""
         return self.flt(ki=value)[1]
 
     def fkd(self, value: int | None = None) -> int:

@@ -195,7 +195,7 @@ class TwinSite:
 
 
 async def _halt(one: Served) -> None:
-    """Take no more turns."""
+    """End the turns of all rangers."""
     task, one.task = one.task, None
     if task is not None:
         task.cancel()

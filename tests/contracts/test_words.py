@@ -1,0 +1,67 @@
+"""One word, one meaning: class names stand once, docstrings say something, and no text is read back into a value."""
+
+import ast
+import re
+from collections import defaultdict
+
+import pytest
+
+from repository import ROOT
+
+SOURCE = ROOT / "src" / "catseye"
+TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+SHORTEST = 24  # characters of a docstring
+READERS = {"partition", "rpartition", "split", "rsplit", "startswith", "endswith", "removeprefix", "removesuffix"}
+VALUES = re.compile(r"\b(reasons?|parameters?|rejected|unresolved|layout\.names|carried\.names)\b")
+
+
+def test_public_class_names_stand_once():
+    places = defaultdict(list)
+    for path, tree in TREES.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(str(path.relative_to(SOURCE)))
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
+def test_docstrings_say_what_is_returned():
+    short = [
+        f"{path.relative_to(SOURCE)}: {node.name}: {said}"
+        for path, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+        and (said := ast.get_docstring(node)) is not None
+        and len(said) < SHORTEST
+    ]
+    assert short == []
+
+
+def read_back(tree):
+    """Places where the text of a reason or of a parameter's name is taken apart."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in READERS:
+            value = node.func.value
+        elif isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice) and isinstance(node.value, ast.Name):
+            value = node.value
+        else:
+            continue
+        text = ast.unparse(value)
+        whole = isinstance(node, ast.Subscript)  # slices of arrays of parameters are none
+        if text in ("reason", "parameter") or (not whole and VALUES.search(text)):
+            yield f"line {node.lineno}: {ast.unparse(node)}"
+
+
+@pytest.mark.parametrize("room", ["reduction/epoch", "reduction/live", "reduction/budget", "coordinator", "service"])
+def test_no_reason_and_no_parameter_is_read_from_its_text(room):
+    found = {
+        str(path.relative_to(SOURCE)): places
+        for path, tree in TREES.items()
+        if path.is_relative_to(SOURCE / room) and (places := list(read_back(tree)))
+    }
+    assert found == {}
+
+
+def test_such_reading_is_seen():
+    for text in ("reason.partition(':')", "row.reason.startswith('blocked')", "parameter[:-2]", "reasons[k].split()"):
+        assert list(read_back(ast.parse(text))), text
+    assert not list(read_back(ast.parse("name.partition(' ')")))
