@@ -8,7 +8,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
-from catseye.reduction.live.epoch import _lasts, campaign_of
+from catseye.reduction.live.epoch import _lasts, observed_site
 from catseye.reduction.site.motion import ground_from
 from live_scene import START, begun, site
 from parameter_scene import parameter, parameters
@@ -33,11 +33,11 @@ def second_epoch():
 
 def test_without_weather_there_is_no_campaign():
     with pytest.raises(InputError, match="no weather station has spoken"):
-        campaign_of(site(), [], [], **POSTURE)
+        observed_site(site(), [], [], **POSTURE)
 
 
 def test_only_stations_that_speak_take_part():
-    campaign = campaign_of(site(), [], [weather("WX2"), weather("WX2", 10.0)], **POSTURE)
+    campaign = observed_site(site(), [], [weather("WX2"), weather("WX2", 10.0)], **POSTURE)
     assert [s.name for s in campaign.site.weather_station] == ["WX2"]
     assert campaign.weather.station == ("WX2", "WX2")
     assert campaign.site.campaign.azimuth_deg == pytest.approx(10.0)

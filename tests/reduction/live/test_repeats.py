@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from catseye.records.night.live import LiveShot
+from catseye.reduction.epoch.ranges import ShotPhase
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.live.repeats import joined_repeats
-from catseye.reduction.live.shots import Taken
+from catseye.reduction.live.shots import PhasedShot
 
 HALF = 299_792_458.0 / 1.5e9 / 2.0  # m of a phase's turn, in vacuum
 INDEX = 1.00028
@@ -16,12 +18,16 @@ DAY = 86_400.0
 NOISE = 2e-3  # V
 
 
-def taken(number, seconds, distance, *, target="ZEG1", amplitude=1.0, reason="", u=NOISE):
+def with_noise(row, noise):
+    return replace(row, phase=replace(row.phase, phasor=row.phase.phasor + noise))
+
+
+def taken(number, seconds, distance, *, target="ZEG1", amplitude=1.0, reason=None, u=NOISE):
     """A shot whose phase is that of a path to and back: the further, the later."""
     phasor = amplitude * np.exp(-2j * math.pi * (INDEX * distance / HALF % 1.0))
     shot = LiveShot("ZY101", target, 52_889 * 10**8 + number, 128, 64, 1000, 1e-3, None, number=number)
-    harmonics = np.array([0.001 * number, 0.0])
-    return Taken(shot, 52_889.0 + seconds / DAY, phasor, u, 2 * u, 0.01, harmonics, amplitude, reason)
+    phase = ShotPhase(phasor, u, 2 * u, 0.01, (0.001 * number, 0.0), amplitude, reason)
+    return PhasedShot(shot, 52_889.0 + seconds / DAY, phase)
 
 
 def joined(rows, lengths):
@@ -29,7 +35,7 @@ def joined(rows, lengths):
 
 
 def phase_of(row, distance):
-    return abs(np.angle(row.phasor * np.exp(2j * math.pi * INDEX * distance / HALF)))
+    return abs(np.angle(row.phase.phasor * np.exp(2j * math.pi * INDEX * distance / HALF)))
 
 
 def test_a_stream_on_a_moving_target_is_one_shot_at_its_middle():
@@ -44,19 +50,19 @@ def test_a_stream_on_a_moving_target_is_one_shot_at_its_middle():
     assert one.shot.number == 7
     assert one.mjd == rows[6].mjd
     assert phase_of(one, length(times[6])) < 1e-5  # MJD as a double has steps of 0.6 us, 1e-9 m here
-    weights = np.array([r.u_phasor**-2 for r in rows])
-    assert one.u_phasor == pytest.approx(weights.sum() ** -0.5)
-    assert one.u_across == pytest.approx(2 * weights.sum() ** -0.5)
-    assert one.harmonics[0] == pytest.approx(0.0065)
+    weights = np.array([r.phase.u_phasor**-2 for r in rows])
+    assert one.phase.u_phasor == pytest.approx(weights.sum() ** -0.5)
+    assert one.phase.u_across == pytest.approx(2 * weights.sum() ** -0.5)
+    assert one.phase.harmonics[0] == pytest.approx(0.0065)
 
 
 def test_claimed_noise_is_the_scatter_of_the_mean():
     rng, found = np.random.default_rng(2), []
     for _ in range(400):
         rows = [taken(k, 0.13 * k, 50.0) for k in range(16)]
-        noisy = [replace(r, phasor=r.phasor + complex(*rng.normal(0.0, NOISE, 2))) for r in rows]
+        noisy = [with_noise(r, complex(*rng.normal(0.0, NOISE, 2))) for r in rows]
         (one,) = joined(noisy, lambda ranger, target, mjd: np.full(len(mjd), 50.0))
-        found.append((one.phasor - rows[0].phasor) / one.u_phasor)
+        found.append((one.phase.phasor - rows[0].phase.phasor) / one.phase.u_phasor)
     assert np.mean(np.abs(found) ** 2) / 2 == pytest.approx(1.0, abs=4 / math.sqrt(800))
 
 
@@ -83,7 +89,7 @@ def test_windows():
 def test_what_is_not_joined():
     rows = [
         taken(1, 0.0, 50.0),
-        taken(2, 0.1, 50.0, reason="blocked: by a test"),
+        taken(2, 0.1, 50.0, reason=Reason(ShotStatus.BLOCKED, "by a test")),
         taken(3, 0.2, 50.0, target="ZEG2"),
         taken(4, 0.3, 5.0, target="ZRG"),
         taken(5, 0.4, 5.0, target="ZRG"),

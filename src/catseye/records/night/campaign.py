@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -29,16 +29,22 @@ PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign(SiteFolder):
-    """Everything that a campaign's directory holds: its site and its night.
+class ObservedSite(SiteFolder):
+    """A site with its shots and its weather, all that ranges and coordinates need once phases are known.
 
     `path_temperatures` is None where no line's temperature was measured by sound.
     """
 
     weather: Weather
     shots: ShotColumns
-    frames: np.ndarray
     path_temperatures: PathTemperatureTable | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign(ObservedSite):
+    """Everything that a campaign's directory holds: its site and its night, with the samples of each shot."""
+
+    frames: np.ndarray = field(kw_only=True)
 
 
 def read_campaign(directory: Path | str) -> Campaign:

@@ -13,7 +13,7 @@ from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.path.mean import mean_over_height, pressure_at
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.records.night.path_temperature import PathTemperatureTable
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -129,7 +129,7 @@ class AirField:
     sounded: np.ndarray | None = None
 
     @classmethod
-    def of(cls, campaign: Campaign, settings: ReductionSettings) -> "AirField":
+    def of(cls, campaign: ObservedSite, settings: ReductionSettings) -> "AirField":
         """The air of a campaign; heights in the ground frame."""
         weather, site = campaign.weather, campaign.site
         stations = site.weather_station

@@ -10,7 +10,7 @@ from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit, LeastSquaresSolution, adjust
 from catseye.estimation.least_squares.robust import CHECKED, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
@@ -142,7 +142,7 @@ class AdjustedCoordinates:
 
 
 def adjust_coordinates(
-    campaign: Campaign,
+    campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
     settings: ReductionSettings,

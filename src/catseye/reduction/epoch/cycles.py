@@ -17,7 +17,7 @@ from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit,
 from catseye.estimation.least_squares.robust import adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
 from catseye.reduction.epoch.reason import Reason, ShotStatus
@@ -47,7 +47,7 @@ class Resolved:
 
 
 def resolve_cycles(
-    campaign: Campaign,
+    campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
     settings: ReductionSettings,

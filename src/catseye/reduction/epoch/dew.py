@@ -13,7 +13,7 @@ from catseye.atmosphere.weather.condensation import Condensation, condensation
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import utc_text
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 
 LONGEST_GAP = 900.0  # s between two readings of a surface that are joined, and two samples at risk of one spell
 LEAST_PROBABILITY = 0.1  # of a deposit, from which on a person should look
@@ -91,7 +91,7 @@ class DewRisk:
 
 
 def dew_risk(
-    campaign: Campaign,
+    campaign: ObservedSite,
     *,
     surface_minus_air_c: float | None = None,
     surface: SurfaceTemperature | None = None,

@@ -6,7 +6,7 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.shapes.paraboloid import fit_paraboloid
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.unknowns import CampaignNetwork
 from catseye.reduction.site.places import nominal_frame
 
@@ -15,7 +15,7 @@ WELL_KNOWN = 0.001  # m, largest standard uncertainty of a coordinate of a prism
 ROUNDS = 5  # of leaving out the prisms that stand out
 
 
-def dish_prisms(campaign: Campaign) -> list[str]:
+def dish_prisms(campaign: ObservedSite) -> list[str]:
     """Names of the single prisms of the reflector frame, sorted.
 
     Source: README of the campaign layout: their reference points lie on the paraboloid when the surface is ideal.

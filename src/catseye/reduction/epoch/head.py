@@ -23,7 +23,7 @@ from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle, azimuth_co
 from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
 from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.files.refusal import refusal
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.site.stations import AXES, station_in
@@ -67,7 +67,7 @@ class HeadCorrections:
         return self.value + np.sum(self.slopes * x[self.columns], axis=1)
 
 
-def head_unknowns(campaign: Campaign, name: str) -> list[Unknown]:
+def head_unknowns(campaign: ObservedSite, name: str) -> list[Unknown]:
     """The parameters of a ranger's head; none for a sheet that knows nothing of these effects.
 
     Raises InputError for a feed-arm ranger whose sheet speaks of its axes while feedarm.toml does not say how its mount
@@ -92,7 +92,7 @@ def head_unknowns(campaign: Campaign, name: str) -> list[Unknown]:
 
 
 def head_corrections(
-    campaign: Campaign,
+    campaign: ObservedSite,
     name: str,
     at: Mapping[Parameter, int],
     *,
@@ -142,7 +142,7 @@ def _orders(mirror: Mirror) -> int:
     return len(mirror.cyclic_cosine_mm) or UNSAID_ORDERS
 
 
-def _axes(campaign: Campaign, name: str, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _axes(campaign: ObservedSite, name: str, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Correction (m,) and its derivatives (m, 4) by the four offsets: less the target's change, plus the cube's.
 
     Source: [PARKER04] eq. 2.8 and 2.12 for the mirror's axes, 2.21 and 2.22 for the cube's angles.
@@ -169,7 +169,7 @@ def _axes(campaign: Campaign, name: str, sight: np.ndarray) -> tuple[np.ndarray,
     return change_0 - change, slopes_0 - slopes
 
 
-def mounted(campaign: Campaign, name: str) -> MirrorStation:
+def mounted(campaign: ObservedSite, name: str) -> MirrorStation:
     """The ranger's mirror as it stands; InputError on the feed arm where feedarm.toml does not say how it is turned."""
     station, mirror = station_in(campaign, name), campaign.mirror_of(name)
     if station is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
-from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.night.campaign import REFERENCE, Campaign, ObservedSite
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -28,6 +28,19 @@ BEND = 0.005  # rad, more allowed inside, where only its curvature counts
 REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which something else is in it
 
 WRONG = {BufferStatus.DROPOUT: ShotStatus.DROPOUT, BufferStatus.STUCK: ShotStatus.STUCK}
+
+
+@dataclass(frozen=True, eq=False)
+class ShotPhase:
+    """What one shot's samples say: a row of `Phases`."""
+
+    phasor: complex
+    u_phasor: float
+    u_across: float
+    offset: float
+    harmonics: tuple[float, float]
+    largest: float
+    reason: Reason | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +64,19 @@ class Phases:
     harmonics: np.ndarray
     largest: np.ndarray
     reason: tuple[Reason | None, ...]
+
+    @staticmethod
+    def of(shots: Sequence["ShotPhase"]) -> "Phases":
+        """Phases that were found one by one, as columns."""
+        return Phases(
+            np.array([s.phasor for s in shots], dtype=complex),
+            np.array([s.u_phasor for s in shots]),
+            np.array([s.u_across for s in shots]),
+            np.array([s.offset for s in shots]),
+            np.array([s.harmonics for s in shots]).reshape(-1, 2),
+            np.array([s.largest for s in shots]),
+            tuple(s.reason for s in shots),
+        )
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -97,7 +123,7 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
     volts_per_code = adc.full_scale_volt / 2 ** (adc.bits - 1)
-    detected = Detected.empty(n)
+    detected = Detections.empty(n)
     shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
     done = 0
     for cycles, samples_per_cycle in shapes:
@@ -116,7 +142,22 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
 
 
 @dataclass(frozen=True, eq=False)
-class Detected:
+class BufferDetection:
+    """What synchronous detection found in one buffer: a row of `Detections`, V."""
+
+    raw: complex
+    u_phasor: float
+    offset: float = 0.0
+    harmonics: tuple[float, float] = (0.0, 0.0)
+    largest: float = 0.0
+    clipped: int = 0
+    total: Sequence[float] = (0.0, 0.0, 0.0)
+    between: Sequence[float] = (0.0, 0.0, 0.0)
+    wrong: Reason | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
     """What synchronous detection found in n buffers, leakage still in it; fields as in
     `signal.detection.phase.Detection`.
 
@@ -134,10 +175,10 @@ class Detected:
     wrong: list[Reason | None]
 
     @staticmethod
-    def empty(n: int) -> "Detected":
+    def empty(n: int) -> "Detections":
         """Detections of n buffers, to be filled."""
         one, three = np.zeros(n), np.zeros((n, 3))
-        return Detected(
+        return Detections(
             np.zeros(n, dtype=complex),
             one,
             one.copy(),
@@ -147,6 +188,20 @@ class Detected:
             three,
             three.copy(),
             [None] * n,
+        )
+
+    def row(self, k: int) -> BufferDetection:
+        """One buffer's, as plain numbers."""
+        return BufferDetection(
+            complex(self.raw[k]),
+            float(self.u_phasor[k]),
+            float(self.offset[k]),
+            (float(self.harmonics[k, 0]), float(self.harmonics[k, 1])),
+            float(self.largest[k]),
+            int(self.clipped[k]),
+            self.total[k].tolist(),
+            self.between[k].tolist(),
+            self.wrong[k],
         )
 
     def put(
@@ -166,7 +221,7 @@ class Detected:
 
 
 def judged_phases(
-    detected: Detected,
+    detected: Detections,
     cycles: np.ndarray,
     samples_per_cycle: np.ndarray,
     mirrors: Sequence[Mirror],
@@ -180,41 +235,37 @@ def judged_phases(
     mirrors                      n, the sheets of the heads
     usual_of                     from amplitudes (n,), V, to what is usual for each; for the text of a blocked one
     """
-    raw, u_phasor, clipped, largest = detected.raw, detected.u_phasor, detected.clipped, detected.largest
-    n = len(raw)
+    n = len(detected.raw)
     phasor = subtract_leakage(
-        raw,
+        detected.raw,
         np.array([m.leakage_amplitude_volt for m in mirrors]),
         np.array([m.leakage_phase_rad for m in mirrors]),
     )
     scatter = CycleScatter(cycles, detected.total, detected.between, np.zeros(n, dtype=np.int64))
     enough = cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
-    u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), u_phasor)
+    u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), detected.u_phasor)
     usual = usual_of(np.abs(phasor))
     reason = [
         why_not(
-            complex(raw[k]),
+            detected.row(k),
             complex(phasor[k]),
-            float(u_phasor[k]),
-            int(clipped[k]),
-            float(largest[k]),
-            (int(cycles[k]), int(samples_per_cycle[k])),
-            mirrors[k],
-            settings,
-            float(usual[k]),
+            sampling=(int(cycles[k]), int(samples_per_cycle[k])),
+            mirror=mirrors[k],
+            settings=settings,
+            usual=float(usual[k]),
         )
         or detected.wrong[k]
         for k in range(n)
     ]
-    return Phases(phasor, u_phasor, u_across, detected.offset, detected.harmonics, largest, tuple(reason))
+    return Phases(
+        phasor, detected.u_phasor, u_across, detected.offset, detected.harmonics, detected.largest, tuple(reason)
+    )
 
 
 def why_not(
-    raw: complex,
+    buffer: BufferDetection,
     phasor: complex,
-    u_phasor: float,
-    clipped: int,
-    largest: float,
+    *,
     sampling: tuple[int, int],
     mirror: Mirror,
     settings: ReductionSettings,
@@ -222,15 +273,14 @@ def why_not(
 ) -> Reason | None:
     """Why a buffer's phase cannot be used, None where it can.
 
-    raw, phasor   V, with leakage in it and without
-    clipped       samples at the converter's end
-    largest       V
-    sampling      cycles and samples a cycle
-    usual         V, for the text
+    buffer      leakage in it
+    phasor      V, without
+    sampling    cycles and samples a cycle
+    usual       V, for the text
     """
-    limit = settings.smallest_return * math.hypot(u_phasor, mirror.u_leakage_volt)
-    if clipped:
-        return Reason(ShotStatus.CLIPPED, f"{clipped} samples at the converter's end ({largest:.2f} V)")
+    limit = settings.smallest_return * math.hypot(buffer.u_phasor, mirror.u_leakage_volt)
+    if buffer.clipped:
+        return Reason(ShotStatus.CLIPPED, f"{buffer.clipped} samples at the converter's end ({buffer.largest:.2f} V)")
     if not math.isfinite(limit):
         text = (
             f"{sampling[0]} cycles of {sampling[1]} samples show no scatter (expected at least 2 cycles, or 8 samples)"
@@ -239,14 +289,14 @@ def why_not(
     if abs(phasor) < limit:
         text = f"return {abs(phasor):.4f} V, below the limit of {limit:.4f} V (usual {usual:.2f} V)"
         return Reason(ShotStatus.BLOCKED, text)
-    if abs(raw) < limit:
+    if abs(buffer.raw) < limit:
         leakage = mirror.leakage_amplitude_volt
-        text = f"the samples hold {abs(raw):.4f} V, not even the leakage of {leakage:.4f} V: converter or cable"
+        text = f"the samples hold {abs(buffer.raw):.4f} V, not even the leakage of {leakage:.4f} V: converter or cable"
         return Reason(ShotStatus.DEAD, text)
     return None
 
 
-def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
+def _usual_amplitude(campaign: ObservedSite, amplitude: np.ndarray) -> np.ndarray:
     """Median amplitude of each shot's ranger, reference and target shots apart."""
     key = np.array([f"{r} {t == REFERENCE}" for r, t in zip(campaign.shots.ranger, campaign.shots.target, strict=True)])
     usual = np.zeros(len(amplitude))
@@ -255,7 +305,7 @@ def _usual_amplitude(campaign: Campaign, amplitude: np.ndarray) -> np.ndarray:
     return usual
 
 
-def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
+def follow_electronics(campaign: ObservedSite, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
     """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
 
     References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
@@ -292,7 +342,7 @@ def follow_electronics(campaign: Campaign, phases: Phases) -> tuple[dict[str, El
     return electronics, rejected
 
 
-def walk_notes(campaign: Campaign, phases: Phases, wrong: Collection[int]) -> list[str]:
+def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -> list[str]:
     """A line where the good references of all rangers together walk otherwise than the site's figure says.
 
     wrong   references that are left out, indices into the campaign's shots

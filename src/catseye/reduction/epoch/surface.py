@@ -8,7 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.dish import dish_prisms
 from catseye.reduction.site.places import nominal_frame
@@ -60,7 +60,7 @@ class DishFit:
         }
 
 
-def fit_surface(campaign: Campaign, coordinates: AdjustedCoordinates) -> tuple[DishFit | None, str]:
+def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tuple[DishFit | None, str]:
     """The dish from its prisms (single prisms of the reflector frame), and why there is none, "" where there is.
 
     A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
-from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.night.campaign import REFERENCE, ObservedSite
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air import AirField
 from catseye.reduction.epoch.head import head_unknowns
@@ -75,7 +75,7 @@ class UnknownsLayout:
 class CampaignNetwork:
     """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what."""
 
-    campaign: Campaign
+    campaign: ObservedSite
     settings: ReductionSettings
     phases: Phases
     electronics: dict[str, ElectronicsPhase]
@@ -102,7 +102,7 @@ class CampaignNetwork:
 
 
 def build_network(
-    campaign: Campaign,
+    campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
     settings: ReductionSettings,
@@ -173,7 +173,11 @@ def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: Arra
 
 
 def _priors(
-    campaign: Campaign, settings: ReductionSettings, seen: dict[str, RangedPoint], layout: UnknownsLayout, air: AirField
+    campaign: ObservedSite,
+    settings: ReductionSettings,
+    seen: dict[str, RangedPoint],
+    layout: UnknownsLayout,
+    air: AirField,
 ) -> list[ObservationGroup]:
     count = len(air.stations)
     at = layout.air
@@ -210,7 +214,7 @@ def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
     return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
 
 
-def _survey(campaign: Campaign, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
+def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
     """Fixed points as surveyed (a zero u holds a coordinate, it defines the datum), mirrors above them as measured."""
     priors: list[ObservationGroup] = []
     columns, observed, sigma = [], [], []
@@ -238,7 +242,7 @@ def _survey(campaign: Campaign, seen: dict[str, RangedPoint], layout: UnknownsLa
     return priors
 
 
-def _heads(campaign: Campaign, layout: UnknownsLayout) -> list[ObservationGroup]:
+def _heads(campaign: ObservedSite, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
     rangers = [n for n in campaign.rangers if Parameter(ParameterKind.ZERO, n) in layout.at]
     mirrors = [campaign.mirror_of(n) for n in rangers]
@@ -253,7 +257,7 @@ def _heads(campaign: Campaign, layout: UnknownsLayout) -> list[ObservationGroup]
     ]
 
 
-def _head(campaign: Campaign, name: str, layout: UnknownsLayout) -> Linear:
+def _head(campaign: ObservedSite, name: str, layout: UnknownsLayout) -> Linear:
     """How far the effects of one ranger's head may be off its sheet."""
     zp = campaign.mirror_of(name).zp
     columns: list[int] = []
@@ -264,7 +268,7 @@ def _head(campaign: Campaign, name: str, layout: UnknownsLayout) -> Linear:
     return _independent(HEADS, columns, np.zeros(len(columns)), u)
 
 
-def _directions(campaign: Campaign, settings: ReductionSettings, layout: UnknownsLayout) -> list[ObservationGroup]:
+def _directions(campaign: ObservedSite, settings: ReductionSettings, layout: UnknownsLayout) -> list[ObservationGroup]:
     """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
     normals = [quantity for quantity in layout.at if quantity.kind is ParameterKind.NORMAL]
     if not normals:

@@ -4,6 +4,7 @@ The recipe is that of a campaign (`coordinates.settle_network`), with two differ
 the telescope had carried them, and what earlier epochs know takes the place of the records' priors.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.geometry.frames.frame import Transform
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import ObservedSite
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.records.night.shot import ShotColumns
 from catseye.records.night.weather import Weather
@@ -22,11 +23,11 @@ from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of, settle_network
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
-from catseye.reduction.epoch.ranges import follow_electronics
+from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
-from catseye.reduction.live.shots import Taken, phases_of
+from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
 from catseye.reduction.site.motion import CarriedMotion, ground_from
 
@@ -43,22 +44,22 @@ class Epoch:
     reasons       row of the shots: why it was left out
     """
 
-    rows: tuple[Taken, ...]
+    rows: tuple[PhasedShot, ...]
     coordinates: AdjustedCoordinates
     carried: Carried
     reasons: dict[int, Reason]
 
 
-def campaign_of(
+def observed_site(
     site: SiteFolder,
-    rows: Sequence[Taken],
+    rows: Sequence[PhasedShot],
     weather: Sequence[LiveWeather],
     *,
     azimuth: float,
     elevation: float,
     mjd: float,
-) -> Campaign:
-    """The shots of an epoch as a campaign of a telescope that stands as it stood then.
+) -> ObservedSite:
+    """The shots and the weather of an epoch, at a site whose telescope stands as it stood then.
 
     rows      shots, in any order; times are those of the buffers' middles
     weather   readings of the stations that speak; the others are left out of the site
@@ -73,9 +74,9 @@ def campaign_of(
         update={"azimuth_deg": azimuth / DEGREE % 360.0, "elevation_deg": elevation / DEGREE, "start_mjd_utc": mjd}
     )
     said = [w for w in weather if any(w.station == s.name for s in stations)]
-    fields = {name: getattr(site, name) for name in SiteFolder.__dataclass_fields__}
+    fields = {field.name: getattr(site, field.name) for field in dataclasses.fields(SiteFolder)}
     fields["site"] = site.site.model_copy(update={"campaign": posture, "weather_station": stations})
-    return Campaign(
+    return ObservedSite(
         **fields,
         weather=Weather(
             np.array([w.ticks / TICKS_PER_DAY for w in said]),
@@ -93,13 +94,12 @@ def campaign_of(
             np.array([r.shot.samples_per_cycle for r in rows], dtype=np.int64),
             np.arange(len(rows)),
         ),
-        frames=np.empty((0, 0), dtype=np.int16),
     )
 
 
 def solve_epoch(
-    campaign: Campaign,
-    rows: Sequence[Taken],
+    observed: ObservedSite,
+    rows: Sequence[PhasedShot],
     motion: CarriedMotion,
     settings: ReductionSettings,
     *,
@@ -109,7 +109,7 @@ def solve_epoch(
 ) -> Epoch:
     """Everything that the shots of an epoch and what was carried to it say.
 
-    campaign   of the shots, see `campaign_of`
+    observed   the shots and the weather, see `observed_site`
     rows       the same shots with their phases
     motion     of the telescope, its epoch that of `ticks`
     settings   of the reduction
@@ -119,15 +119,15 @@ def solve_epoch(
 
     Raises InputError where no shot can be used and EstimationError where the adjustment finds no answer.
     """
-    phases = phases_of(list(rows))
+    phases = Phases.of([row.phase for row in rows])
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason}
-    electronics, wrong = follow_electronics(campaign, phases)
+    electronics, wrong = follow_electronics(observed, phases)
     reasons |= wrong
     resolved = Resolved({}, {}, ())
     if carried is None:
-        resolved = resolve_cycles(campaign, phases, electronics, settings, motion=motion)
+        resolved = resolve_cycles(observed, phases, electronics, settings, motion=motion)
         electronics = without_shots(electronics, set(resolved.rejected))
-    network = build_network(campaign, phases, electronics, settings, motion=motion, also=lasting)
+    network = build_network(observed, phases, electronics, settings, motion=motion, also=lasting)
     if not network.rangers:
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
     frames = frames_at(network, motion)
@@ -138,7 +138,7 @@ def solve_epoch(
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
-        [i for i, free in enumerate(layout.free) if free and _lasts(layout.parameters[i], lasting, campaign.triplets)]
+        [i for i, free in enumerate(layout.free) if free and _lasts(layout.parameters[i], lasting, observed.triplets)]
     )
     seen = from_ground(
         tuple(layout.parameters[i] for i in lasts),

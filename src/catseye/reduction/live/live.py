@@ -22,11 +22,11 @@ from catseye.reduction.epoch.parameter import GRADIENT, POINT_KINDS, Parameter, 
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.live.epoch import Epoch, campaign_of, frames_of_points, solve_epoch
+from catseye.reduction.live.epoch import Epoch, frames_of_points, observed_site, solve_epoch
 from catseye.reduction.live.jitter import Jitter
 from catseye.reduction.live.pose import LivePose, live_pose
 from catseye.reduction.live.repeats import joined_repeats
-from catseye.reduction.live.shots import RangerNow, ShotAnswer, SolvedLine, Taken, answer, taken
+from catseye.reduction.live.shots import PhasedShot, RangerNow, ShotAnswer, SolvedLine, answer, phased
 from catseye.reduction.live.state import USUAL, Carried, Loosening, carried_on, with_reference, with_velocities
 from catseye.reduction.live.weather import StationWatch
 from catseye.reduction.site.bodies import bodies_of, lasting_names
@@ -126,7 +126,7 @@ class EpochAnswer:
 class EpochJob:
     """An epoch to be solved, by itself: another process may do it."""
 
-    rows: list[Taken]
+    rows: list[PhasedShot]
     weather: list[LiveWeather]
     motion: CarriedMotion
     places: dict[str, Array]
@@ -144,11 +144,11 @@ class EpochJob:
             try:
                 site = self.motion.site
                 rows = joined_repeats(self.rows, self._lengths, site.site.ranging.modulation_hz, self.index)
-                campaign = campaign_of(
+                observed = observed_site(
                     site, rows, self.weather, azimuth=self.azimuth, elevation=self.elevation, mjd=self.motion.epoch
                 )
                 return solve_epoch(
-                    campaign,
+                    observed,
                     rows,
                     self.motion,
                     self.rules,
@@ -183,7 +183,7 @@ class Live:
         self.number = 0
         self.last_ticks = 0
         self.failed = ""  # why the last solve gave nothing
-        self._pending: list[Taken] = []
+        self._pending: list[PhasedShot] = []
         self._lines: dict[tuple[str, str], SolvedLine] = {}
         self._own: dict[str, Array] = _own_places(self.site, self.frames)
         self._constants = {name: place.constant for name, place in places_of(self.site).items()}
@@ -212,7 +212,7 @@ class Live:
         modulation = self.site.site.ranging.modulation_hz
         distance, rate = (math.nan, 0.0) if own else self._distance(shot)
         run = -2.0 * TWO_PI * modulation * self._index * rate / SPEED_OF_LIGHT / shot.if_hz
-        row = taken(
+        row = phased(
             shot,
             mirror,
             adc,
@@ -221,8 +221,9 @@ class Live:
             run=run if abs(run) < 0.5 * math.pi else 0.0,
         )
         stamped = abs(run) * shot.if_hz * TICK_SECONDS / math.sqrt(12.0)  # rad: a stamp has steps of 0.864 ms
-        u_across = math.hypot(row.u_across, stamped * abs(row.phasor))
-        row = replace(row, u_across=u_across, shot=replace(shot, samples=None))  # the epoch needs its phase alone
+        u_across = math.hypot(row.phase.u_across, stamped * abs(row.phase.phasor))
+        phase = replace(row.phase, u_across=u_across)
+        row = replace(row, phase=phase, shot=replace(shot, samples=None))  # the epoch needs its phase alone
         said = answer(
             row,
             now,
@@ -233,10 +234,11 @@ class Live:
             walk=self.site.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR,
         )
         if said.status is ShotStatus.NO_PLACE:
+            reason = Reason(ShotStatus.NO_PLACE, "the telescope has told no posture")
             if shot.target not in self._own:
-                stranger = Reason(ShotStatus.NO_PLACE, f"the site has no target {shot.target}")
-                said = ShotAnswer.refused(stranger, said.amplitude, said.phase)
-            row = replace(row, reason=said.reason)
+                reason = Reason(ShotStatus.NO_PLACE, f"the site has no target {shot.target}")
+            said = ShotAnswer.refused(reason, said.amplitude, said.phase)
+            row = row.left_out(reason)
         if said.status in (ShotStatus.USED, ShotStatus.REFERENCE):
             usual.append(said.amplitude)
         if said.status is ShotStatus.REFERENCE:
@@ -377,7 +379,7 @@ class Live:
             return "the telescope has told no posture"
         return "" if weather else "no weather station has spoken"
 
-    def _rows(self, ticks: int) -> list[Taken]:
+    def _rows(self, ticks: int) -> list[PhasedShot]:
         """The epoch's shots and the reference shots before, in order of time; those without a posture say so."""
         since = (ticks / TICKS_PER_DAY) - self.settings.references_s / SECONDS_PER_DAY
         references = [r for now in self.rangers.values() for r in now.references if r.mjd >= since]
@@ -389,13 +391,13 @@ class Live:
         age = self.track.age(np.array([r.mjd for r in rows]))
         nearest, expected = "the telescope's nearest is", f"(expected {LONGEST_GAP:g} s)"
         return [
-            replace(row, reason=Reason(ShotStatus.NO_POSTURE, f"{nearest} {old:.1f} s away {expected}"))
+            row.left_out(Reason(ShotStatus.NO_POSTURE, f"{nearest} {old:.1f} s away {expected}"))
             if not row.reason and old > LONGEST_GAP and {row.shot.ranger, row.shot.target} & moving
             else row
             for row, old in zip(rows, age, strict=True)
         ]
 
-    def _shaking(self, rows: Sequence[Taken]) -> dict[str, float]:
+    def _shaking(self, rows: Sequence[PhasedShot]) -> dict[str, float]:
         """Jitter of each body, mm: as learnt, and bent by the telescope's own motion during the epoch's shots."""
         times = [r.mjd for r in rows if r.shot.target != REFERENCE]
         angles = self.track.at(np.array(times or [rows[-1].mjd]))

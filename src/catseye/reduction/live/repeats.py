@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.site.folder import REFERENCE
-from catseye.reduction.live.shots import Taken
+from catseye.reduction.epoch.ranges import ShotPhase
+from catseye.reduction.live.shots import PhasedShot
 
 Array = NDArray[np.float64]
 Lengths = Callable[[str, str, Array], Array]  # ranger, target, MJD (m,) to predicted distances (m,), m
@@ -23,7 +24,9 @@ WAY = 5.0 * MILLIMETRE  # that it may change: a place 10 mm wrong makes some mic
 OFF_SIGMAS, OFF_WAY = 6.0, 1.0 * MILLIMETRE  # from the median, both: a repeat that is of something else
 
 
-def joined_repeats(rows: Sequence[Taken], lengths: Lengths, modulation_hz: float, index: float) -> list[Taken]:
+def joined_repeats(
+    rows: Sequence[PhasedShot], lengths: Lengths, modulation_hz: float, index: float
+) -> list[PhasedShot]:
     """The rows of an epoch with repeats joined, in order of time; `numbers` says what each stands for.
 
     rows            of an epoch; those with a reason and reference shots stay as they are
@@ -31,7 +34,7 @@ def joined_repeats(rows: Sequence[Taken], lengths: Lengths, modulation_hz: float
     modulation_hz   Hz
     index           group refractive index, to 1e-4
     """
-    lines: dict[tuple[str, str, int, int], list[Taken]] = {}
+    lines: dict[tuple[str, str, int, int], list[PhasedShot]] = {}
     left = []
     for row in rows:
         shot = row.shot
@@ -50,7 +53,7 @@ def joined_repeats(rows: Sequence[Taken], lengths: Lengths, modulation_hz: float
     return sorted(left, key=lambda r: (r.mjd, r.shot.ranger, r.shot.number))
 
 
-def _groups(line: Sequence[Taken], way: Array) -> list[slice]:
+def _groups(line: Sequence[PhasedShot], way: Array) -> list[slice]:
     """Runs of repeats that belong together."""
     longest = RESTING if np.ptp(way) == 0.0 else MOVING
     found, first = [], 0
@@ -65,13 +68,13 @@ def _groups(line: Sequence[Taken], way: Array) -> list[slice]:
     return found
 
 
-def _joined(group: Sequence[Taken], way: Array, per_metre: float) -> list[Taken]:
+def _joined(group: Sequence[PhasedShot], way: Array, per_metre: float) -> list[PhasedShot]:
     """One row for repeats that agree, and the others by themselves."""
     if len(group) == 1:
         return list(group)
-    turned = np.array([r.phasor for r in group]) * np.exp(1j * per_metre * (way - way[0]))
+    turned = np.array([r.phase.phasor for r in group]) * np.exp(1j * per_metre * (way - way[0]))
     typical = complex(np.median(turned.real), np.median(turned.imag))
-    across = np.array([r.u_across for r in group])
+    across = np.array([r.phase.u_across for r in group])
     off = np.abs(np.angle(turned / typical))
     agree = off <= np.maximum(OFF_SIGMAS * across / abs(typical), OFF_WAY * per_metre)
     if np.count_nonzero(agree) < 2:
@@ -79,15 +82,16 @@ def _joined(group: Sequence[Taken], way: Array, per_metre: float) -> list[Taken]
     middle = int(np.flatnonzero(agree)[np.count_nonzero(agree) // 2])
     back = np.exp(-1j * per_metre * (way[middle] - way[0]))
     same = [r for r, on in zip(group, agree, strict=True) if on]
-    weight = 1.0 / np.array([r.u_phasor for r in same]) ** 2
-    one = replace(
-        group[middle],
+    weight = 1.0 / np.array([r.phase.u_phasor for r in same]) ** 2
+    second, third = np.mean([r.phase.harmonics for r in same], axis=0).tolist()
+    phase = ShotPhase(
         phasor=complex(back * (weight @ turned[agree]) / weight.sum()),
         u_phasor=float(weight.sum() ** -0.5),
         u_across=float(np.sum(1.0 / across[agree] ** 2) ** -0.5),
-        offset=float(np.mean([r.offset for r in same])),
-        harmonics=np.mean([r.harmonics for r in same], axis=0),
-        largest=max(r.largest for r in same),
-        repeats=tuple(r.shot.number for r in same),
+        offset=float(np.mean([r.phase.offset for r in same])),
+        harmonics=(second, third),
+        largest=max(r.phase.largest for r in same),
+        reason=None,
     )
+    one = replace(group[middle], phase=phase, repeats=tuple(r.shot.number for r in same))
     return [one, *(r for r, on in zip(group, agree, strict=True) if not on)]

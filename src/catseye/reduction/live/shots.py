@@ -7,8 +7,8 @@ last good reference. The epoch's solution uses the phases, not these ranges.
 import cmath
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from statistics import median
 
 import numpy as np
@@ -19,7 +19,7 @@ from catseye.records.night.live import LiveShot
 from catseye.records.site.folder import REFERENCE
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.site import Adc
-from catseye.reduction.epoch.ranges import Detected, Phases, why_not
+from catseye.reduction.epoch.ranges import BufferDetection, Detections, ShotPhase, why_not
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.detection.buffers import shortest_run
@@ -63,19 +63,26 @@ class ShotAnswer:
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
-    """A shot with its phase, kept for the epoch: a row of `Phases`; `repeats`: numbers of those that it stands for."""
+class PhasedShot:
+    """A shot with its phase, kept for the epoch.
+
+    mjd       of its buffer's middle
+    repeats   numbers of those that it stands for
+    """
 
     shot: LiveShot
     mjd: float
-    phasor: complex
-    u_phasor: float
-    u_across: float
-    offset: float
-    harmonics: NDArray[np.float64]
-    largest: float
-    reason: Reason | None
+    phase: ShotPhase
     repeats: tuple[int, ...] = ()
+
+    @property
+    def reason(self) -> Reason | None:
+        """Why the shot cannot be used, None where it can."""
+        return self.phase.reason
+
+    def left_out(self, reason: Reason) -> "PhasedShot":
+        """The same shot, not to be used."""
+        return replace(self, phase=replace(self.phase, reason=reason))
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -95,15 +102,15 @@ class SolvedLine:
 class RangerNow:
     """What is known of one ranger between epochs."""
 
-    references: deque[Taken] = field(default_factory=lambda: deque(maxlen=64))
+    references: deque[PhasedShot] = field(default_factory=lambda: deque(maxlen=64))
     usual: dict[bool, deque[float]] = field(
         default_factory=lambda: {True: deque(maxlen=USUAL_OF), False: deque(maxlen=USUAL_OF)}
     )
 
 
-def taken(
+def phased(
     shot: LiveShot, mirror: Mirror, adc: Adc, settings: ReductionSettings, *, usual: float, run: float = 0.0
-) -> Taken:
+) -> PhasedShot:
     """The phase of one shot, judged as `catseye reduce` judges it.
 
     usual   V, amplitude that such shots have; for the text alone
@@ -112,102 +119,74 @@ def taken(
     Where the samples did not travel the ranger's own amplitude and phase count, their noise a guess (`U_UNSEEN_VOLT`),
     and clipping and dropouts are not seen.
     """
-    seen = _Seen()
-    if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
-        told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
-        seen.wrong = Reason(ShotStatus.WRONG_LENGTH, f"{told} {shot.cycles * shot.samples_per_cycle}")
-    elif shot.samples is not None:
-        leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
-        _detect(shot, shot.samples, seen, adc.bits, run, leaked)
-    elif not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
-        seen.wrong = Reason(ShotStatus.NO_SAMPLES, "neither the buffer came nor what the ranger made of it")
-    else:
-        seen.raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
-        seen.u_phasor, seen.largest = U_UNSEEN_VOLT, shot.amplitude
-    phasor = seen.raw - mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+    leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
+    buffer = _detection(shot, adc.bits, run, leaked)
+    phasor = buffer.raw - leaked
     sampling = shot.cycles, shot.samples_per_cycle
-    reason = why_not(seen.raw, phasor, seen.u_phasor, seen.clipped, seen.largest, sampling, mirror, settings, usual)
-    across = seen.u_phasor
+    reason = why_not(buffer, phasor, sampling=sampling, mirror=mirror, settings=settings, usual=usual)
+    across = buffer.u_phasor
     if shot.samples is None:
         across = U_UNSEEN_VOLT
     elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer tell too little of one quadrature's own scatter
-        across = math.sqrt(variance_across(seen.total, seen.between, shot.cycles, phasor))
-    return Taken(
-        shot,
-        shot.middle_mjd,
-        phasor,
-        seen.u_phasor,
-        across,
-        seen.offset,
-        np.array(seen.harmonics),
-        seen.largest,
-        seen.wrong or reason,
+        across = math.sqrt(variance_across(buffer.total, buffer.between, shot.cycles, phasor))
+    phase = ShotPhase(
+        phasor, buffer.u_phasor, across, buffer.offset, buffer.harmonics, buffer.largest, buffer.wrong or reason
     )
+    return PhasedShot(shot, shot.middle_mjd, phase)
 
 
-@dataclass
-class _Seen:
-    """What detection found in one buffer, V: `Detected` of one, without arrays."""
+def _detection(shot: LiveShot, bits: int, run: float, leaked: complex) -> BufferDetection:
+    """What a shot's samples hold, or what the ranger itself made of them."""
+    if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
+        told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
+        wrong = Reason(ShotStatus.WRONG_LENGTH, f"{told} {shot.cycles * shot.samples_per_cycle}")
+        return BufferDetection(0j, 0.0, wrong=wrong)
+    if shot.samples is not None:
+        return _detected(shot, shot.samples, bits, run, leaked)
+    if not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
+        wrong = Reason(ShotStatus.NO_SAMPLES, "neither the buffer came nor what the ranger made of it")
+        return BufferDetection(0j, 0.0, wrong=wrong)
+    raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
+    return BufferDetection(raw, U_UNSEEN_VOLT, largest=shot.amplitude)
 
-    raw: complex = 0j
-    u_phasor: float = 0.0
-    offset: float = 0.0
-    harmonics: tuple[float, float] = (0.0, 0.0)
-    largest: float = 0.0
-    clipped: int = 0
-    total: Sequence[float] = (0.0, 0.0, 0.0)
-    between: Sequence[float] = (0.0, 0.0, 0.0)
-    wrong: Reason | None = None
 
-
-def _detect(shot: LiveShot, samples: NDArray[np.int16], into: _Seen, bits: int, run: float, leaked: complex) -> None:
+def _detected(shot: LiveShot, samples: NDArray[np.int16], bits: int, run: float, leaked: complex) -> BufferDetection:
     """A buffer, compiled; what is wrong with it in words, by the plain form."""
     from catseye.signal.detection import buffer_kernel as kernel
 
     n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
-    ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    found, still = np.zeros(16), np.zeros(8)
     if m < 2:  # a single cycle's noise comes from its overtones: rare, and not here
-        _plainly(samples, into, n, volts, bits)
-        return
-    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, found, still)
-    out, stand = found.tolist(), still.tolist()
+        return _plainly(samples, n, volts, bits)
+    ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    moving, standing = np.zeros(16), np.zeros(8)
+    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, moving, standing)
+    out, stand = moving.tolist(), standing.tolist()
+    wrong = None
     if out[kernel.CLIPPED] or out[kernel.DROPPED] or out[kernel.LONGEST] >= shortest_run(n):
-        _plainly(samples, into, n, volts, bits)
+        wrong = _plainly(samples, n, volts, bits).wrong
     mean, moments = (out[0:2], out[kernel.TOTAL :]) if run == 0.0 else (stand[0:2], stand[2:])
-    into.raw = complex(mean[0], mean[1]) * volts + (leaked if run else 0.0)
-    into.u_phasor = math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts
-    into.offset, into.clipped = out[kernel.OFFSET] * volts, int(out[kernel.CLIPPED])
-    into.harmonics = out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts
-    into.largest = max(-out[kernel.LOW], out[kernel.HIGH]) * volts
-    into.total, into.between = ([v * volts**2 for v in part] for part in (moments[:3], moments[3:6]))
-
-
-def _plainly(samples: NDArray[np.int16], into: _Seen, n: int, volts: float, bits: int) -> None:
-    """By the form of the campaigns."""
-    found = Detected.empty(1)
-    found.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
-    into.raw, into.u_phasor, into.offset = complex(found.raw[0]), float(found.u_phasor[0]), float(found.offset[0])
-    into.harmonics = float(found.harmonics[0, 0]), float(found.harmonics[0, 1])
-    into.largest, into.clipped, into.wrong = float(found.largest[0]), int(found.clipped[0]), found.wrong[0]
-    into.total, into.between = found.total[0].tolist(), found.between[0].tolist()
-
-
-def phases_of(rows: list[Taken]) -> Phases:
-    """Shots as the batch recipes want them."""
-    return Phases(
-        np.array([r.phasor for r in rows], dtype=complex),
-        np.array([r.u_phasor for r in rows]),
-        np.array([r.u_across for r in rows]),
-        np.array([r.offset for r in rows]),
-        np.array([r.harmonics for r in rows]).reshape(-1, 2),
-        np.array([r.largest for r in rows]),
-        tuple(r.reason for r in rows),
+    return BufferDetection(
+        complex(mean[0], mean[1]) * volts + (leaked if run else 0.0),
+        math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts,
+        out[kernel.OFFSET] * volts,
+        (out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts),
+        max(-out[kernel.LOW], out[kernel.HIGH]) * volts,
+        int(out[kernel.CLIPPED]),
+        total=[v * volts**2 for v in moments[:3]],
+        between=[v * volts**2 for v in moments[3:6]],
+        wrong=wrong,
     )
 
 
+def _plainly(samples: NDArray[np.int16], n: int, volts: float, bits: int) -> BufferDetection:
+    """By the form of the campaigns."""
+    one = Detections.empty(1)
+    one.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
+    return one.row(0)
+
+
 def answer(
-    row: Taken,
+    row: PhasedShot,
     now: RangerNow,
     *,
     predicted: Callable[[], float] | None,
@@ -226,7 +205,7 @@ def answer(
 
     Source: [PARKER04] eq. 5.12 and 5.18: D = ((N - p/2pi) c/2f)/n - (glass, axes, zero) + D0.
     """
-    amplitude, phase = abs(row.phasor), math.atan2(row.phasor.imag, row.phasor.real) % TWO_PI
+    amplitude, phase = abs(row.phase.phasor), math.atan2(row.phase.phasor.imag, row.phase.phasor.real) % TWO_PI
     if row.reason:
         return ShotAnswer.refused(row.reason, amplitude, phase)
     if row.shot.target == REFERENCE:
@@ -243,12 +222,12 @@ def answer(
         return ShotAnswer.refused(Reason(ShotStatus.NO_PLACE, "the telescope has told no posture"), amplitude, phase)
     last = now.references[-1]
     half = 0.5 * SPEED_OF_LIGHT / modulation_hz
-    share = ((phase - math.atan2(last.phasor.imag, last.phasor.real)) / TWO_PI) % 1.0
+    share = ((phase - math.atan2(last.phase.phasor.imag, last.phase.phasor.real)) / TWO_PI) % 1.0
     corrections, distance = line(), predicted()
     coarse = corrections.index * (distance + corrections.added)
     optical = (round(coarse / half + share) - share) * half
     range_ = optical / corrections.index - corrections.added
-    u_phase = math.hypot(row.u_across / amplitude, last.u_across / max(abs(last.phasor), 1e-9))
+    u_phase = math.hypot(row.phase.u_across / amplitude, last.phase.u_across / max(abs(last.phase.phasor), 1e-9))
     drift = walk * math.sqrt(abs(row.mjd - last.mjd) * SECONDS_PER_DAY)
     u = half / TWO_PI / corrections.index * math.hypot(u_phase, drift)
     return ShotAnswer(ShotStatus.USED, None, amplitude, phase, range_, u, range_ - distance)
