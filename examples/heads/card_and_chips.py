@@ -17,7 +17,7 @@ from lm628 import EXCESSIVE_ERROR, MOTOR_OFF, ON_TARGET, SEEKS_INDEX, Lm628, Por
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.geometry.sky.time_tag import TimeTag
-from catseye.ranger.head import Buffer, Homing, Sampling
+from catseye.ranger.head import Buffer, Homing, SamplingSettings
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 
 FILTER = (356, 465, 4355, 4096, 3)  # yours will differ: docs/studies/servo.md says how to find them
@@ -91,7 +91,7 @@ class CardAndChips:
         self.reset()
 
     def reset(self) -> None:
-        self._taking: tuple[Sampling, TimeTag] | None = None
+        self._taking: tuple[SamplingSettings, TimeTag] | None = None
         self._last: Buffer | None = None
         self._on = [False, False]
         self._homing: list[Homing] = ["never", "never"]
@@ -119,7 +119,7 @@ class CardAndChips:
 
     # Buffers --------------------------------------------------------------------------------------------------------
 
-    def trigger(self, sampling: Sampling) -> None:
+    def trigger(self, sampling: SamplingSettings) -> None:
         self._card.begin(sampling.samples * sampling.cycles, sampling.samples * sampling.frequency_hz)
         self._taking, self._last = (sampling, self.now()), None
 

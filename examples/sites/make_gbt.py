@@ -19,7 +19,7 @@ import numpy as np
 
 from catseye.records.files.record import Record
 from catseye.records.files.toml_text import record_toml
-from catseye.records.site.target import FeedArm, Target, Targets
+from catseye.records.site.target import FeedArm, TargetRow, Targets
 
 HERE = Path(__file__).parent
 NIGHT, GBT = HERE.parent / "night-01", HERE / "gbt"
@@ -87,7 +87,7 @@ def names(places: list[tuple[int, float]]) -> list[str]:
     return found
 
 
-def prisms() -> list[Target]:
+def prisms() -> list[TargetRow]:
     """All prisms of the dish, reference points on the design paraboloid."""
     places, random, r = corners(), np.random.default_rng(SEED), hoops()
     heights = np.round(random.normal(HEIGHT_MM, HEIGHT_SCATTER_MM, len(places)), 3)
@@ -97,7 +97,7 @@ def prisms() -> list[Target]:
         position = np.array([x, y, (x * x + y * y) / (4e3 * FOCAL_LENGTH)])
         normal = (AIM_MM - position) / np.linalg.norm(AIM_MM - position)
         made.append(
-            Target(
+            TargetRow(
                 name=name,
                 type="prism",
                 frame="reflector",

@@ -121,7 +121,7 @@ def test_what_is_history_is_still_said():
         ("see `atmosphere/air.py`.", False, None, None),
         ("see `reduction/epoch/test_epoch.py` and `catseye reduce`", True, None, True),
         ("as `atmosphere.index.air.MODELS` says", None, True, None),
-        ("as `catseye.signal.cycles.whole.Decision.margin` says", None, True, None),
+        ("as `catseye.signal.cycles.whole.CycleDecision.margin` says", None, True, None),
         ("as `catseye.signal.cycles.whole.Decision.marvel` says", None, False, None),
         ("as `signal.whole` says, by `.venv/bin/catseye reduse`", None, False, False),
         ("`records.night.campaign.read_campaign(directory)`, `catseye plot servo`", None, True, True),

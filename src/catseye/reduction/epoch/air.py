@@ -229,9 +229,9 @@ class AirField:
             if len(rows):
                 warm, share = line.at(mjd_utc[rows])
                 profile = self._by_sound(mjd_utc[rows], parameters[:count], warm - share * parameters[count + i])
-                found = mean_over_height(profile, a[rows, 2], b[rows, 2])
-                values[: 1 + count, rows] = found[:-1]
-                values[1 + count + i, rows] = -share * found[-1]
+                means = mean_over_height(profile, a[rows, 2], b[rows, 2])
+                values[: 1 + count, rows] = means[:-1]
+                values[1 + count + i, rows] = -share * means[-1]
         return PathAir(values[0], values[1:].T)
 
     def _by_thermometers(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> Profile:

@@ -53,19 +53,23 @@ def search(scene: CycleScene, name: str, shots: set[int]) -> Located:
     return next((a for a in answers if a.status is AmbiguityStatus.FOUND), answers[0])
 
 
-def _settled(scene: CycleScene, name: str, rows: list[tuple[int, int]], chosen: np.ndarray, found: Located) -> Located:
+def _settled(
+    scene: CycleScene, name: str, rows: list[tuple[int, int]], chosen: np.ndarray, located: Located
+) -> Located:
     """The search again with dPc, air and head as they are where the point was found, until it is found there."""
     for _ in range(TURNS):
-        if not np.isfinite(found.x).all():
-            return found
+        if not np.isfinite(located.x).all():
+            return located
         x = scene.solution.x.copy()
-        x[scene.network.layout.columns(name)] = found.x
+        x[scene.network.layout.columns(name)] = located.x
         pairs = [shot_group(scene.network, n, x) for n in scene.network.rangers]
         there = replace(scene, groups=[g for g, _ in pairs], parts=[p for _, p in pairs])
-        before, found = found, _problem(there, name, rows, x).located(chosen, wider=False)
-        if np.linalg.norm(found.x - before.x) < SETTLED:
-            return found
-    return found if found.status is not AmbiguityStatus.FOUND else replace(found, status=AmbiguityStatus.AMBIGUOUS)
+        before, located = located, _problem(there, name, rows, x).located(chosen, wider=False)
+        if np.linalg.norm(located.x - before.x) < SETTLED:
+            return located
+    return (
+        located if located.status is not AmbiguityStatus.FOUND else replace(located, status=AmbiguityStatus.AMBIGUOUS)
+    )
 
 
 @dataclass(frozen=True, eq=False)

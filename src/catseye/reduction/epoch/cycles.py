@@ -84,20 +84,20 @@ def resolve_cycles(
         waiting -= safe
         placed = {n for n in doubtful if not _too_wide(network, spread(scene, n))}
         doubtful -= placed
-        found = set()
+        placed_now = set()
         for name in sorted(doubtful & {n for k in waiting for n in ends[k]}):
             mine = {k for k in waiting if name in ends[k] and not (ends[k] - {name}) & doubtful}
             if not mine:
                 continue
             last[name] = search(scene, name, mine)
             if last[name].status is AmbiguityStatus.FOUND:
-                found.add(name)
-        for name in found:
+                placed_now.add(name)
+        for name in placed_now:
             x[network.layout.columns(name)] = last[name].x
             found_as[name] = last[name]
-        doubtful -= found
+        doubtful -= placed_now
         waiting = {k for k in waiting if ends[k] & doubtful}  # wrong ones among the others show in the adjustment
-        if not waiting or not (found or safe or placed):
+        if not waiting or not (placed_now or safe or placed):
             break
     if progress is not None:
         progress("whole cycles", ROUNDS, ROUNDS)
@@ -230,24 +230,24 @@ def _u_mm(network: CampaignNetwork, settings: ReductionSettings, name: str) -> f
     return network.places[name].u_typed(settings.u_position) / MILLIMETRE
 
 
-def _found_notes(network: CampaignNetwork, settings: ReductionSettings, found: dict[str, Located]) -> list[str]:
-    if len(found) > MANY:
-        least = min(found, key=lambda name: found[name].discrimination)
+def _found_notes(network: CampaignNetwork, settings: ReductionSettings, located: dict[str, Located]) -> list[str]:
+    if len(located) > MANY:
+        least = min(located, key=lambda name: located[name].discrimination)
         return [
-            f"{len(found)} points known too badly for the nearest integer: whole cycles found jointly; least sure "
-            f"{least}, {_next(found[least])}"
+            f"{len(located)} points known too badly for the nearest integer: whole cycles found jointly; least sure "
+            f"{least}, {_next(located[least])}"
         ]
     return [
         f"{name}: position known to {_u_mm(network, settings, name):.0f} mm only; whole cycles found "
         f"jointly from {len(one.cycles)} shots{', one of them left out' * (one.left_out >= 0)}, {_next(one)}"
-        for name, one in sorted(found.items())
+        for name, one in sorted(located.items())
     ]
 
 
-def _next(found: Located) -> str:
-    if not np.isfinite(found.discrimination):
+def _next(located: Located) -> str:
+    if not np.isfinite(located.discrimination):
         return "no other candidate"
-    return f"next candidate at least {np.sqrt(found.discrimination):.0f} sigma worse"
+    return f"next candidate at least {np.sqrt(located.discrimination):.0f} sigma worse"
 
 
 def _lost_notes(

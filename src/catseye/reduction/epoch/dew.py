@@ -122,7 +122,7 @@ def dew_risk(
     else:
         temperature = _between(surface, weather.mjd_utc)
     known = np.isfinite(temperature)
-    found = condensation(
+    state = condensation(
         np.where(known, temperature, weather.temperature_c),
         weather.temperature_c,
         weather.pressure_hpa,
@@ -132,15 +132,15 @@ def dew_risk(
         u_humidity_percent=u_humidity_percent,
         covariance_c2=covariance,
     )
-    found = found._replace(
-        margin_k=np.where(known, found.margin_k, np.nan),
-        deposit=np.where(known, found.deposit, "unknown"),
-        probability=np.where(known, found.probability, np.nan),
+    state = state._replace(
+        margin_k=np.where(known, state.margin_k, np.nan),
+        deposit=np.where(known, state.deposit, "unknown"),
+        probability=np.where(known, state.probability, np.nan),
     )
     station = np.array(weather.station)
-    at_risk = known & (found.probability >= least_probability)
+    at_risk = known & (state.probability >= least_probability)
     spells = [
-        _spell(name, rows, weather.mjd_utc, found)
+        _spell(name, rows, weather.mjd_utc, state)
         for name in sorted(set(weather.station))
         for rows in _stretches(np.flatnonzero((station == name) & at_risk), weather.mjd_utc)
     ]
@@ -151,7 +151,7 @@ def dew_risk(
             f"dew: the surface's temperature is unknown at {np.count_nonzero(~known)} of {len(known)} weather samples "
             f"(readings lie over {LONGEST_GAP:.0f} s apart, or begin later or end earlier); they are not judged"
         )
-    return DewRisk(weather.mjd_utc, weather.station, found, tuple(spells), tuple(notes))
+    return DewRisk(weather.mjd_utc, weather.station, state, tuple(spells), tuple(notes))
 
 
 def _between(surface: SurfaceTemperature, mjd_utc: np.ndarray) -> np.ndarray:
@@ -178,16 +178,16 @@ def _stretches(marked: np.ndarray, mjd_utc: np.ndarray) -> list[np.ndarray]:
     return np.split(marked, np.flatnonzero(np.diff(mjd_utc[marked]) * SECONDS_PER_DAY > LONGEST_GAP) + 1)
 
 
-def _spell(station: str, rows: np.ndarray, mjd_utc: np.ndarray, found: Condensation) -> Spell:
-    worst = rows[np.argmin(found.margin_k[rows])]
+def _spell(station: str, rows: np.ndarray, mjd_utc: np.ndarray, state: Condensation) -> Spell:
+    worst = rows[np.argmin(state.margin_k[rows])]
     return Spell(
         station=station,
         start_mjd_utc=float(mjd_utc[rows[0]]),
         end_mjd_utc=float(mjd_utc[rows[-1]]),
         worst_mjd_utc=float(mjd_utc[worst]),
-        margin_k=float(found.margin_k[worst]),
-        u_margin_k=float(found.u_margin_k[worst]),
-        threshold_c=float(found.threshold_c[worst]),
-        threat=str(found.threat[worst]),
-        probability=float(found.probability[rows].max()),
+        margin_k=float(state.margin_k[worst]),
+        u_margin_k=float(state.u_margin_k[worst]),
+        threshold_c=float(state.threshold_c[worst]),
+        threat=str(state.threat[worst]),
+        probability=float(state.probability[rows].max()),
     )

@@ -210,14 +210,18 @@ class Detections:
         """Detect buffers (b, cycles samples_per_cycle) of one shape into rows (b,)."""
         ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
         seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
-        found = seen.detection
+        detection = seen.detection
         for k, row in enumerate(rows):
             wrong = WRONG.get(BufferStatus(seen.status[k]))
             if wrong is not None:
                 self.wrong[row] = Reason(wrong, seen.detail(k))
-        self.total[rows], self.between[rows] = found.scatter.total, found.scatter.between
-        self.raw[rows], self.u_phasor[rows], self.offset[rows] = found.phasor, found.u_phasor, found.offset
-        self.harmonics[rows], self.largest[rows], self.clipped[rows] = found.harmonics, found.largest, found.clipped
+        self.total[rows], self.between[rows] = detection.scatter.total, detection.scatter.between
+        self.raw[rows], self.u_phasor[rows], self.offset[rows] = detection.phasor, detection.u_phasor, detection.offset
+        self.harmonics[rows], self.largest[rows], self.clipped[rows] = (
+            detection.harmonics,
+            detection.largest,
+            detection.clipped,
+        )
 
 
 def judged_phases(
@@ -369,14 +373,14 @@ def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -
         return []
     verdict = f"not by the {told:g} of site.toml: u_range is too {'small' if test.statistic > test.high else 'large'}"
     try:
-        found = estimate_walk(*references, series=series)
+        walk = estimate_walk(*references, series=series)
     except EstimationError:  # the test needs one difference of references, an estimate two
         return [f"the electronics walk between references, but {verdict}"]
-    if found.random_walk == 0.0:
+    if walk.random_walk == 0.0:
         return [f"the electronics show no walk between references beyond their noise, {verdict}"]
-    low, high = (v / MRAD_PER_ROOT_HOUR for v in found.interval())
+    low, high = (v / MRAD_PER_ROOT_HOUR for v in walk.interval())
     return [
-        f"the electronics walk by {found.random_walk / MRAD_PER_ROOT_HOUR:.1f} mrad per root hour between references "
+        f"the electronics walk by {walk.random_walk / MRAD_PER_ROOT_HOUR:.1f} mrad per root hour between references "
         f"(95 %: {low:.1f} to {high:.1f}), {verdict}"
     ]
 

@@ -134,7 +134,7 @@ def solve_epoch(
     if carried is not None:
         network = _with_carried(network, carried, frames)
     solution, shots = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
-    found = coordinates_of(network, solution, shots, resolved)
+    coordinates = coordinates_of(network, solution, shots, resolved)
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
@@ -148,7 +148,7 @@ def solve_epoch(
         ticks=ticks,
         elevation=float(motion.track.at(motion.epoch)[1]),
     )
-    return Epoch(tuple(rows), found, seen if carried is None else with_unseen(carried, seen), reasons)
+    return Epoch(tuple(rows), coordinates, seen if carried is None else with_unseen(carried, seen), reasons)
 
 
 def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:

@@ -39,8 +39,8 @@ class Jitter:
     @property
     def mm(self) -> dict[str, float]:
         """Jitter of each body by its name, mm."""
-        found = {body: (s / w) ** 0.5 / MILLIMETRE if s > 0.0 else 0.0 for body, (s, w) in self._sums.items()}
-        return {body: max(u, LEAST * self.usual_mm[body]) for body, u in found.items()}
+        learnt = {body: (s / w) ** 0.5 / MILLIMETRE if s > 0.0 else 0.0 for body, (s, w) in self._sums.items()}
+        return {body: max(u, LEAST * self.usual_mm[body]) for body, u in learnt.items()}
 
     def learn(self, ranges: RangeShots, bodies: Mapping[str, str]) -> None:
         """Take in an epoch's ranges.

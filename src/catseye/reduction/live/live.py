@@ -267,13 +267,13 @@ class Live:
         if latest is not None:
             for frame in ("alidade", "reflector"):
                 turns[frame] = ground_from(self.site, frame, latest.azimuth, latest.elevation).single.rotation
-        found = {}
+        blocks = {}
         for i, parameter in enumerate(self.carried.parameters):
             point = str(parameter._replace(part=""))
             if parameter.kind in POINT_KINDS and parameter.part == "x" and point in self._own:
                 turn = turns.get(self.frames[point], np.eye(3))
-                found[point] = turn @ self.carried.covariance[i : i + 3, i : i + 3] @ turn.T
-        return found
+                blocks[point] = turn @ self.carried.covariance[i : i + 3, i : i + 3] @ turn.T
+        return blocks
 
     # What it answers -------------------------------------------------------------------------------------------------
 
@@ -305,12 +305,12 @@ class Live:
             rows, weather, motion, places, self._index, azimuth, elevation, carried, self.lasting, ticks, rules
         )
 
-    def take_in(self, job: "EpochJob", found: "Epoch | str") -> EpochAnswer | None:
+    def take_in(self, job: "EpochJob", epoch: "Epoch | str") -> EpochAnswer | None:
         """What `job.solve()` found becomes what is known; None where it found nothing, `failed` says why."""
-        if isinstance(found, str):
-            self.failed = found
+        if isinstance(epoch, str):
+            self.failed = epoch
             return None
-        return self._take_in(found, job.motion, job.azimuth, job.elevation)
+        return self._take_in(epoch, job.motion, job.azimuth, job.elevation)
 
     def solve(self, ticks: int) -> EpochAnswer | None:
         """`begin`, `EpochJob.solve` and `take_in` in one."""
@@ -325,15 +325,15 @@ class Live:
     # Inside ----------------------------------------------------------------------------------------------------------
 
     def _take_in(self, epoch: Epoch, motion: CarriedMotion, azimuth: float, elevation: float) -> EpochAnswer:
-        found = epoch.coordinates
+        coordinates = epoch.coordinates
         self.number += 1
-        self.jitter.learn(found.ranges, self.bodies)
+        self.jitter.learn(coordinates.ranges, self.bodies)
         self.carried, self.last_ticks = epoch.carried, epoch.carried.ticks
-        frames = frames_of_points(motion, found.points)
-        for name, x in zip(found.points, found.x, strict=True):
+        frames = frames_of_points(motion, coordinates.points)
+        for name, x in zip(coordinates.points, coordinates.x, strict=True):
             self._own[name] = frames[name].inverse().points(x) if name in frames else np.array(x)
-        ranges = found.ranges
-        self._index = 1.0 + found.refractivity_ppm * 1e-6
+        ranges = coordinates.ranges
+        self._index = 1.0 + coordinates.refractivity_ppm * 1e-6
         for k, (ranger, target) in enumerate(zip(ranges.ranger, ranges.target, strict=True)):
             added = -(ranges.glass[k] + ranges.obliquity[k] + ranges.zero[k] + ranges.head[k])
             d0 = self.site.mirror_of(ranger).d0_mm * MILLIMETRE
@@ -356,19 +356,19 @@ class Live:
             self.last_ticks,
             azimuth,
             elevation,
-            found.points,
-            found.x,
-            found.covariance,
-            tuple(int(n) for n in found.shots),
+            coordinates.points,
+            coordinates.x,
+            coordinates.covariance,
+            tuple(int(n) for n in coordinates.shots),
             tuple(sorted(set(used))),
             dict(sorted(rejected.items())),
-            found.variance_factor,
-            found.degrees_of_freedom,
-            found.refractivity_ppm,
-            found.air,
-            found.zeros,
+            coordinates.variance_factor,
+            coordinates.degrees_of_freedom,
+            coordinates.refractivity_ppm,
+            coordinates.air,
+            coordinates.zeros,
             pose,
-            (*found.notes, *self.stations.notes()),
+            (*coordinates.notes, *self.stations.notes()),
         )
 
     def _unready(self, weather: Sequence[LiveWeather]) -> str:

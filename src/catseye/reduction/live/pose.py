@@ -180,13 +180,13 @@ def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Ar
             low, high = (bending, high) if solved(bending)[1] > degrees else (low, bending)
         gain, _ = solved(bending)
     to_motion = gain @ axes.T
-    found = to_motion @ change
+    six = to_motion @ change
     spread = to_motion @ covariance @ to_motion.T + bending * to_motion @ to_motion.T
     motion = BodyMotion(
         body,
         pivot,
-        found[:3],
-        found[3:],
+        six[:3],
+        six[3:],
         _positive(spread),
         chi2 if scale >= 1e-16 else 0.0,
         degrees,

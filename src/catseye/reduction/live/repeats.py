@@ -56,16 +56,16 @@ def joined_repeats(
 def _groups(line: Sequence[PhasedShot], way: Array) -> list[slice]:
     """Runs of repeats that belong together."""
     longest = RESTING if np.ptp(way) == 0.0 else MOVING
-    found, first = [], 0
+    groups, first = [], 0
     for k in range(1, len(line) + 1):
         if (
             k == len(line)
             or (line[k].mjd - line[first].mjd) * SECONDS_PER_DAY > longest
             or not abs(way[k] - way[first]) <= WAY
         ):
-            found.append(slice(first, k))
+            groups.append(slice(first, k))
             first = k
-    return found
+    return groups
 
 
 def _joined(group: Sequence[PhasedShot], way: Array, per_metre: float) -> list[PhasedShot]:

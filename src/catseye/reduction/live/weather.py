@@ -59,13 +59,13 @@ class StationWatch:
 
     def believed(self, ticks: int) -> list[LiveWeather]:
         """Readings of the stations that speak and are believed, in order of station and time."""
-        found: list[LiveWeather] = []
+        readings: list[LiveWeather] = []
         for station in self._stations.values():
             fresh = station.good and _seconds(ticks - station.good[-1].ticks) <= SILENT
             if fresh and station.doubted_since is None:
-                found += station.good
-        if found:
-            return found
+                readings += station.good
+        if readings:
+            return readings
         return [read for station in self._stations.values() for read in station.good]  # better old than none
 
     def notes(self) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ EDGE, CLIPPED, SILENT, NOT_FINITE = (
     int(s) for s in (DelayStatus.EDGE, DelayStatus.CLIPPED, DelayStatus.SILENT, DelayStatus.NOT_FINITE)
 )
 
+# What numba kept of a kernel names `PeakSearch`; a kept form is looked for by a kernel's line.
 _compiled = njit(cache=True, error_model="numpy", nogil=True)
 _inlined = njit(error_model="numpy")  # kept with their caller
 
