@@ -232,14 +232,18 @@ def settle_network(
         if turn and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
             break
     else:
-        raise EstimationError(
-            f"not settled: cycles, air and incidence still move {layout.parameters[coordinates[np.argmax(moved)]]} by "
-            f"{moved.max() / MILLIMETRE:.3f} mm after {PASSES} passes; check its typed position"
-        )
+        raise _unsettled(layout.parameters[coordinates[np.argmax(moved)]], float(moved.max()))
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
     return solution, shots
+
+
+def _unsettled(worst: Parameter, moved: float) -> EstimationError:
+    return EstimationError(
+        f"not settled: cycles, air and incidence still move {worst} by {moved / MILLIMETRE:.3f} mm after {PASSES} "
+        "passes; check its typed position"
+    )
 
 
 def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray], critical: float) -> bool:

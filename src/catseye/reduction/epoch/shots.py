@@ -47,6 +47,52 @@ class ShotParts:
     head: HeadCorrections
 
 
+@dataclass(frozen=True, eq=False)
+class _Sights:
+    """Where one ranger's m shots begin and end, at their own times.
+
+    origin, target   (m,) columns of the ranger's and the targets' x
+    a, b             (m, 3) m, ground: scan points and targets
+    distance         (m,) m
+    towards          (m, 3) unit, from target to ranger
+    turns            rotation and shift of both ends from the network's epoch to each shot; None where nothing moves
+    """
+
+    origin: np.ndarray
+    target: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    distance: np.ndarray
+    towards: np.ndarray
+    turns: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None
+
+    @staticmethod
+    def of(network: CampaignNetwork, name: str, targets: tuple[str, ...], x: np.ndarray) -> "_Sights":
+        layout, m = network.layout, len(targets)
+        origin = np.full(m, layout.points[name])
+        target = np.array([layout.points[t] for t in targets])
+        a = x[origin[:, None] + np.arange(3)]
+        b = x[target[:, None] + np.arange(3)]
+        turns = None
+        if network.motion is not None:
+            times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
+            turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
+            a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
+        towards = a - b
+        distance = np.linalg.norm(towards, axis=1)
+        return _Sights(origin, target, a, b, distance, towards / distance[:, None], turns)
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(m, 3) where the ranger is, as a target that stands still sees it."""
+        return self.towards if self.turns is None else np.einsum("mji,mj->mi", self.turns[2], self.towards)
+
+    @property
+    def sent(self) -> np.ndarray:
+        """(m, 3) m, from the scan point to the target, as a ranger that stands still sends its beam."""
+        return self.b - self.a if self.turns is None else np.einsum("mji,mj->mi", self.turns[0], self.b - self.a)
+
+
 def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
     """One ranger's shots as distances in optical metres, with everything that depends on where things are.
 
@@ -56,98 +102,32 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     electronics, phases = network.electronics[name], network.phases
     rows = electronics.shots
     targets = tuple(campaign.shots.target[k] for k in rows)
-    m = len(rows)
-    origin = np.full(m, layout.points[name])
-    target = np.array([layout.points[t] for t in targets])
-    a = x[origin[:, None] + np.arange(3)]
-    b = x[target[:, None] + np.arange(3)]
-    turns = None
-    if network.motion is not None:
-        times = campaign.shots.mjd_utc[rows]
-        turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
-        a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
-    towards = a - b
-    distance = np.linalg.norm(towards, axis=1)
-    towards = towards / distance[:, None]
-
-    air_columns = layout.air
-    air = network.field.along(campaign.shots.mjd_utc[rows], a, b, x[air_columns])
+    sights = _Sights.of(network, name, targets, x)
+    distance = sights.distance
+    air = network.field.along(campaign.shots.mjd_utc[rows], sights.a, sights.b, x[layout.air])
     n = 1.0 + air.refractivity
     d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
     glass = np.array([places[t].constant for t in targets])
-    has_rest = np.array([Parameter(ParameterKind.GLASS, t) in layout.at for t in targets])
-    rest_columns = np.array([layout.at.get(Parameter(ParameterKind.GLASS, t), 0) for t in targets])  # no slope: none
-    seen = towards if turns is None else np.einsum("mji,mj->mi", turns[2], towards)  # by a target that stands still
-    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, seen, x)
+    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, sights.seen, x)
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
     lit, cube = phases.phasor[rows], electronics.reference
-    zero = Parameter(ParameterKind.ZERO, name)
     head = head_corrections(
         campaign,
         name,
         layout.at,
-        sight=b - a if turns is None else np.einsum("mji,mj->mi", turns[0], b - a),
+        sight=sights.sent,
         phase=phase,
         amplitude=np.abs(lit),
         reference_amplitude=np.abs(cube),
         index=n,
     )
-    coarse = n * (distance - glass - obliquity - d0 - x[layout.at[zero]] - head.at(x))
+    zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
+    coarse = n * (distance - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
-
-    # Leakage left over, complex dL: a phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
     per_radian = -half / TWO_PI
-    turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
-    leakage_slope = per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
-
-    covariance = np.diag((per_radian * phases.u_phase[rows]) ** 2) + per_radian**2 * electronics.covariance
-    lasting = 0.0 if network.motion is None else network.motion.lasting
-    path = campaign.site.ranging.path_index_fluctuation_ppm * PPM * distance * np.sqrt(1.0 - lasting**2)
-    same = np.array(targets)[:, None] == np.array(targets)
-    covariance += same * np.outer(path, path)
-    if network.motion is not None:
-        covariance += np.diag(n**2 * network.motion.jitter(name, targets))
-
-    offset = (
-        -n * (glass + obliquity + d0 + head.value)
-        - distance * (air.slopes @ x[air_columns])
-        + n * np.sum(normal_slopes * x[normal_columns], axis=1)
-    )
-    paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, name, t), -1)] for t in targets])  # -1: none
-    nuisance = np.concatenate(
-        [
-            paths,
-            np.full((m, 1), layout.at[zero]),
-            np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, name), 2), (m, 2)),
-            np.broadcast_to(air_columns, (m, len(air_columns))),
-            normal_columns,
-            rest_columns[:, None],
-            head.columns,
-        ],
-        axis=1,
-    )
-    coefficient = np.concatenate(
-        [
-            PPM * distance[:, None] * (paths >= 0),
-            -n[:, None],
-            leakage_slope,
-            distance[:, None] * air.slopes,
-            -n[:, None] * normal_slopes,
-            (-n * has_rest)[:, None],
-            -n[:, None] * head.slopes,
-        ],
-        axis=1,
-    )
-    group: ShotGroup
-    if turns is None:
-        group = Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient)
-    else:
-        group = MovingDistances(
-            name, observed, covariance, origin, target, *turns, n, offset, nuisance=nuisance, coefficient=coefficient
-        )
     parts = ShotParts(
         name=name,
         electronics=electronics,
@@ -159,10 +139,87 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         incidence=incidence,
         glass=glass,
         obliquity=obliquity,
-        leakage_slope=leakage_slope,
+        leakage_slope=_leakage_slope(per_radian, lit, cube),
         head=head,
     )
-    return group, parts
+    offset = (
+        -n * (glass + obliquity + d0 + head.value)
+        - distance * (air.slopes @ x[layout.air])
+        + n * np.sum(normal_slopes * x[normal_columns], axis=1)
+    )
+    nuisance, coefficient = _nuisance(network, parts, distance, air.slopes, (normal_columns, normal_slopes))
+    covariance = _covariance(network, parts, distance, per_radian)
+    origin, target = sights.origin, sights.target
+    if sights.turns is None:
+        return Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient), parts
+    moving = MovingDistances(
+        name, observed, covariance, origin, target, *sights.turns, n, offset, nuisance=nuisance, coefficient=coefficient
+    )
+    return moving, parts
+
+
+def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.ndarray:
+    """(m, 2) m/V, of the optical length by the leakage left over, complex dL.
+
+    A phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
+    """
+    turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
+    return per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
+
+
+def _covariance(network: CampaignNetwork, parts: ShotParts, distance: np.ndarray, per_radian: float) -> np.ndarray:
+    """(m, m) m^2 of the optical lengths: noise, the electronics' walk, the path's fluctuation, the structure's."""
+    electronics, motion = parts.electronics, network.motion
+    noise = network.phases.u_phase[electronics.shots]
+    covariance = np.diag((per_radian * noise) ** 2) + per_radian**2 * electronics.covariance
+    lasting = 0.0 if motion is None else motion.lasting
+    ppm = network.campaign.site.ranging.path_index_fluctuation_ppm
+    path = ppm * PPM * distance * np.sqrt(1.0 - lasting**2)
+    same = np.array(parts.target)[:, None] == np.array(parts.target)
+    covariance += same * np.outer(path, path)
+    if motion is not None:
+        index = 1.0 + parts.refractivity
+        covariance += np.diag(index**2 * motion.jitter(parts.name, parts.target))
+    return covariance
+
+
+def _nuisance(
+    network: CampaignNetwork,
+    parts: ShotParts,
+    distance: np.ndarray,
+    air_slopes: np.ndarray,
+    normals: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (m, q) of all parameters but the points, and the derivatives of the optical lengths by them.
+
+    air_slopes   (m, k), of the index by the air's parameters
+    normals      columns (m, 2) of the faces' tilts, and slopes of dPc by them
+    """
+    layout, targets, m = network.layout, parts.target, len(parts.target)
+    n = 1.0 + parts.refractivity
+    paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, parts.name, t), -1)] for t in targets])  # -1: none
+    constants = [Parameter(ParameterKind.GLASS, t) for t in targets]
+    has_rest = np.array([c in layout.at for c in constants])
+    rest = np.array([layout.at.get(c, 0) for c in constants])  # column 0 with derivative 0: none
+    columns = [
+        paths,
+        np.full((m, 1), layout.at[Parameter(ParameterKind.ZERO, parts.name)]),
+        np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, parts.name), 2), (m, 2)),
+        np.broadcast_to(layout.air, (m, len(layout.air))),
+        normals[0],
+        rest[:, None],
+        parts.head.columns,
+    ]
+    slopes = [
+        PPM * distance[:, None] * (paths >= 0),
+        -n[:, None],
+        parts.leakage_slope,
+        distance[:, None] * air_slopes,
+        -n[:, None] * normals[1],
+        (-n * has_rest)[:, None],
+        -n[:, None] * parts.head.slopes,
+    ]
+    return np.concatenate(columns, axis=1), np.concatenate(slopes, axis=1)
 
 
 def other_ends(group: ShotGroup, row: int, own: int, x: np.ndarray) -> np.ndarray:
