@@ -65,3 +65,32 @@ def test_such_reading_is_seen():
     for text in ("reason.partition(':')", "row.reason.startswith('blocked')", "parameter[:-2]", "reasons[k].split()"):
         assert list(read_back(ast.parse(text))), text
     assert not list(read_back(ast.parse("name.partition(' ')")))
+
+
+def annotations(tree):
+    """Of arguments, returns and fields, with the names they belong to."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = node.args
+            for one in [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]:
+                if one is not None and one.annotation is not None:
+                    yield node.lineno, f"{node.name}({one.arg})", one.annotation
+            if node.returns is not None:
+                yield node.lineno, node.name, node.returns
+        elif isinstance(node, ast.ClassDef):
+            for field in node.body:
+                if isinstance(field, ast.AnnAssign):
+                    yield field.lineno, f"{node.name}.{ast.unparse(field.target)}", field.annotation
+
+
+@pytest.mark.parametrize("room", ["reduction", "coordinator"])
+def test_signatures_say_what_they_take(room):
+    """mypy would refuse bare arrays, too, if it were asked in the reduction."""
+    anything = [
+        f"{path.relative_to(SOURCE)}:{line}: {name}: {ast.unparse(annotation)}"
+        for path, tree in TREES.items()
+        if path.is_relative_to(SOURCE / room)
+        for line, name, annotation in annotations(tree)
+        if re.search(r"\bAny\b", ast.unparse(annotation))
+    ]
+    assert anything == []

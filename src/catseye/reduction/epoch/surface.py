@@ -1,7 +1,7 @@
 """The dish: which points are on it, the paraboloid that fits them, its pose against the nominal posture."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -15,6 +15,21 @@ from catseye.reduction.site.places import nominal_frame
 
 FEWEST_CHECKS = 3  # used shots at a prism before it may shape the dish
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
+
+
+class DishPose(TypedDict):
+    """Where the dish stands, for JSON: metres and radians; `covariance` of the motion, in `covariance_order`."""
+
+    frame: str
+    pivot: list[float]
+    axis: list[float]
+    vertex: list[float]
+    focus: list[float]
+    translation: list[float]
+    rotation: list[float]
+    covariance: list[list[float]]
+    covariance_order: list[str]
+    unobserved: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +57,7 @@ class DishFit:
         """Standard uncertainty of each deviation, (k,) m."""
         return np.sqrt(np.diag(self.fit.deviation_covariance))
 
-    def pose(self) -> dict[str, Any]:
+    def pose(self) -> DishPose:
         """Axis, vertex and focus in the ground frame, and the rigid motion from the nominal posture, SI units."""
         axis = self.fit.frame.rotation[:, 2]
         vertex = self.fit.frame.translation

@@ -6,9 +6,9 @@ journal replayed in its order gives the same answers bit for bit.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from statistics import median
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,8 @@ from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGH
 from catseye.errors import CatseyeError
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder
+from catseye.records.site.target import FeedArmRanger, TargetRow
+from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.parameter import GRADIENT, POINT_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.epoch.reason import Reason, ShotStatus
@@ -41,6 +43,7 @@ from catseye.reduction.site.motion import (
 from catseye.reduction.site.places import places_of
 
 Array = NDArray[np.float64]
+Typed = TypeVar("Typed", TargetRow, TripletRecord, FeedArmRanger)  # records with a position that somebody typed
 FIRST_INDEX = 1.00028  # group index before the first epoch, good to 5e-5: 6 mm at 120 m, enough for whole cycles
 
 
@@ -464,13 +467,13 @@ def _with_flexure(site: SiteFolder, settings: LiveSettings) -> SiteFolder:
     """The site with typed positions on the telescope as uncertain as a telescope that bends makes them."""
     usual = settings.reduction.u_position / MILLIMETRE
 
-    def wider(record: Any) -> Any:
+    def wider(record: Typed) -> Typed:
         u = math.hypot(record.u_position_mm or usual, settings.u_flexure_mm)
         return record.model_copy(update={"u_position_mm": u})
 
-    fields = {name: getattr(site, name) for name in SiteFolder.__dataclass_fields__}
-    fields["targets"] = {n: wider(t) if t.frame != "ground" else t for n, t in site.targets.items()}
-    fields["triplets"] = {n: wider(t) if t.frame != "ground" else t for n, t in site.triplets.items()}
+    own = {each.name: getattr(site, each.name) for each in fields(SiteFolder)}
+    own["targets"] = {n: wider(t) if t.frame != "ground" else t for n, t in site.targets.items()}
+    own["triplets"] = {n: wider(t) if t.frame != "ground" else t for n, t in site.triplets.items()}
     arm = tuple(wider(r) for r in site.feedarm.ranger)
-    fields["feedarm"] = site.feedarm.model_copy(update={"ranger": arm})
-    return SiteFolder(**fields)
+    own["feedarm"] = site.feedarm.model_copy(update={"ranger": arm})
+    return SiteFolder(**own)
