@@ -327,3 +327,12 @@ def test_what_is_outside_is_refused_with_value_and_limit(call, said):
 
 def test_the_notice_is_a_warning():
     assert "not a certificate" in safety.NOTICE
+
+
+def test_passes_beyond_t2_do_not_shrink_the_limit_of_one_any_further():
+    """IEC 60825-1, 4.3 f 3: an extended source, seen for longer than T_2, is as dangerous as at T_2."""
+    beam = LaserBeam(0.010, 0.780, 0.003, 1e-3)
+    ratios = [sweep_ratio(beam, 10.0, 0.5, duration=t, period=0.3, subtense=0.01) for t in (25.0, 50.0, 99.0)]
+    assert ratios == pytest.approx([ratios[0]] * 3, rel=1e-12)
+    shorter = sweep_ratio(beam, 10.0, 0.5, duration=5.0, period=0.3, subtense=0.01)
+    assert shorter < ratios[0]

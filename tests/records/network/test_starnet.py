@@ -190,6 +190,13 @@ def test_levelling_and_second_face():
     assert np.degrees(group(network, "zenith_angle").observed) == pytest.approx([91.0])
 
 
+def test_standard_errors_of_coordinates_have_the_units_of_lengths():
+    network = read(".UNITS FEETUS DMS\n.ORDER NE\nC A 0 0 0 ! ! !\nC B 100 200 10 0.1 0.2 0.3\nD A-B 224 0.01")
+    foot = 1200.0 / 3937.0
+    assert group(network, "coordinates").observed == pytest.approx(np.array([100.0, 200.0, 10.0]) * foot)
+    assert np.sqrt(group(network, "coordinates").covariance) == pytest.approx(np.array([0.1, 0.2, 0.3]) * foot)
+
+
 REFUSED = {
     "SS 1-2-3 10-00-00 5 90-00-00": (
         "'SS 1-2-3 10-00-00 5 90-00-00' is not known here "

@@ -8,6 +8,7 @@ import csv
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 from catseye.records.laboratory.baseline import (
     FORMAT,
@@ -152,6 +153,16 @@ def test_the_ts16_against_the_ts30(ts16):
     assert scale * 1e6 == pytest.approx(-3.1, abs=0.2)
     assert u_scale * 1e6 == pytest.approx(1.57, abs=0.2)
     assert ts16.test.degrees_of_freedom == 4
+
+
+def test_the_standards_second_question_compares_with_the_known_baseline(ts16, known):
+    """ISO 17123-4 b: the ratio of both variances against F of their degrees of freedom, by scipy."""
+    asked = next(d for d in ts16.decisions if d.name.startswith("ISO 17123-4 b"))
+    ratio = (ts16.test.s * 1e3 / known.s_mm) ** 2
+    low, high = f.ppf([0.025, 0.975], 4, known.degrees_of_freedom)
+    assert asked.statistic == pytest.approx(ratio, rel=1e-9)
+    assert asked.limit == pytest.approx(high, rel=1e-6)
+    assert asked.passed == (low <= ratio <= high)
 
 
 def test_taken_as_corrected_in_the_field_both_instruments_agree_twice_as_well(heights, ts30, ts16):
