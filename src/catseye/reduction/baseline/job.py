@@ -25,27 +25,27 @@ Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in
 class BaselineJob:
     """The adjustments of one calibration, which differ in what they leave out or add."""
 
-    def __init__(self, seen, lengths, settings: BaselineSettings, known: KnownPlaces | None, notes: list[str]):
-        self.seen, self.lengths, self.settings, self.known, self.notes = seen, lengths, settings, known, notes
-        count = len(seen.names)
-        u_direction = np.hypot(seen.u_rounding, settings.u_direction_arcsec * ARCSECOND)
+    def __init__(self, shots, lengths, settings: BaselineSettings, known: KnownPlaces | None, notes: list[str]):
+        self.shots, self.lengths, self.settings, self.known, self.notes = shots, lengths, settings, known, notes
+        count = len(shots.names)
+        u_direction = np.hypot(shots.u_rounding, settings.u_direction_arcsec * ARCSECOND)
         self.sights = BaselineSights(
-            seen.start,
-            seen.end,
-            seen.set,
-            seen.setup,
+            shots.start,
+            shots.end,
+            shots.set,
+            shots.setup,
             lengths.distance,
             lengths.stretch,
             lengths.systematic,
             lengths.effects,
-            seen.direction,
+            shots.direction,
             u_direction,
         )
         if known is None:
             try:
-                self.x = places_in_line(seen.start, seen.end, lengths.distance, count)
+                self.x = places_in_line(shots.start, shots.end, lengths.distance, count)
             except EstimationError as problem:
-                raise EstimationError(named(str(problem), seen.names)) from problem
+                raise EstimationError(named(str(problem), shots.names)) from problem
             self.y = np.zeros(count)
         else:
             self.x, self.y = known.x, known.y
@@ -65,7 +65,7 @@ class BaselineJob:
                 claim=self._specified(keep),
             )
         except EstimationError as problem:
-            raise EstimationError(named(str(problem), self.seen.names)) from problem
+            raise EstimationError(named(str(problem), self.shots.names)) from problem
 
     def _specified(self, keep) -> Claim:
         """The maker's claim as variances; repeats from their own scatter, or a tenth of the claim."""
@@ -98,10 +98,10 @@ class BaselineJob:
 
     def cleaned(self, progress: Progress | None):
         """Shots used, why others are not, what is suspect, and the solution; one rejection a step."""
-        keep = np.ones(len(self.seen), bool)
-        rejected = [""] * len(self.seen)
-        most = max(1, len(self.seen) // 10)
-        for step in range(len(self.seen)):
+        keep = np.ones(len(self.shots), bool)
+        rejected = [""] * len(self.shots)
+        most = max(1, len(self.shots) // 10)
+        for step in range(len(self.shots)):
             if progress is not None:
                 progress("adjusting", step, 0)
             solution = self.solved(keep)
@@ -130,7 +130,7 @@ class BaselineJob:
         """cos and sin of the length shown, in unit lengths; what coefficient 1 m adds."""
         if not names or self.settings.unit_length is None:
             return None
-        phase = TWO_PI * self.seen.slope / self.settings.unit_length
+        phase = TWO_PI * self.shots.slope / self.settings.unit_length
         columns = [self.lengths.stretch * f((k + 1) * phase) for k in range(len(names) // 2) for f in (np.cos, np.sin)]
         return Extra(names, np.stack(columns, axis=1))
 
@@ -169,10 +169,10 @@ class BaselineJob:
 
         def of(distance, start, end, sigma=None):
             line = np.sqrt(distance**2 - (y[end] - y[start]) ** 2)
-            found = full_test(number[start], number[end], line, number[order], sigma)
+            test = full_test(number[start], number[end], line, number[order], sigma)
             places = np.full(len(y), np.nan)
-            places[touched] = found.x
-            return replace(found, x=places)
+            places[touched] = test.x
+            return replace(test, x=places)
 
         steep = used.distance - (used.stretch - 1.0) * solution.of("zero")[0]  # its part along the slope
         start, end, mean = used.start[used.first], used.end[used.first], used.mean(steep)
@@ -195,10 +195,10 @@ class BaselineJob:
         if solution.freedom_sets < 6 or np.ptp(index[keep]) < 0.2 * PPM:
             return float("nan"), float("nan")
         try:
-            found = self.solved(keep, extra=Extra(names, columns))
+            extended = self.solved(keep, extra=Extra(names, columns))
         except EstimationError:
             return float("nan"), float("nan")
-        b, u = found.of("weather")
+        b, u = extended.of("weather")
         return 1.0 - b, u
 
 

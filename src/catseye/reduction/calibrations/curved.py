@@ -125,13 +125,13 @@ def fit_curved(
             reject=rejecting,
             level=level,
         )  # fmt: skip
-        found = values.copy()
-        found[sought] += fit.x
-        found[acting] = start[acting] + [fit.effects[p.name][0] for k, p in enumerate(parameters) if acting[k]]
+        latest = values.copy()
+        latest[sought] += fit.x
+        latest[acting] = start[acting] + [fit.effects[p.name][0] for k, p in enumerate(parameters) if acting[k]]
         covariance = _covariance(slopes, scatter, fit, parameters)
         u = np.sqrt(np.diag(covariance))
-        moved = np.max(np.abs(found - values) / np.where(u > 0.0, u, np.inf), initial=0.0)
-        values = found
+        moved = np.max(np.abs(latest - values) / np.where(u > 0.0, u, np.inf), initial=0.0)
+        values = latest
         if not np.isfinite(values).all():
             break
         if moved < SETTLED:
@@ -180,9 +180,9 @@ def row_ends(fit: CalibrationFit, reasons: Sequence[str], each: int) -> list[tup
     """
     states = fit.state([reason for reason in reasons for _ in range(each)])
     order = (USED, SUSPECT, REJECTED)
-    told = []
+    ends = []
     for k in range(0, len(states), each):
         statistic = max(fit.statistic[k : k + each], key=abs)
         state = max(states[k : k + each], key=lambda s: order.index(s) if s in order else len(order))
-        told.append((float(statistic), state))
-    return told
+        ends.append((float(statistic), state))
+    return ends

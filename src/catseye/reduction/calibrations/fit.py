@@ -92,12 +92,12 @@ class CalibrationFit:
 
     def decisions(self, level: float = SCATTER_LIMIT) -> tuple[TestOutcome, ...]:
         """Tests of the scatter and of the single readings."""
-        told = []
+        outcomes = []
         if self.test == "w" and self.degrees_of_freedom > 0.5:
             test = global_test(self.variance_factor * self.degrees_of_freedom, self.degrees_of_freedom, level)
             low, high = test.lower, test.upper
             limit = high if self.variance_factor >= 1.0 else low
-            told.append(
+            outcomes.append(
                 TestOutcome(
                     "scatter: variance factor",
                     self.variance_factor,
@@ -107,7 +107,7 @@ class CalibrationFit:
                 )
             )
         elif self.test == "tau":
-            told.append(
+            outcomes.append(
                 TestOutcome(
                     "scatter: variance factor",
                     float("nan"),
@@ -117,7 +117,7 @@ class CalibrationFit:
                 )
             )
         else:
-            told.append(
+            outcomes.append(
                 TestOutcome("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings")
             )
         tested = self.active & self.checked
@@ -125,12 +125,12 @@ class CalibrationFit:
             worst = float(np.max(np.abs(self.statistic[tested])))
             count = int(np.count_nonzero(self.suspects))
             text = "no reading stands out" if not count else f"{count} of the values used stand out: look at them"
-            told.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
+            outcomes.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
         else:
-            told.append(
+            outcomes.append(
                 TestOutcome("outliers", float("nan"), float("nan"), None, "no reading is checked by the others")
             )
-        return tuple(told)
+        return tuple(outcomes)
 
     def state(self, reasons: Sequence[str]) -> tuple[str, ...]:
         """(m,) of each value: used, suspect, rejected, or the reason why it was left out beforehand."""
@@ -242,31 +242,31 @@ def _outcome(
     level: float,
     effective: np.ndarray,
 ) -> CalibrationFit:
-    found, p = solution.fits[0], len(effective)
+    group, p = solution.fits[0], len(effective)
     full = solution.covariance
     block = np.ix_(on, on)
     design = readings.matrix[:, :p]
     weight = np.linalg.inv(readings.covariance[block])
     scattered = np.linalg.inv(design[on].T @ weight @ design[on])
-    degrees = float(np.sum(found.redundancy[on]))
-    factor = found.pvv / degrees if degrees > 1e-6 else float("nan")
-    tested = checked(found) & on
+    degrees = float(np.sum(group.redundancy[on]))
+    factor = group.pvv / degrees if degrees > 1e-6 else float("nan")
+    tested = checked(group) & on
     single = single_level(level, max(int(tested.sum()), 1))
     estimated = bool(components) and degrees > 1.5
     critical = tau_critical(single, degrees) if estimated else w_critical(single)
-    statistic = found.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
+    statistic = group.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
     return CalibrationFit(
         x=solution.x[:p],
         covariance=full[:p, :p],
         scattered=scattered,
         effects={name: (float(solution.x[p + k]), float(np.sqrt(full[p + k, p + k]))) for k, name in enumerate(acting)},
         components=components,
-        residual=found.residual,
+        residual=group.residual,
         predicted=design @ solution.x[:p],
-        sigma=found.sigma,
+        sigma=group.sigma,
         statistic=statistic,
         active=on,
-        checked=checked(found),
+        checked=checked(group),
         test="tau" if components else "w",
         critical=critical,
         variance_factor=float("nan") if components else factor,

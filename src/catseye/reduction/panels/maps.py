@@ -73,10 +73,10 @@ def fitted_map(given: PanelMap) -> FittedMap:
     weight, fit = np.ones(k), np.zeros(3)
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
-        found = np.linalg.lstsq(design / size * root[:, None], given.deviation * root, rcond=None)[0] / size
-        rest = given.deviation - design @ found
-        moved = float(np.max(np.abs(design @ (found - fit))))
-        fit = found
+        refitted = np.linalg.lstsq(design / size * root[:, None], given.deviation * root, rcond=None)[0] / size
+        rest = given.deviation - design @ refitted
+        moved = float(np.max(np.abs(design @ (refitted - fit))))
+        fit = refitted
         scale = MAD_TO_SIGMA * float(np.median(np.abs(rest)))
         if moved < SETTLED or scale == 0.0:
             break

@@ -61,7 +61,7 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
     steps, u_steps = _steps(measurement, lengths, shares)
     status = tuple(_status(measurement, k, lengths, cycles, best.suspects) for k in range(len(measurement.placement)))
     memo = memo_numbers(readings, cycles, lengths)
-    found = TripletReduction(
+    reduction = TripletReduction(
         measurement=measurement,
         readings=readings,
         cycles=cycles,
@@ -100,7 +100,7 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
         status=status,
         notes=(),
     )
-    return _with_notes(found)
+    return _with_notes(reduction)
 
 
 def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
@@ -273,5 +273,5 @@ def _status(
     return SUSPECT if k in suspects else GOOD
 
 
-def _with_notes(found: TripletReduction) -> TripletReduction:
-    return replace(found, notes=tuple(triplet_notes(found)))
+def _with_notes(reduction: TripletReduction) -> TripletReduction:
+    return replace(reduction, notes=tuple(triplet_notes(reduction)))

@@ -203,8 +203,10 @@ def ball_ranges(
             f"ranges have shape {d.shape} and covariance {given.shape}; expected ({n}, {k}, 2) and "
             f"({2 * n * k}, {2 * n * k}) for {n} triplets and {k} scan points"
         )
-    found = [_one(unit, s, rows) for unit, rows in zip(units, d, strict=True)]
-    incidence, obliquity, d_mp, d_bc, memo, by_range, by_unit = (np.stack(part) for part in zip(*found, strict=True))
+    by_triplet = [_one(unit, s, rows) for unit, rows in zip(units, d, strict=True)]
+    incidence, obliquity, d_mp, d_bc, memo, by_range, by_unit = (
+        np.stack(part) for part in zip(*by_triplet, strict=True)
+    )
     slope = by_range.reshape(n * k, 2)
     known = np.isfinite(d_bc).ravel()
     blocks = np.where(np.isfinite(given), given, 0.0).reshape(n * k, 2, n * k, 2)

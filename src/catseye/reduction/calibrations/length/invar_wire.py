@@ -110,7 +110,7 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
     """
     sheet, m = readings.sheet, len(readings)
     values = {name: readings.get(name) for name in (*STEPS, "scale_sum_mm")}
-    seen = _distance_mm(values, sheet.hanging)
+    distance = _distance_mm(values, sheet.hanging)
     effects = [
         Effect(label, _slope(values, name, sheet.hanging), getattr(sheet, f"u_{name}"))
         for name, label in SHARED.items()
@@ -118,9 +118,9 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
     ]
     known = sheet.known_distance_mm
     if known is None:
-        observed, design = seen, np.ones((m, 1))
+        observed, design = distance, np.ones((m, 1))
     else:  # observed = how much longer the wire is than certified, times its slope
-        observed, design = known - seen, _slope(values, "certified_mm", sheet.hanging)[:, None]
+        observed, design = known - distance, _slope(values, "certified_mm", sheet.hanging)[:, None]
         effects = [Effect(e.name, -e.column, e.u) for e in effects]
         effects.append(Effect("known distance, mm", np.ones(m), sheet.u_known_distance_mm))
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
@@ -136,7 +136,7 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         reject=reject,
         level=sheet.level,
     )
-    return _told(readings, fit, seen)
+    return _calibration(readings, fit, distance)
 
 
 def _distance_mm(values: dict[str, np.ndarray], hanging: bool) -> np.ndarray:
@@ -175,7 +175,7 @@ def _slope(values: dict[str, np.ndarray], name: str, hanging: bool) -> np.ndarra
     return (moved(step) - moved(-step)) / (2.0 * step)
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit, seen: np.ndarray) -> Calibration:
+def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndarray) -> Calibration:
     sheet = readings.sheet
     known = sheet.known_distance_mm
     if known is None:
@@ -190,7 +190,7 @@ def _told(readings: SheetReadings, fit: CalibrationFit, seen: np.ndarray) -> Cal
     rows = tuple(
         (
             *(float(column[k]) for column in readings.numbers.values()),
-            float(seen[k]),
+            float(distance[k]),
             float(1e3 * fit.residual[k]),
             float(fit.statistic[k]),
             state,

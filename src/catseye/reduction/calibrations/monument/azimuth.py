@@ -59,7 +59,7 @@ def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibrat
     else:
         raise refusal(readings.file, f"the azimuth does not settle ({moved:.1e} rad in the last round): is a point at "
                                      "the instrument itself?")  # fmt: skip
-    return _told(sights, fit, linear)
+    return _calibration(sights, fit, linear)
 
 
 def _tied(sights: DirectionSights) -> bool:
@@ -161,27 +161,27 @@ def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
     """(name, u, step, change of a step -> Conditions) of what the geometry hangs on; u in the unit of the step."""
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
-    told: list[tuple[str, float, float, Any]] = [
+    changes: list[tuple[str, float, float, Any]] = [
         ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
         ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
     ]
     if sights.are("star").any():
         late = float(np.hypot(sheet.u_ut1_utc_s, sheet.u_clock_s))
         u_pole = sheet.u_pole_arcsec * ARCSECOND
-        told += [
+        changes += [
             ("time and UT1, s", late, STEPS["time"], lambda s: SightConditions(time=s)),
             ("pole x, rad", u_pole, angle, lambda s: SightConditions(pole=(s, 0.0))),
             ("pole y, rad", u_pole, angle, lambda s: SightConditions(pole=(0.0, s))),
         ]
     u_offset = sheet.u_instrument_mm * MILLIMETRE
     for k, axis in enumerate(("x", "y", "z")):
-        told.append(
+        changes.append(
             (f"instrument d{axis}, m", u_offset, length, lambda s, k=k: SightConditions(offset=s * np.eye(3)[k]))
         )
     for number, column in enumerate(_coordinate_columns(sheet)):
         size = float(np.abs(column).max())
         shape = column.reshape(-1, 3) / size
-        told.append(
+        changes.append(
             (
                 f"coordinates, component {number + 1}",
                 size,
@@ -189,7 +189,7 @@ def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
                 lambda s, shape=shape: SightConditions(points=s * shape),
             )
         )
-    return told
+    return changes
 
 
 def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
@@ -223,7 +223,7 @@ def _fitted(sights: DirectionSights, linear: dict[str, Any], active: np.ndarray,
 
 def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[tuple[str, float, float]]:
     """Set, lab after less before (rad), its u: scatter of readings, transport, what both visits do not share."""
-    told = []
+    closures = []
     plain = sights.observed - geometry_of(sights, float(fit.x[0]), SightConditions())[0]
     for k, name in enumerate(sights.sets):
         rows = [fit.active & (sights.of_set == k) & (sights.place == end) for end in (BEFORE, AFTER)]
@@ -237,11 +237,11 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
                 weight[there] = sign / (len(faces) * np.count_nonzero(there))
         closure = float(weight @ wrapped(plain - plain[np.argmax(rows[0])]))
         shared = sum((float(weight @ e.column) * e.u) ** 2 for e in effects)
-        told.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
-    return told
+        closures.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
+    return closures
 
 
-def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) -> Calibration:
+def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
     alpha1 = float(wrapped(np.array(np.pi - azimuth)))

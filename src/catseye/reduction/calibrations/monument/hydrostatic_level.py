@@ -142,7 +142,7 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         level=sheet.level,
     )
     loops = _loops(fit, design, effects, climb)
-    return _told(readings, fit, marks, density, loops)
+    return _calibration(readings, fit, marks, density, loops)
 
 
 def _refuse(readings: SheetReadings, ends: list[tuple[str, ...]], marks: tuple[str, ...]) -> None:
@@ -200,7 +200,7 @@ def _loops(
     off = (fit.residual + _acted(fit, effects))[on]
     least = design[on]
     left = total - least @ np.linalg.solve(least.T @ np.linalg.solve(total, least), least.T)
-    told: list[tuple[str, float, float]] = []
+    loops: list[tuple[str, float, float]] = []
     tree: list[int] = []
     for k, row in enumerate(on):
         if not tree or np.linalg.matrix_rank(climb[on[[*tree, k]]]) > len(tree):
@@ -211,8 +211,8 @@ def _loops(
         loop[k], loop[tree] = 1.0, -way
         u = float(np.sqrt(max(loop @ left @ loop, 0.0)))
         members = ", ".join(str(on[j] + 1) for j in np.flatnonzero(loop))
-        told.append((members, float(loop @ off), u))
-    return told
+        loops.append((members, float(loop @ off), u))
+    return loops
 
 
 def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
@@ -221,7 +221,7 @@ def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
     return sum(parts, np.zeros(len(fit.residual)))
 
 
-def _told(
+def _calibration(
     readings: SheetReadings,
     fit: CalibrationFit,
     marks: tuple[str, ...],
@@ -241,7 +241,7 @@ def _told(
             f"the constant is the sheet's, {sheet.constant_mm:g} mm; these readings move it by {value:+.4f} mm, "
             f"u {u:.4f} mm"
         )
-    found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
     worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
     decisions = [
         TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
@@ -270,16 +270,16 @@ def _told(
     on, number = fit.active, np.arange(1, len(readings) + 1)
     record: dict[str, object] = {
         "marks": list(marks),
-        "heights_mm": [sheet.held_height_mm, *(q.value for q in found[: len(marks) - 1])],
-        "u_heights_mm": [sheet.u_held_height_mm, *(q.u for q in found[: len(marks) - 1])],
+        "heights_mm": [sheet.held_height_mm, *(q.value for q in calibrated[: len(marks) - 1])],
+        "u_heights_mm": [sheet.u_held_height_mm, *(q.u for q in calibrated[: len(marks) - 1])],
     }
     if constant:
-        record |= {"constant_mm": found[-1].value, "u_constant_mm": found[-1].u}
+        record |= {"constant_mm": calibrated[-1].value, "u_constant_mm": calibrated[-1].u}
     return Calibration(
         kind=KIND,
         title=f"Run with hydrostatic level {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("from", "to", "vessel_from", "reading_from_mm", "reading_to_mm", "density_um", "residual_um",
                  fit.test, "state"),

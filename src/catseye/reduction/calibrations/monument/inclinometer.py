@@ -156,7 +156,7 @@ def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Cal
         moved = np.abs(fit.x - at) / np.maximum(np.abs(fit.x), table.sizes)
         at, active = fit.x, fit.active[: len(readings)]
         if turn > 2 and moved.max() < ENOUGH:
-            return _told(table, fit)
+            return _calibration(table, fit)
     raise EstimationError(
         f"the inclinometer's model did not settle in {ROUNDS} rounds; is the pier level, or the scale's sign wrong?"
     )
@@ -308,7 +308,7 @@ MEANINGS = (
 )
 
 
-def _told(table: _Table, fit: CalibrationFit) -> Calibration:
+def _calibration(table: _Table, fit: CalibrationFit) -> Calibration:
     readings, sheet, m = table.readings, table.sheet, table.m
     all_keys = [
         (key.format(axis), unit, meaning.format(axis), size) for key, unit, meaning, size in MEANINGS for axis in "xy"
@@ -316,12 +316,12 @@ def _told(table: _Table, fit: CalibrationFit) -> Calibration:
     chosen = [all_keys[k] for k in np.flatnonzero(table.free)]
     turn = np.diag([1.0 / size for *_, size in chosen])
     values, covariance = turn @ fit.x, turn @ fit.covariance @ turn.T
-    found = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
+    calibrated = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
     states = fit.state(readings.left_out * 2)
-    seen = [name for name in LAYOUT.optional if name in readings.numbers]
+    optional = [name for name in LAYOUT.optional if name in readings.numbers]
     rows = tuple(
         (
-            *(float(readings.numbers[name][k]) for name in seen),
+            *(float(readings.numbers[name][k]) for name in optional),
             float(table.observed[k]),
             float(table.observed[m + k]),
             float(fit.residual[k] * 1e3),
@@ -338,9 +338,9 @@ def _told(table: _Table, fit: CalibrationFit) -> Calibration:
         kind=KIND,
         title=f"Inclinometer {sheet.instrument} on a {'pier' if table.pier else 'tilt table'}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
-        columns=(*seen, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
+        columns=(*optional, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
                  "state"),
         rows=rows,
         decisions=fit.decisions(),
@@ -356,7 +356,7 @@ def _told(table: _Table, fit: CalibrationFit) -> Calibration:
         method="Readings of both axes are adjusted to the tilts: zero and scale of each axis, their misalignments and, "
         "where asked, cubic terms, temperature coefficients and the table's own tilt. Tilts and scale of the table, "
         "and on a pier the scales and the turn of the case, are parameters with priors.",
-        record={q.key: q.value for q in found} | {f"u_{q.key}": q.u for q in found},
+        record={q.key: q.value for q in calibrated} | {f"u_{q.key}": q.u for q in calibrated},
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ frame with full covariance, latitude, longitude, elevation, and easting, northin
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -94,7 +94,7 @@ def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
         covariance = covariance + _by_deflection(sheet, given)
     except ValueError as problem:
         raise refusal(readings.file, f"{readings.where[row]}, {problem}") from problem
-    return _told(readings, row, frame, values, covariance)
+    return _calibration(readings, row, frame, values, covariance)
 
 
 def monument_place(
@@ -111,7 +111,7 @@ def monument_place(
     """
     if system not in ("ground", "state-plane"):
         raise InputError(f"system {system!r} is unknown (expected 'ground' or 'state-plane')")
-    to_ground: Callable[[Any], Any] = frame.from_state_plane if system == "state-plane" else np.asarray
+    to_ground: Callable[[np.ndarray], np.ndarray] = frame.from_state_plane if system == "state-plane" else np.asarray
 
     def every(at: np.ndarray) -> np.ndarray:
         points = to_ground(at)
@@ -156,19 +156,19 @@ def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
     return total
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray
 ) -> Calibration:
     sheet = readings.sheet
-    found = quantities(KEYS, values, covariance)
+    calibrated = quantities(KEYS, values, covariance)
     latitude, longitude = values[3] * DEGREE, values[4] * DEGREE
     scale, convergence = grid(latitude, longitude)
     height = frame.geodetic(values[:3] * MILLIMETRE)[2]
     factor = float(elevation_factor(latitude, height))
     held = readings.words.get("fixed", ("",) * len(readings))[row]
-    value = {q.key: q.value for q in found}
+    value = {q.key: q.value for q in calibrated}
     record = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
-    record |= {f"u_{q.key}": q.u for q in found[:3]}
+    record |= {f"u_{q.key}": q.u for q in calibrated[:3]}
     record |= {key: value[key] for key in ("latitude_deg", "longitude_deg", "elevation_m", "wv_x_m", "wv_y_m")}
     record["wv_z_m"] = value["elevation_m"]
     back = frame.from_state_plane(frame.state_plane(values[:3] * MILLIMETRE)) / MILLIMETRE - values[:3]
@@ -179,7 +179,7 @@ def _told(
         kind=KIND,
         title=f"Place of monument {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("point", "x_m", "y_m", "z_m"),
         rows=tuple(

@@ -85,7 +85,7 @@ def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibratio
     first = fitted(effects, readings.active, reject)
     tilted = design[:, :2] @ first.x[:2]  # the scale acts on the tilts, which the first fit knows well enough
     scale = Effect("scale of the level, %", 0.01 * tilted, sheet.u_scale_percent)
-    return _told(readings, fitted([*effects, scale], first.active, False))
+    return _calibration(readings, fitted([*effects, scale], first.active, False))
 
 
 def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
@@ -112,10 +112,10 @@ def _in_ground(sheet: Any, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0
     return mount_angles(local @ plumb)[1:]
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
+def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
     sheet = readings.sheet
     tilts = np.sin(fit.x[:2])
-    found = _in_ground(sheet, tilts)
+    ground_tilts = _in_ground(sheet, tilts)
     turn = np.zeros((3, 3))
     turn[0, 0], turn[1, 1], turn[2, 2] = 1.0, -1.0, 1.0 / ARCSECOND  # tilts below 0.1 rad add as vectors to 1 %
     by_deflection = np.zeros((3, 2))
@@ -129,8 +129,8 @@ def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
         ("alpha3_rad", "rad", "turn of the mount about x^, against the ground frame's z"),
         ("level_zero_arcsec", "arcsec", "what the level reads on a level plate"),
     ]
-    values = np.array([*found, fit.x[2] / ARCSECOND])
-    given = quantities(keys, values, covariance, fit=fit, turn=turn)
+    values = np.array([*ground_tilts, fit.x[2] / ARCSECOND])
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=turn)
     leans = lean(frame_of(sheet), np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE) / ARCSECOND
     local = np.array([fit.x[0], -fit.x[1]]) / ARCSECOND
     orientation = readings.get("orientation_deg")
@@ -143,7 +143,7 @@ def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
         kind=KIND,
         title=f"Plate levels of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("orientation_deg", *(("plate_deg",) if "plate_deg" in readings.numbers else ()), "reading_arcsec",
                  "residual_arcsec", fit.test, "state"),

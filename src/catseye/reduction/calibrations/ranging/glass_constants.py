@@ -78,7 +78,7 @@ def calibrate_prism(readings: SheetReadings, reject: bool = False) -> Calibratio
         ("hrp_mm", "mm", "reference point below the entry face"),
         ("pc_mm", "mm", "range constant at normal incidence, added to the measured length"),
     ]
-    return _told(
+    return _calibration(
         readings, fit, PRISM, "Prism", keys, values=values, by_size=by_size[:, None], by_index=by_index,
         record={"height_mm": values[0], "u_height_mm": float(np.sqrt(fit.covariance[0, 0])), "hrp_mm": values[1],
                 "pc_mm": values[2]},
@@ -108,7 +108,7 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
         ("r2_mm", "mm", "radius of the silvered shell at 20 °C"),
         ("pc_b_mm", "mm", "range constant, added to the measured length"),
     ]
-    return _told(
+    return _calibration(
         readings, fit, BALL, "Ball", keys, values=values, by_size=by_size, by_index=by_index,
         record={"r1_mm": r1, "r2_mm": r2, "u_r_mm": float(np.sqrt(fit.covariance.diagonal().max())),
                 "pc_b_mm": values[2]},
@@ -116,13 +116,13 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
 
 
 def _dimensions(
-    readings: SheetReadings, seen: np.ndarray, design: np.ndarray, names: list[str], reject: bool
+    readings: SheetReadings, measured: np.ndarray, design: np.ndarray, names: list[str], reject: bool
 ) -> tuple[CalibrationFit, np.ndarray]:
     """Sizes at 20 °C, mm, from readings at their temperature."""
     sheet, m = readings.sheet, len(readings)
     temperature = readings.get("temperature_c")
     expansion = sheet.expansion_ppm_per_c * PPM
-    observed = seen / expanded(1.0, temperature, expansion)
+    observed = measured / expanded(1.0, temperature, expansion)
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))
@@ -143,7 +143,7 @@ def _dimensions(
     return fit, observed
 
 
-def _told(
+def _calibration(
     readings: SheetReadings,
     fit: CalibrationFit,
     kind: str,

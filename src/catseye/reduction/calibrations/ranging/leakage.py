@@ -59,7 +59,7 @@ def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibrat
         reject=reject,
         level=sheet.level,
     )
-    return _told(readings, fit, z, names, len(sessions))
+    return _calibration(readings, fit, z, names, len(sessions))
 
 
 def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> ObservedScatter:
@@ -93,12 +93,12 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
     return TestOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
 ) -> Calibration:
     sheet, m = readings.sheet, len(z)
     leakage = complex(*fit.x)
-    found, polar = polar_quantities(leakage, fit.covariance, fit)
+    calibrated, polar = polar_quantities(leakage, fit.covariance, fit)
     between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
     u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
     to_come = float(np.hypot(u_mean, between))
@@ -122,19 +122,19 @@ def _told(
     on = fit.active[:m]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     circle = leakage + 2.0 * to_come * np.exp(1j * turn)
-    told = [
+    notes = [
         f"{int(on.sum())} buffers of {sessions} {'session' if sessions == 1 else 'sessions'}; the mean is known to "
         f"{u_mean / MILLIVOLT:.3g} mV in each quadrature",
         f"u_leakage_volt of the record is {to_come / MILLIVOLT:.3g} mV: of the leakage of a session to come, that of "
         f"the mean and {between / MILLIVOLT:.3g} mV between sessions together",
     ]
     if sessions == 1 and sheet.u_session_volt is None:
-        told.append("one session says nothing of other days: measure others, or state u_session_volt")
+        notes.append("one session says nothing of other days: measure others, or state u_session_volt")
     return Calibration(
         kind=KIND,
         title=f"Leakage of {sheet.instrument}, beam blocked",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=polar,
         columns=(
             "reading",
@@ -150,7 +150,7 @@ def _told(
         decisions=(_sessions_decision(sheet, sessions), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=(*told, *scatter_notes(fit, "mV", MILLIVOLT)),
+        notes=(*notes, *scatter_notes(fit, "mV", MILLIVOLT)),
         curve={
             "readings": (z[on].real / MILLIVOLT, z[on].imag / MILLIVOLT),
             "left out": (z[~on].real / MILLIVOLT, z[~on].imag / MILLIVOLT),
@@ -161,7 +161,7 @@ def _told(
         "adjusted, alike in both quadratures, with the scatter of buffers and between sessions as the sheet claims it "
         "or as the readings show it. The circle of the figure holds two standard uncertainties of the leakage of a "
         "session to come.",
-        record=leakage_record(found, to_come),
+        record=leakage_record(calibrated, to_come),
         equal_axes=True,
     )
 

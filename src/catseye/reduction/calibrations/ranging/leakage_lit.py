@@ -57,9 +57,9 @@ def calibrate_lit_leakage(readings: SheetReadings, reject: bool = False) -> Cali
     z = phasors(readings)
     fit, m = (_along(readings, z, reject), len(z)) if "distance_m" in readings.numbers else (None, len(z))
     if fit is not None:
-        return _told(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
+        return _calibration(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
     fit = _circle(readings, z, reject)
-    return _told(readings, fit, z, fit.statistic, known=False)
+    return _calibration(readings, fit, z, fit.statistic, known=False)
 
 
 def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
@@ -95,8 +95,8 @@ def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationF
 def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
     """Unknown positions: distances from a circle, linearised where the fit settles."""
     on = readings.active
-    found = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
-    point = np.array([found.phasor.real, found.phasor.imag, float(np.mean(np.abs(z[on] - found.phasor)))])
+    circle = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
+    point = np.array([circle.phasor.real, circle.phasor.imag, float(np.mean(np.abs(z[on] - circle.phasor)))])
     scatter = _scatter(readings, 1)
     for _ in range(ROUNDS):
         arm = z - complex(point[0], point[1])
@@ -132,13 +132,13 @@ def _arc(arm: np.ndarray) -> float:
     return float(TWO_PI - gaps.max())
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
 ) -> Calibration:
     sheet, m = readings.sheet, len(z)
     leakage = complex(fit.x[0], fit.x[1])
     centre = fit.covariance[:2, :2]
-    found, polar = polar_quantities(leakage, centre, fit)
+    calibrated, polar = polar_quantities(leakage, centre, fit)
     u_centre = float(np.sqrt(0.5 * np.trace(centre)))
     to_come = float(np.hypot(u_centre, sheet.u_session_volt))
     states = fit.state(readings.left_out * (2 if known else 1))
@@ -171,7 +171,7 @@ def _told(
         kind=KIND,
         title=f"Leakage of {sheet.instrument}, from a moving retroreflector",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=polar,
         columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
         rows=rows,
@@ -197,7 +197,7 @@ def _told(
             if known
             else "the centre of the circle that fits them best."
         ),
-        record=leakage_record(found, to_come),
+        record=leakage_record(calibrated, to_come),
         equal_axes=True,
     )
 

@@ -48,7 +48,7 @@ def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibr
         active = _fit(rail, kept, effects, active, sheet.level, reject=True).active
     chosen, decisions = _chosen(rail, kept, effects, active, sheet)
     fit = _fit(rail, chosen, effects, active, sheet.level)
-    return _told(readings, rail, fit, chosen, (*decisions, *fit.decisions()), reason)
+    return _calibration(readings, rail, fit, chosen, (*decisions, *fit.decisions()), reason)
 
 
 def _design(rail: Rail, orders: tuple[int, ...]) -> np.ndarray:
@@ -98,8 +98,8 @@ def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], st
     room = (int(on.sum()) - 4) // 2  # readings that are left over must tell the scatter
     tried = min(wanted, max(room, 0))
     others = np.column_stack([np.ones(len(length)), length - length.mean()])
-    found = separable_orders(phase, tried, others=others).orders if tried else ()
-    orders = tuple(k for k, got in zip(range(1, tried + 1), found, strict=False) if k == got)
+    separate = separable_orders(phase, tried, others=others).orders if tried else ()
+    orders = tuple(k for k, got in zip(range(1, tried + 1), separate, strict=False) if k == got)
     if len(orders) < wanted:
         text = (
             f"cyclic orders above {len(orders)} {left}, because {int(on.sum())} positions over {span:.4g} m do not "
@@ -131,7 +131,7 @@ def _chosen(
     longest = _fit(rail, kept, effects, active, sheet.level)
     single = single_level(ORDER_LEVEL, len(kept))
     limit = float(fisher.isf(single, 2.0, degrees))
-    highest, told = 0, []
+    highest, outcomes = 0, []
     weight = np.linalg.inv(_covariance(rail, longest)[np.ix_(active, active)])
     squares = [_squares(rail, kept[:k], active, weight) for k in range(len(kept) + 1)]
     scale = max(squares[-1] / degrees, np.finfo(float).tiny)  # readings without any scatter are no division by zero
@@ -140,8 +140,8 @@ def _chosen(
         significant = bool(statistic > limit)
         highest = k if significant else highest
         text = f"F test of its two terms at the level {single:.2g}: {'' if significant else 'not '}significant"
-        told.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
-    return kept[:highest], tuple(told)
+        outcomes.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
+    return kept[:highest], tuple(outcomes)
 
 
 def _covariance(rail: Rail, fit: CalibrationFit) -> np.ndarray:
@@ -180,7 +180,7 @@ def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[li
     return keys, turn
 
 
-def _told(
+def _calibration(
     readings: SheetReadings,
     rail: Rail,
     fit: CalibrationFit,
@@ -191,11 +191,11 @@ def _told(
     sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
     keys, turn = _quantities(rail, orders, sheet.start_m is not None)
     covariance = turn @ fit.covariance @ turn.T
-    found = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
+    calibrated = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
     count = len(orders)
     record = {}
     if count:
-        cyclic = found[2:]
+        cyclic = calibrated[2:]
         record = {
             "cyclic_cosine_mm": [q.value for q in cyclic[:count]],
             "cyclic_sine_mm": [q.value for q in cyclic[count:]],
@@ -229,7 +229,7 @@ def _told(
     notes = [
         reason,
         f"{count} cyclic {'order is' if count == 1 else 'orders are'} modelled"
-        + ("; " + ", ".join(_amplitude(found, fit, k, count) for k in range(count)) if count else ""),
+        + ("; " + ", ".join(_amplitude(calibrated, fit, k, count) for k in range(count)) if count else ""),
         f"u of the offset from the scatter alone {np.sqrt(fit.scattered[0, 0]) / micrometre:.2g} µm; the rest are "
         "interferometer, air and start as the sheet states them",
         "the orders were chosen by the tests from these readings; their u takes the choice as given"
@@ -241,7 +241,7 @@ def _told(
         kind=KIND,
         title=f"Zero and linearity of {sheet.instrument} against an interferometer",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=(
             "distance_m",
@@ -273,9 +273,9 @@ def _told(
     )
 
 
-def _amplitude(found: tuple, fit: CalibrationFit, k: int, count: int) -> str:
+def _amplitude(calibrated: tuple, fit: CalibrationFit, k: int, count: int) -> str:
     """Amplitude of one order with its u, in micrometres."""
-    cosine, sine = found[2 + k].value, found[2 + count + k].value
+    cosine, sine = calibrated[2 + k].value, calibrated[2 + count + k].value
     size = float(np.hypot(cosine, sine))
     at = [2 + k, 2 + count + k]
     gradient = np.array([cosine, sine]) / size

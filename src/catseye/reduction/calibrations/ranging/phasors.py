@@ -56,10 +56,10 @@ def polar_quantities(
     return quantities(keys, values, polar, fit=fit, turn=turn), polar
 
 
-def leakage_record(found: tuple[Quantity, ...], u_volt: float) -> dict[str, Any]:
+def leakage_record(leakage: tuple[Quantity, ...], u_volt: float) -> dict[str, Any]:
     """What goes into the ranger's record: one uncertainty of each quadrature."""
     return {
-        "leakage_amplitude_volt": found[0].value,
-        "leakage_phase_rad": found[1].value,
+        "leakage_amplitude_volt": leakage[0].value,
+        "leakage_phase_rad": leakage[1].value,
         "u_leakage_volt": u_volt,
     }

@@ -98,7 +98,7 @@ def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) 
         reject=reject,
         level=sheet.level,
     )
-    return _told(readings, fit, observed=observed, cycles=cycles, margin=margin)
+    return _calibration(readings, fit, observed=observed, cycles=cycles, margin=margin)
 
 
 def _design(scale: bool, length: np.ndarray) -> np.ndarray:
@@ -140,7 +140,7 @@ def _effects(
     return effects
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, fit: CalibrationFit, *, observed: np.ndarray, cycles: np.ndarray, margin: np.ndarray
 ) -> Calibration:
     sheet, distance = readings.sheet, readings.get("distance_m")
@@ -150,7 +150,7 @@ def _told(
         ("scale_ppm", "ppm", "by which ranges are too long"),
     ][: len(fit.x)]
     covariance = fit.covariance * np.outer(scale, scale)
-    found = quantities(keys, fit.x * scale, covariance, fit=fit, turn=np.diag(scale))
+    calibrated = quantities(keys, fit.x * scale, covariance, fit=fit, turn=np.diag(scale))
     micrometre = 1e-3 * MILLIMETRE
     rows = tuple(
         (
@@ -169,7 +169,7 @@ def _told(
         kind=KIND,
         title=f"Reference distance D0 of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("distance_m", "cycles", "margin_mm", "d0_mm", "residual_um", fit.test, "state"),
         rows=rows,
@@ -192,7 +192,7 @@ def _told(
         "length; the known distance less the target's constant less that length is the reference distance. The whole "
         "cycles are the nearest integers. The readings are adjusted together with all systematic effects as "
         "parameters with priors.",
-        record={"d0_mm": found[0].value, "u_d0_mm": found[0].u},
+        record={"d0_mm": calibrated[0].value, "u_d0_mm": calibrated[0].u},
     )
 
 

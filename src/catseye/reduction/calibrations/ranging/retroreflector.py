@@ -64,15 +64,16 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
     """
     sheet = readings.sheet
     names, on = readings.words["retroreflector"], readings.active
-    seen = sorted({name for name, a in zip(names, on, strict=True) if a})
-    if sheet.reference not in seen:
+    measured = sorted({name for name, a in zip(names, on, strict=True) if a})
+    if sheet.reference not in measured:
         raise refusal(
             readings.file, f"no reading of {shown(sheet.reference)}, the reference that {readings.sheet_file} names"
         )
-    unknown = [name for name in seen if name != sheet.reference]
+    unknown = [name for name in measured if name != sheet.reference]
     if not unknown or "" in names:
         raise refusal(
-            readings.file, f"column retroreflector holds {', '.join(map(shown, seen))} (expected an unknown one too)"
+            readings.file,
+            f"column retroreflector holds {', '.join(map(shown, measured))} (expected an unknown one too)",
         )
     range_ = readings.get("range_m")
     phase = np.mod(-2.0 * TWO_PI * sheet.modulation_hz / SPEED_OF_LIGHT * range_, TWO_PI)
@@ -86,7 +87,7 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
         reject=reject,
         level=sheet.level,
     )
-    return _told(readings, fit, unknown)
+    return _calibration(readings, fit, unknown)
 
 
 def _positions(readings: SheetReadings) -> tuple[np.ndarray, list[str]]:
@@ -143,7 +144,7 @@ def _scatter(readings: SheetReadings) -> ObservedScatter:
     return ObservedScatter(claimed, unknown)
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
+def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
     values = sheet.pc_mm - difference
@@ -152,7 +153,7 @@ def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> C
         ("pc_mm" if count == 1 else f"pc_{name}_mm", "mm", f"range constant of {name}, added to the measured length")
         for name in unknown
     ]
-    found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
     hours, range_, on = readings.hours(), readings.get("range_m"), fit.active
     names = readings.words["retroreflector"]
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
@@ -181,7 +182,7 @@ def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> C
         kind=KIND,
         title=f"Range constant of {', '.join(unknown)} against {sheet.reference}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
         rows=rows,
@@ -215,9 +216,9 @@ def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> C
         method="The retroreflectors take turns in the same seat. Their differences, the level and a line in time of "
         "each position are adjusted together, seatings and readings scattering as the sheet claims it or as the "
         "readings show it; the cyclic terms that the two lengths do not share are systematic effects with priors.",
-        record={"pc_mm": found[0].value, "u_pc_mm": found[0].u}
+        record={"pc_mm": calibrated[0].value, "u_pc_mm": calibrated[0].u}
         if count == 1
-        else {name: {"pc_mm": q.value, "u_pc_mm": q.u} for name, q in zip(unknown, found, strict=True)},
+        else {name: {"pc_mm": q.value, "u_pc_mm": q.u} for name, q in zip(unknown, calibrated, strict=True)},
     )
 
 
