@@ -5,7 +5,7 @@ the standard adds to readings is -zero.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -251,7 +251,22 @@ def _notes(
     return notes
 
 
-def record_values(calibration: BaselineCalibration) -> dict[str, Any]:
+class BaselineRecordValues(TypedDict):
+    """Keys of BASELINE.toml that a calibration fills in; `records.laboratory.baseline.Baseline` explains them."""
+
+    reference_height_m: float | None
+    pillars: tuple[str, ...]
+    x_m: tuple[float, ...]
+    y_m: tuple[float, ...]
+    known: tuple[str, ...]
+    covariance_mm2: tuple[tuple[float, ...], ...]
+    s_mm: float | None
+    degrees_of_freedom: int | None
+    zero_mm: float
+    u_zero_mm: float
+
+
+def record_values(calibration: BaselineCalibration) -> BaselineRecordValues:
     """What BASELINE.toml keeps of a calibration, pillars in their order along the line."""
     s, order = calibration.solution, calibration.order
     rows, covariance = s.places

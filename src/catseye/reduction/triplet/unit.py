@@ -117,6 +117,9 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
     def column(name: str) -> Array:
         return np.array([getattr(each, name) for each in m.placement], dtype=float)
 
+    def metres(length_mm: float) -> Array:
+        return np.asarray(length_mm * 1e-3)
+
     def after(quantity: str, unit: str) -> Array:
         return np.array([each.flipped(quantity, unit) for each in m.placement], dtype=float)
 
@@ -141,21 +144,21 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
         eta_a_fp=eta_fp,
         d_toppl=column("d_toppl_mm") * 1e-3,
         h_s=column("h_s_mm") * 1e-3,
-        d_12=m.d12_mm * 1e-3,
-        l_1=plate.l1_mm * 1e-3,
-        l_2=plate.l2_mm * 1e-3,
-        l_bt=plate.l_bt_mm * 1e-3,
-        l_post=plate.l_post_mm * 1e-3,
-        height_1=left.height_mm * 1e-3,
-        height_2=right.height_mm * 1e-3,
-        hrp_1=left.hrp_mm * 1e-3,
-        hrp_2=right.hrp_mm * 1e-3,
+        d_12=metres(m.d12_mm),
+        l_1=metres(plate.l1_mm),
+        l_2=metres(plate.l2_mm),
+        l_bt=metres(plate.l_bt_mm),
+        l_post=metres(plate.l_post_mm),
+        height_1=metres(left.height_mm),
+        height_2=metres(right.height_mm),
+        hrp_1=metres(left.hrp_mm),
+        hrp_2=metres(right.hrp_mm),
         pc_1=(left.pc_mm - left.height_mm * extra) * 1e-3,
         pc_2=(right.pc_mm - right.height_mm * extra) * 1e-3,
         pc_b=(m.ball.pc_b_mm - (m.ball.r1_mm + m.ball.r2_mm) * extra_fp) * 1e-3,
-        r_1=m.ball.r1_mm * 1e-3,
-        n=n,
-        modulation_hz=m.modulation_hz,
+        r_1=metres(m.ball.r1_mm),
+        n=np.asarray(n),
+        modulation_hz=np.asarray(m.modulation_hz),
     )
 
 

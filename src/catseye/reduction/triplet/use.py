@@ -21,7 +21,6 @@ What lies beside the mid-point counts here, as it does not at the calibration: t
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -278,7 +277,7 @@ def _one(unit: MountedTriplet, s: Array, d: Array) -> tuple[Array, ...]:
     )
 
 
-def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Any]:
+def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Array]:
     """The offset along the sight, and its square length."""
     e, v = np.asarray(sight, dtype=float), np.asarray(offset, dtype=float)
     return np.sum(e * v, axis=-1), np.sum(v * v, axis=-1)

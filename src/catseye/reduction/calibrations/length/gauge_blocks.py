@@ -5,7 +5,7 @@
 A block that stands in several stacks brings its certificate's uncertainty into all of them, as one effect.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,7 +14,7 @@ from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
@@ -224,8 +224,20 @@ def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> 
     ]
 
 
-def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> dict[str, Any]:
-    """What both kinds tell alike."""
+class CommonParts(TypedDict):
+    """What calibrations by blocks and of spacers have alike; see `Calibration` for the words."""
+
+    provenance: dict[str, Any]
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    decisions: tuple[TestOutcome, ...]
+    variance_factor: float
+    degrees_of_freedom: int
+    notes: tuple[str, ...]
+
+
+def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> CommonParts:
+    """What both kinds report alike."""
     word = next(iter(readings.words))
     rows = tuple(
         (readings.words[word][k], float(readings.get("reads_mm")[k]), float(length[k]),

@@ -13,7 +13,7 @@ Signs by the notes: from the ball to the mirror, up the mount's own axes.
 """
 
 import re
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,7 +23,7 @@ from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within, broken_rule
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
@@ -229,10 +229,10 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]
             for name in sought
         ]
     )
-    record: dict[str, Any] = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_offset_mm"] = max(solution.u(name) for name in OFFSETS)
     words = ("setup", "up", "front", "feature", "touch")
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (*(readings.words[word][k] for word in words), float(fit.predicted[k] + fit.residual[k]),
          float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
         for k, state in enumerate(fit.state(readings.left_out))

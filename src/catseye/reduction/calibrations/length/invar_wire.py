@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, PPM
 from catseye.geometry.catenary import expanded, span, unstretched
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
@@ -187,7 +187,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndar
             "length of the wire at 20 °C and certified tension",
         )
     value = float(fit.x[0]) + shift
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             *(float(column[k]) for column in readings.numbers.values()),
             float(distance[k]),

@@ -15,7 +15,7 @@ What it does to pointing and range is computed with exact rays (`geometry.mirror
 the pointing by itself; it moves no range to first order, as the wave's phase is the same all across.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -27,7 +27,7 @@ from catseye.geometry.mirror.mount import gamma
 from catseye.geometry.mirror.pointing import MirrorStation, aim
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
@@ -170,7 +170,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
         for axis in "xy"
     ]  # fmt: skip
     calibrated, covariance = solution.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_axis_mm"] = max(solution.u("beam x"), solution.u("beam y"))
     record["u_tilt_rad"] = max(solution.u("tilt x"), solution.u("tilt y"), sheet.u_face_tilt_rad)
     if sheet.u_face_tilt_rad > 0.0:

@@ -23,7 +23,7 @@ from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
@@ -199,7 +199,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray,
     sought = {p.name for p in solution.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
     calibrated, covariance = solution.quantities(wanted)
-    record = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_beta_rad"] = max(solution.u("beta1"), solution.u("beta2"))
     record["u_zero_counts"] = max(solution.u("N_e0"), solution.u("N_a0"))
     if "face tilt" in sought:

@@ -10,7 +10,7 @@ both pointings turn the same face to the same side (the notes, section 2.4, say 
 of `geometry.mirror.mirror_path`); it takes known distances.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from catseye.geometry.mirror.mirror_path import path_change
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
@@ -159,7 +159,7 @@ def _calibration(
             f"the back retroreflector stands {solution.value('back retroreflector'):.4f} mm before the scan point"
         )
     calibrated, covariance = solution.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_axis_mm"] = max(q.u for q in calibrated)
     notes.append(
         f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in calibrated)}: "

@@ -11,7 +11,7 @@ moves its azimuth by t, a turn of the whole mirror (beta) by t cos Phi, and both
 axis tell them apart. Exact rays: `geometry.mirror.imperfect`.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
@@ -216,7 +216,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
     fit, sought = solution.fit, {p.name for p in solution.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
     calibrated, covariance = solution.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_tilt_rad"] = max(q.u for q in calibrated if "tilt" in q.key)
     record["u_zero_counts"] = max(q.u for q in calibrated if q.key in ("na0", "ne0"))
     residual = fit.residual.reshape(-1, 2)

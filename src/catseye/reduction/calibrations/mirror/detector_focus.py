@@ -13,7 +13,7 @@ factor e above the reference's amplitude, so a weaker return with a coupling abo
 """
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
@@ -193,7 +193,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, lon
     calibrated, covariance = _results(solution, model, sheet.amplitude_to_phase_rad is not None)
     by_key = {q.key: q for q in calibrated}
     defocus, share = by_key["detector_defocus_mm"], by_key["amplitude_share"]
-    record: dict[str, Any] = {"detector_defocus_mm": defocus.value, "u_detector_defocus_mm": defocus.u}
+    record: dict[str, RecordValue] = {"detector_defocus_mm": defocus.value, "u_detector_defocus_mm": defocus.u}
     on, grid = fit.active, np.linspace(place.min(), place.max(), 200)
     rows = tuple(
         (float(place[k]), float(readings.get("amplitude_volt")[k]), float(100.0 * fit.residual[k]),

@@ -11,7 +11,7 @@ runs begin at different faces the better they are told from the encoder's. A pol
 does not tell the order k from n - k: that gives a refusal or a large u, not a wrong number.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
@@ -161,7 +161,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) 
     ]  # fmt: skip
     calibrated, covariance = solution.quantities(wanted)
     values = [q.value for q in calibrated]
-    record: dict[str, Any] = {
+    record: dict[str, RecordValue] = {
         f"{sheet.axis}_encoder_cosine_counts": values[:n],
         f"{sheet.axis}_encoder_sine_counts": values[n:],
         "u_encoder_counts": max(q.u for q in calibrated),

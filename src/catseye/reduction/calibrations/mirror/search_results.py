@@ -10,6 +10,7 @@ counts decided: 1 all, 0 nothing. The change from the laboratory's values is nor
 both are right; that is tested as a whole (chi-square) and for each parameter.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
@@ -46,7 +47,7 @@ IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
     **{k: (k, "counts", 1.0, "mirror") for k in ("na0", "ne0")},
 }
 NEEDED = ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad", "u_beta_rad", "u_zero_counts")
-TOLD = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
+DECIDED = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
 NOTHING = 1e-6  # of the largest singular value: a combination that no count depends on
 INFORMED = 1e-3  # share below which a change is rounding
 SHOWN = 0.3  # of a unit combination: parameters named in it
@@ -194,7 +195,7 @@ class _Compared:
         self.left = solution.covariance[np.ix_(self.free, self.free)] / np.outer(u, u)
         values, vectors = np.linalg.eigh(np.eye(len(u)) - self.left)
         self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
-        self.decided = int(np.count_nonzero(self.share > TOLD))
+        self.decided = int(np.count_nonzero(self.share > DECIDED))
 
     def whole(self, level: float) -> TestOutcome:
         """Whether laboratory and field agree in all that the counts say something of."""
@@ -242,7 +243,7 @@ class _Compared:
         return " ".join(f"{vector[i]:+.2f} {PARAMETERS[self.free[i]]}" for i in order)
 
 
-def _inseparable(solution: CurvedFit, predict: Any) -> tuple[int, list[str]]:
+def _inseparable(solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray]) -> tuple[int, list[str]]:
     """Rank of the counts in the free parameters, and the parameters that no number of counts would tell."""
     free = [k for k, p in enumerate(solution.parameters[:P]) if p.u > 0.0]
     columns = []
@@ -258,7 +259,9 @@ def _inseparable(solution: CurvedFit, predict: Any) -> tuple[int, list[str]]:
     return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > NOTHING]
 
 
-def _calibration(readings: SheetReadings, solution: CurvedFit, predict: Any) -> Calibration:
+def _calibration(
+    readings: SheetReadings, solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray]
+) -> Calibration:
     sheet, fit = readings.sheet, solution.fit
     compared = _Compared(solution)
     if not len(compared.free) or compared.share[0] <= INFORMED:
@@ -310,9 +313,9 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, predict: Any) -> 
     )  # fmt: skip
 
 
-def _records(solution: CurvedFit, free: list[str]) -> dict[str, Any]:
+def _records(solution: CurvedFit, free: list[str]) -> dict[str, RecordValue]:
     """Keys of the monument's and of the mirror's record."""
-    records: dict[str, dict[str, Any]] = {"monument": {}, "mirror": {}}
+    records: dict[str, dict[str, float]] = {"monument": {}, "mirror": {}}
     for name in free:
         key, _, size, record = IN_FILES[name]
         records[record][key] = solution.value(name) / size
@@ -328,7 +331,7 @@ def _records(solution: CurvedFit, free: list[str]) -> dict[str, Any]:
         u = max(solution.u(name) for name in members) / size
         if u > 0.0:  # none where the record has none
             records["mirror"][key] = u
-    return records
+    return {**records}
 
 
 RECIPE = CalibrationKind(

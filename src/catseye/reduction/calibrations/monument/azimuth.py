@@ -5,7 +5,8 @@ The circle is tied to the mount in one of three ways: a Kelvin plate whose circl
 unlocked, or a reference on the mount itself, such as a target over the v-block. Model and signs: directions.py.
 """
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,6 +32,20 @@ from catseye.reduction.calibrations.monument.directions import (
 ROUNDS, ENOUGH = 12, 1e-11  # rad; the offset of the instrument over the length of a sight is the rate, 1e-2 at worst
 CLOSURE_FACTOR = 3.0  # of its standard uncertainty, beyond which a closure is named
 STEPS = {"angle": ARCSECOND, "length": 1e-4, "time": 1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisedDirections:
+    """Circle readings about an azimuth and zeros: observed = design x + effects, rad.
+
+    observed   (m,)
+    design     (m, p) by the azimuth of z^ and, where the plate does not tell it, the zero of each set
+    effects    systematic, with priors
+    """
+
+    observed: np.ndarray
+    design: np.ndarray
+    effects: list[Effect]
 
 
 def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibration:
@@ -98,8 +113,8 @@ def _start(sights: DirectionSights, tied: bool) -> np.ndarray:
     return np.array([azimuth, *([] if tied else zeros)])
 
 
-def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> dict[str, Any]:
-    """Observed values, design and effects about (azimuth, zeros): observed = design x + effects.
+def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDirections:
+    """The readings about the latest (azimuth, zeros).
 
     The parameters themselves, not their changes, are sought, so that the priors of the effects stay about zero.
     """
@@ -127,7 +142,7 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> dict[str, An
         effects.append(Effect("circle's zero of the plate, arcsec", np.full(m, ARCSECOND), sheet.u_plate_zero_arcsec))
     for name, u, step, given in _changes(sights):
         effects.append(Effect(name, slope(step, (at[0], given(step)), (at[0], given(-step))), u))
-    return {"observed": off + design @ at, "design": design, "effects": effects, "off": off}
+    return LinearisedDirections(off + design @ at, design, effects)
 
 
 def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray) -> list[Effect]:
@@ -157,11 +172,18 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
     return effects
 
 
-def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
-    """(name, u, step, change of a step -> Conditions) of what the geometry hangs on; u in the unit of the step."""
+def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[[float], SightConditions]]]:
+    """(name, u, step, change of a step -> conditions) of what the geometry hangs on; u in the unit of the step."""
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
-    changes: list[tuple[str, float, float, Any]] = [
+
+    def offset_along(axis: np.ndarray) -> Callable[[float], SightConditions]:
+        return lambda s: SightConditions(offset=s * axis)
+
+    def points_along(shape: np.ndarray) -> Callable[[float], SightConditions]:
+        return lambda s: SightConditions(points=s * shape)
+
+    changes: list[tuple[str, float, float, Callable[[float], SightConditions]]] = [
         ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
         ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
     ]
@@ -175,20 +197,11 @@ def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
         ]
     u_offset = sheet.u_instrument_mm * MILLIMETRE
     for k, axis in enumerate(("x", "y", "z")):
-        changes.append(
-            (f"instrument d{axis}, m", u_offset, length, lambda s, k=k: SightConditions(offset=s * np.eye(3)[k]))
-        )
+        changes.append((f"instrument d{axis}, m", u_offset, length, offset_along(np.eye(3)[k])))
     for number, column in enumerate(_coordinate_columns(sheet)):
         size = float(np.abs(column).max())
         shape = column.reshape(-1, 3) / size
-        changes.append(
-            (
-                f"coordinates, component {number + 1}",
-                size,
-                length,
-                lambda s, shape=shape: SightConditions(points=s * shape),
-            )
-        )
+        changes.append((f"coordinates, component {number + 1}", size, length, points_along(shape)))
     return changes
 
 
@@ -203,18 +216,20 @@ def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
     return [column * MILLIMETRE for column in root.T if np.abs(column).max() > 1e-9]
 
 
-def _fitted(sights: DirectionSights, linear: dict[str, Any], active: np.ndarray, *, reject: bool) -> CalibrationFit:
+def _fitted(
+    sights: DirectionSights, linear: LinearisedDirections, active: np.ndarray, *, reject: bool
+) -> CalibrationFit:
     sheet, m = sights.readings.sheet, len(sights.observed)
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one direction": np.eye(m)}, size=TWO_PI)
     if sheet.u_direction_arcsec is not None:
         scatter = ObservedScatter((sheet.u_direction_arcsec * ARCSECOND) ** 2 * np.eye(m))
     names = ["azimuth of z^", *(f"circle's zero, set {name}" for name in sights.sets)]
     return fit_readings(
-        linear["observed"],
-        linear["design"],
+        linear.observed,
+        linear.design,
         scatter,
-        names=names[: linear["design"].shape[1]],
-        effects=linear["effects"],
+        names=names[: linear.design.shape[1]],
+        effects=linear.effects,
         active=active,
         reject=reject,
         level=sheet.level,
@@ -241,7 +256,7 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
     return closures
 
 
-def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) -> Calibration:
+def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: LinearisedDirections) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
     alpha1 = float(wrapped(np.array(np.pi - azimuth)))
@@ -260,7 +275,7 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: dict[str,
             bool(abs(closure) <= CLOSURE_FACTOR * u),
             "circle against the mount, lab after less before; limit three standard uncertainties",
         )
-        for name, closure, u in _closures(sights, fit, linear["effects"])
+        for name, closure, u in _closures(sights, fit, linear.effects)
     ]
     residual = fit.residual / ARCSECOND
     turned, zenith = geometry_of(sights, float(fit.x[0]), SightConditions())
@@ -322,11 +337,11 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: dict[str,
     )  # fmt: skip
 
 
-def _largest(fit: CalibrationFit, linear: dict[str, Any]) -> str:
+def _largest(fit: CalibrationFit, linear: LinearisedDirections) -> str:
     """The three effects that the azimuth owes most of its u to, in arcseconds: gain times column times u."""
-    on, acting = fit.active, [e for e in linear["effects"] if e.u > 0.0]
+    on, acting = fit.active, [e for e in linear.effects if e.u > 0.0]
     columns = np.column_stack([np.zeros(int(on.sum())), *(e.column[on] * e.u for e in acting)])
-    design = linear["design"][on]
+    design = linear.design[on]
     weight = np.linalg.inv(np.diag(fit.sigma[on] ** 2) + columns @ columns.T)
     gain = np.linalg.solve(design.T @ weight @ design, design.T @ weight)[0]
     parts = np.abs(gain @ columns[:, 1:]) / ARCSECOND

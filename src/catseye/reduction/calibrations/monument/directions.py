@@ -11,7 +11,6 @@ from their place in the sky; both are turned into the plumb line's axes at the i
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from catseye.geometry.mirror.mount import gamma
 from catseye.geometry.sky.star import POLARIS, Star, star_place
 from catseye.records.files.readings import TIME, SheetReadings
 from catseye.records.files.refusal import refusal, shown
+from catseye.reduction.calibrations.monument.azimuth_sheet import CataloguedStar
 from catseye.reduction.calibrations.monument.frame_sheet import frame_of
 
 BEFORE, FIELD, AFTER = "before", "field", "after"
@@ -189,8 +189,8 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightCondition
     return turned, zenith
 
 
-def star_of(entry: Any) -> Star:
-    """The star that a sheet names."""
+def star_of(entry: CataloguedStar) -> Star:
+    """The star of an entry of a sheet, in radians and arcseconds."""
     return Star(
         entry.name,
         entry.ra_deg * DEGREE,

@@ -21,7 +21,7 @@ from catseye.errors import ValidityError
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 
@@ -255,7 +255,7 @@ def _calibration(
         )
     ]
     micro = 1e-3 * MILLIMETRE
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             *(readings.words[end][k] for end in ("from", "to")),
             int(readings.get("vessel_from")[k]),
@@ -268,7 +268,7 @@ def _calibration(
         for k, state in enumerate(fit.state(readings.left_out))
     )
     on, number = fit.active, np.arange(1, len(readings) + 1)
-    record: dict[str, object] = {
+    record: dict[str, RecordValue] = {
         "marks": list(marks),
         "heights_mm": [sheet.held_height_mm, *(q.value for q in calibrated[: len(marks) - 1])],
         "u_heights_mm": [sheet.u_held_height_mm, *(q.u for q in calibrated[: len(marks) - 1])],

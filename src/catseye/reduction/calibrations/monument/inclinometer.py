@@ -23,7 +23,7 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import UAngle
@@ -319,7 +319,7 @@ def _calibration(table: _Table, fit: CalibrationFit) -> Calibration:
     calibrated = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
     states = fit.state(readings.left_out * 2)
     optional = [name for name in LAYOUT.optional if name in readings.numbers]
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             *(float(readings.numbers[name][k]) for name in optional),
             float(table.observed[k]),
@@ -356,7 +356,7 @@ def _calibration(table: _Table, fit: CalibrationFit) -> Calibration:
         method="Readings of both axes are adjusted to the tilts: zero and scale of each axis, their misalignments and, "
         "where asked, cubic terms, temperature coefficients and the table's own tilt. Tilts and scale of the table, "
         "and on a pier the scales and the turn of the case, are parameters with priors.",
-        record={q.key: q.value for q in calibrated} | {f"u_{q.key}": q.u for q in calibrated},
+        record={**{q.key: q.value for q in calibrated}, **{f"u_{q.key}": q.u for q in calibrated}},
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, gr
 from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
@@ -167,7 +167,7 @@ def _calibration(
     factor = float(elevation_factor(latitude, height))
     held = readings.words.get("fixed", ("",) * len(readings))[row]
     value = {q.key: q.value for q in calibrated}
-    record = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
+    record: dict[str, RecordValue] = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
     record |= {f"u_{q.key}": q.u for q in calibrated[:3]}
     record |= {key: value[key] for key in ("latitude_deg", "longitude_deg", "elevation_m", "wv_x_m", "wv_y_m")}
     record["wv_z_m"] = value["elevation_m"]

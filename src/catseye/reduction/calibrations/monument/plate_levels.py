@@ -11,7 +11,7 @@ the orientation) takes out its wedge. Unequal balls tilt the plate in the mount'
 shows it. The level knows the plumb line here; alpha2 and alpha3 stand against the ground frame's z, 3.9" away at 120 m.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -101,7 +101,7 @@ def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
     ]  # fmt: skip
 
 
-def _in_ground(sheet: Any, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0.0) -> np.ndarray:
+def _in_ground(sheet: PlateSheet, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0.0) -> np.ndarray:
     """alpha2, alpha3 (rad) against the ground frame, from the tilts of x^ and z^ above the level's horizon."""
     place = np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE
     plumb = plumb_from_ground(frame_of(sheet, xi=xi, eta=eta), place)

@@ -14,7 +14,7 @@ from catseye.geometry.catenary import expanded
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
@@ -158,7 +158,7 @@ def _calibration(
     sheet = readings.sheet
     covariance = by_size @ fit.covariance @ by_size.T + sheet.u_index_ratio**2 * np.outer(by_index, by_index)
     covariance = 0.5 * (covariance + covariance.T)
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (*(words[k] for words in readings.words.values()), float(fit.predicted[k] + fit.residual[k]),
          float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
         for k, state in enumerate(fit.state(readings.left_out))

@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -193,7 +193,7 @@ def _calibration(
     covariance = turn @ fit.covariance @ turn.T
     calibrated = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
     count = len(orders)
-    record = {}
+    record: dict[str, RecordValue] = {}
     if count:
         cyclic = calibrated[2:]
         record = {
@@ -273,7 +273,7 @@ def _calibration(
     )
 
 
-def _amplitude(calibrated: tuple, fit: CalibrationFit, k: int, count: int) -> str:
+def _amplitude(calibrated: tuple[Quantity, ...], fit: CalibrationFit, k: int, count: int) -> str:
     """Amplitude of one order with its u, in micrometres."""
     cosine, sine = calibrated[2 + k].value, calibrated[2 + count + k].value
     size = float(np.hypot(cosine, sine))
