@@ -248,6 +248,48 @@ def meetings(layout: PanelLayout, taken: np.ndarray) -> np.ndarray:
     return meet
 
 
+@dataclass(frozen=True, eq=False)
+class CornerHeights:
+    """Heights at corners from those of the panels that were read there, m.
+
+    relative, u_relative   (p, 4) beside the mean of those that meet, nan where fewer than two do
+    mean, u_mean           (c,) of those that meet, nan where none was read
+    """
+
+    relative: np.ndarray
+    u_relative: np.ndarray
+    mean: np.ndarray
+    u_mean: np.ndarray
+
+
+def _corner_heights(
+    layout: PanelLayout, model: PanelModel, solution: LeastSquaresSolution, departure: np.ndarray, times: np.ndarray
+) -> CornerHeights:
+    """What the panels' departures (p, 4) say at each corner, of those that were read there `times` above none."""
+    meet = meetings(layout, times > 0)
+    on = meet >= 0
+    count = on.sum(axis=1)
+    flat, u_map = departure.ravel(), model.u_target.ravel()
+    share = np.where(on, 1.0 / np.maximum(count, 1)[:, None], 0.0)
+    mean = np.where(count > 0, np.sum(np.where(on, flat[meet], 0.0) * share, axis=1), np.nan)
+    maps = np.where(on, u_map[meet] ** 2, 0.0)
+
+    def variance(weight: np.ndarray) -> np.ndarray:
+        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
+        inside = solution.q.products(meet, weight)
+        return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
+
+    beside, u_beside = np.full(len(flat), np.nan), np.full(len(flat), np.nan)
+    several = count > 1
+    for k in range(meet.shape[1]):
+        here = several & on[:, k]
+        weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
+        beside[meet[here, k]] = flat[meet[here, k]] - mean[here]
+        u_beside[meet[here, k]] = np.sqrt(variance(weight)[here])
+    u_mean = np.where(count > 0, np.sqrt(variance(share)), np.nan)
+    return CornerHeights(beside.reshape(departure.shape), u_beside.reshape(departure.shape), mean, u_mean)
+
+
 def _heights(
     layout: PanelLayout,
     sheet: PanelInstrument,
@@ -262,27 +304,7 @@ def _heights(
     departure = solution.x[:many].reshape(shape) - model.target
     u_departure = np.hypot(np.sqrt(solution.q.diagonal()[:many].reshape(shape)), model.u_target)
     times = times_read(model, solution)
-    meet = meetings(layout, times > 0)
-    on = meet >= 0
-    count = on.sum(axis=1)
-    flat, u_map = departure.ravel(), model.u_target.ravel()
-    share = np.where(on, 1.0 / np.maximum(count, 1)[:, None], 0.0)
-    mean = np.where(count > 0, np.sum(np.where(on, flat[meet], 0.0) * share, axis=1), np.nan)
-    maps = np.where(on, u_map[meet] ** 2, 0.0)
-
-    def variance(weight: np.ndarray) -> np.ndarray:
-        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
-        inside = solution.q.products(meet, weight)
-        return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
-
-    beside, u_beside = np.full(many, np.nan), np.full(many, np.nan)
-    several = count > 1
-    for k in range(meet.shape[1]):
-        here = several & on[:, k]
-        weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
-        beside[meet[here, k]] = flat[meet[here, k]] - mean[here]
-        u_beside[meet[here, k]] = np.sqrt(variance(weight)[here])
-    relative, u_relative = beside.reshape(shape), u_beside.reshape(shape)
+    corners = _corner_heights(layout, model, solution, departure, times)
     goal, pitch = sheet.goal_um * 1e-6, sheet.screw.pitch_mm * MILLIMETRE
     sense = 1.0 if sheet.screw.clockwise == "raises" else -1.0
     fit, u_fit = panel_fits(layout, solution, departure, model.u_target)
@@ -296,13 +318,13 @@ def _heights(
         times=times,
         departure=departure,
         u_departure=u_departure,
-        relative=relative,
-        u_relative=u_relative,
-        conforms=conformity(relative, u_relative, goal),
-        turns=-sense * relative / pitch,
-        u_turns=u_relative / pitch,
-        actuator=mean,
-        u_actuator=np.where(count > 0, np.sqrt(variance(share)), np.nan),
+        relative=corners.relative,
+        u_relative=corners.u_relative,
+        conforms=conformity(corners.relative, corners.u_relative, goal),
+        turns=-sense * corners.relative / pitch,
+        u_turns=corners.u_relative / pitch,
+        actuator=corners.mean,
+        u_actuator=corners.u_mean,
         fit=fit,
         u_fit=u_fit,
         doubts=doubts,

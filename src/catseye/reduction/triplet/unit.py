@@ -56,8 +56,7 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
     difference = best.value - l_mpbc
     u_difference = float(np.linalg.norm(share - shares.l_mpbc)) if valid else math.nan
     others = np.setdiff1d(used, best.suspects)
-    slope = 0.5 * sum(p.height_mm for p in measurement.prisms) - measurement.ball.r1_mm - measurement.ball.r2_mm
-    by_sizes = np.array([group != "index ratio" for group in shares.groups])
+    agreeing_ratio, u_agreeing_ratio = _agreeing_ratio(measurement, shares, difference, share)
     steps, u_steps = _steps(measurement, lengths, shares)
     status = tuple(_status(measurement, k, lengths, cycles, best.suspects) for k in range(len(measurement.placement)))
     memo = memo_numbers(readings, cycles, lengths)
@@ -93,14 +92,12 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
         steps=steps,
         u_steps=u_steps,
         air_in_glass=_air_in_glass(measurement, readings, best.weights),
-        agreeing_ratio=measurement.bk7_to_air_group_index_ratio - difference / (slope * 1e-3),
-        u_agreeing_ratio=(
-            float(np.linalg.norm((share - shares.l_mpbc)[by_sizes])) / abs(slope * 1e-3) if valid else math.nan
-        ),
+        agreeing_ratio=agreeing_ratio,
+        u_agreeing_ratio=u_agreeing_ratio if valid else math.nan,
         status=status,
         notes=(),
     )
-    return _with_notes(reduction)
+    return replace(reduction, notes=tuple(triplet_notes(reduction)))
 
 
 def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
@@ -244,6 +241,20 @@ def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
     return budget
 
 
+def _agreeing_ratio(
+    m: TripletMeasurement, shares: TripletShares, difference: float, share: Array
+) -> tuple[float, float]:
+    """The index ratio with which ranging and surface plate would agree, and its u.
+
+    difference   m, H_corr by ranging less that by the surface plate
+    share        (q,) m, of each input in H_corr by ranging
+    """
+    slope = 0.5 * sum(p.height_mm for p in m.prisms) - m.ball.r1_mm - m.ball.r2_mm
+    by_sizes = np.array([group != "index ratio" for group in shares.groups])
+    u = float(np.linalg.norm((share - shares.l_mpbc)[by_sizes])) / abs(slope * 1e-3)
+    return m.bk7_to_air_group_index_ratio - difference / (slope * 1e-3), u
+
+
 def _steps(m: TripletMeasurement, lengths: TripletLengths, shares: TripletShares) -> tuple[Array, Array]:
     """How far ranging puts the stops from where it put them in the first placement, and its u."""
     spacer = np.array([each.spacer_mm for each in m.placement]) * 1e-3
@@ -274,7 +285,3 @@ def _status(
     if float(cycles.margin[k]) < SIGMAS * m.u_d_toppl_mm * 1e-3:
         return THIN
     return SUSPECT if k in suspects else GOOD
-
-
-def _with_notes(reduction: TripletReduction) -> TripletReduction:
-    return replace(reduction, notes=tuple(triplet_notes(reduction)))

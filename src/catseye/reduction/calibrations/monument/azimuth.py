@@ -13,7 +13,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.azimuth_sheet import KIND, LAYOUT, AzimuthSheet
@@ -256,6 +256,32 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
     return closures
 
 
+def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple[tuple[Cell, ...], ...]:
+    """Each sight with the azimuth and the zenith angle (degrees) of its target about the plumb line, and how it fits.
+
+    azimuth   rad, of z^
+    """
+    readings = sights.readings
+    turned, zenith = geometry_of(sights, float(fit.x[0]), SightConditions())
+    bearing = np.degrees(np.mod(turned + azimuth, TWO_PI))
+    residual = fit.residual / ARCSECOND
+    return tuple(
+        (
+            str(sights.sets[sights.of_set[k]]),
+            str(sights.place[k]),
+            readings.words["target"][k],
+            "left" if sights.face[k] > 0.0 else "right",
+            float(readings.get("direction_deg")[k]),
+            float(bearing[k]),
+            float(zenith[k] / DEGREE),
+            float(residual[k]),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
 def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: LinearisedDirections) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
@@ -278,25 +304,8 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
         for name, closure, u in _closures(sights, fit, linear.effects)
     ]
     residual = fit.residual / ARCSECOND
-    turned, zenith = geometry_of(sights, float(fit.x[0]), SightConditions())
-    bearing = np.degrees(np.mod(turned + azimuth, TWO_PI))
     number = np.arange(1, len(readings) + 1)
     on = fit.active
-    rows = tuple(
-        (
-            str(sights.sets[sights.of_set[k]]),
-            str(sights.place[k]),
-            readings.words["target"][k],
-            "left" if sights.face[k] > 0.0 else "right",
-            float(readings.get("direction_deg")[k]),
-            float(bearing[k]),
-            float(zenith[k] / DEGREE),
-            float(residual[k]),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     return Calibration(
         kind=KIND,
         title=f"Azimuth of monument {sheet.instrument}",
@@ -305,7 +314,7 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
         covariance=covariance,
         columns=("set", "place", "target", "face", "direction_deg", "azimuth_deg", "zenith_deg", "residual_arcsec",
                  fit.test, "state"),
-        rows=rows,
+        rows=_rows(sights, fit, azimuth),
         decisions=(*decisions, *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),

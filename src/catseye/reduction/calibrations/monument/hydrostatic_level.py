@@ -221,6 +221,49 @@ def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
     return sum(parts, np.zeros(len(fit.residual)))
 
 
+def _constant_note(readings: SheetReadings, fit: CalibrationFit) -> str:
+    """Where the instrument's constant comes from, and how far the readings move one that the sheet states."""
+    sheet = readings.sheet
+    if sheet.constant_mm is None:
+        return "the constant was found by exchanging the vessels"
+    value, u = fit.effects.get("constant of the instrument, mm", (0.0, 0.0))
+    return (
+        f"the constant is the sheet's, {sheet.constant_mm:g} mm; these readings move it by {value:+.4f} mm, "
+        f"u {u:.4f} mm"
+    )
+
+
+def _loops_decision(loops: list[tuple[str, float, float]]) -> TestOutcome:
+    """The loop whose misclosure is largest beside its u, against three of that."""
+    worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
+    if worst is None:
+        return TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
+    return TestOutcome(
+        f"loops: misclosure of {len(loops)}, the worst, mm",
+        worst[1] / MILLIMETRE,
+        CLOSURE_FACTOR * worst[2] / MILLIMETRE,
+        bool(abs(worst[1]) <= CLOSURE_FACTOR * worst[2]),
+        f"set-ups {worst[0]}; limit three standard uncertainties",
+    )
+
+
+def _rows(readings: SheetReadings, fit: CalibrationFit, density: np.ndarray) -> tuple[tuple[Cell, ...], ...]:
+    """Each set-up as read, its correction for the density (m) in micrometres, and how it fits."""
+    micro = 1e-3 * MILLIMETRE
+    return tuple(
+        (
+            *(readings.words[end][k] for end in ("from", "to")),
+            int(readings.get("vessel_from")[k]),
+            *(float(readings.get(name)[k]) for name in ("reading_from_mm", "reading_to_mm")),
+            float(density[k] / micro),
+            float(fit.residual[k] / micro),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
 def _calibration(
     readings: SheetReadings,
     fit: CalibrationFit,
@@ -234,39 +277,8 @@ def _calibration(
     constant = sheet.constant_mm is None
     if constant:
         keys.append(("constant_mm", "mm", "zero of vessel 1 less that of vessel 2, added with vessel 1 on `from`"))
-        prior_note = "the constant was found by exchanging the vessels"
-    else:
-        value, u = fit.effects.get("constant of the instrument, mm", (0.0, 0.0))
-        prior_note = (
-            f"the constant is the sheet's, {sheet.constant_mm:g} mm; these readings move it by {value:+.4f} mm, "
-            f"u {u:.4f} mm"
-        )
     calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
-    worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
-    decisions = [
-        TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
-        if worst is None
-        else TestOutcome(
-            f"loops: misclosure of {len(loops)}, the worst, mm",
-            worst[1] / MILLIMETRE,
-            CLOSURE_FACTOR * worst[2] / MILLIMETRE,
-            bool(abs(worst[1]) <= CLOSURE_FACTOR * worst[2]),
-            f"set-ups {worst[0]}; limit three standard uncertainties",
-        )
-    ]
     micro = 1e-3 * MILLIMETRE
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            *(readings.words[end][k] for end in ("from", "to")),
-            int(readings.get("vessel_from")[k]),
-            *(float(readings.get(name)[k]) for name in ("reading_from_mm", "reading_to_mm")),
-            float(density[k] / micro),
-            float(fit.residual[k] / micro),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     on, number = fit.active, np.arange(1, len(readings) + 1)
     record: dict[str, RecordValue] = {
         "marks": list(marks),
@@ -283,12 +295,12 @@ def _calibration(
         covariance=covariance,
         columns=("from", "to", "vessel_from", "reading_from_mm", "reading_to_mm", "density_um", "residual_um",
                  fit.test, "state"),
-        rows=rows,
-        decisions=(*decisions, *fit.decisions()),
+        rows=_rows(readings, fit, density),
+        decisions=(_loops_decision(loops), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
-            prior_note,
+            _constant_note(readings, fit),
             "heights are along the plumb line (NAVD88 where the held mark is); z of the ground frame falls below them "
             "by the curvature of the earth, 1.1 mm at 120 m, and the deflection: "
             "geometry/frames/local_frame.py turns them",

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
@@ -93,20 +93,16 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
     return TestOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
 
 
-def _calibration(
-    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
-) -> Calibration:
-    sheet, m = readings.sheet, len(z)
-    leakage = complex(*fit.x)
-    calibrated, polar = polar_quantities(leakage, fit.covariance, fit)
-    between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
-    u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
-    to_come = float(np.hypot(u_mean, between))
-    residual = z - leakage
+def _rows(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...]
+) -> tuple[tuple[Cell, ...], ...]:
+    """Each buffer's phasor and residual in mV; statistic and state are those of its worse quadrature."""
+    m = len(z)
+    residual = z - complex(*fit.x)
     statistic = np.abs(fit.statistic).reshape(2, m).max(axis=0)
     states = fit.state((*readings.left_out, *readings.left_out))
     worst = [b if b == "suspect" else a for a, b in zip(states[:m], states[m:], strict=True)]
-    rows = tuple(
+    return tuple(
         (
             readings.where[k],
             names[k],
@@ -119,7 +115,18 @@ def _calibration(
         )
         for k in range(m)
     )
-    on = fit.active[:m]
+
+
+def _calibration(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
+) -> Calibration:
+    sheet = readings.sheet
+    leakage = complex(*fit.x)
+    calibrated, polar = polar_quantities(leakage, fit.covariance, fit)
+    between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
+    u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
+    to_come = float(np.hypot(u_mean, between))
+    on = fit.active[: len(z)]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     circle = leakage + 2.0 * to_come * np.exp(1j * turn)
     notes = [
@@ -146,7 +153,7 @@ def _calibration(
             f"largest |{fit.test}|",
             "state",
         ),
-        rows=rows,
+        rows=_rows(readings, fit, z, names),
         decisions=(_sessions_decision(sheet, sessions), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),

@@ -14,7 +14,7 @@ from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
@@ -132,23 +132,15 @@ def _arc(arm: np.ndarray) -> float:
     return float(TWO_PI - gaps.max())
 
 
-def _calibration(
+def _rows(
     readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
-) -> Calibration:
-    sheet, m = readings.sheet, len(z)
-    leakage = complex(fit.x[0], fit.x[1])
-    centre = fit.covariance[:2, :2]
-    calibrated, polar = polar_quantities(leakage, centre, fit)
-    u_centre = float(np.sqrt(0.5 * np.trace(centre)))
-    to_come = float(np.hypot(u_centre, sheet.u_session_volt))
+) -> tuple[tuple[Cell, ...], ...]:
+    """Each reading's phasor and residual in mV, statistic and state; with known positions of its worse quadrature."""
+    m = len(z)
     states = fit.state(readings.left_out * (2 if known else 1))
     states = tuple(b if b == "suspect" else a for a, b in zip(states[:m], states[-m:], strict=True))
     residual = np.hypot(fit.residual[:m], fit.residual[m:]) if known else fit.residual
-    on = fit.active[:m]
-    arc = _arc((z - leakage)[on])
-    radius = float(np.median(np.abs(z - leakage)[on]))
-    ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
-    rows = tuple(
+    return tuple(
         (
             readings.where[k],
             float(z[k].real / MILLIVOLT),
@@ -159,6 +151,21 @@ def _calibration(
         )
         for k in range(m)
     )
+
+
+def _calibration(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
+) -> Calibration:
+    sheet = readings.sheet
+    leakage = complex(fit.x[0], fit.x[1])
+    centre = fit.covariance[:2, :2]
+    calibrated, polar = polar_quantities(leakage, centre, fit)
+    u_centre = float(np.sqrt(0.5 * np.trace(centre)))
+    to_come = float(np.hypot(u_centre, sheet.u_session_volt))
+    on = fit.active[: len(z)]
+    arc = _arc((z - leakage)[on])
+    radius = float(np.median(np.abs(z - leakage)[on]))
+    ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
     covered = TestOutcome(
         "arc of the circle, rad",
         arc,
@@ -174,7 +181,7 @@ def _calibration(
         quantities=calibrated,
         covariance=polar,
         columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
-        rows=rows,
+        rows=_rows(readings, fit, z, statistic, known=known),
         decisions=(covered, *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),

@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -180,6 +180,61 @@ def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[li
     return keys, turn
 
 
+def _rows(readings: SheetReadings, rail: Rail, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
+    """Each position of the carriage, what was read there, and how it fits."""
+    micrometre = 1e-3 * MILLIMETRE
+    residual = fit.residual / micrometre
+    return tuple(
+        (
+            float(rail.length[k]),
+            float(readings.numbers["range_m"][k]),
+            float(rail.observed[k] / micrometre),
+            float(rail.phase[k]),
+            float(residual[k]),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
+def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -> TestOutcome:
+    """Whether a line stands out of the residuals' spectrum; periods and heights in m, and each line's probability."""
+    top = int(np.argmin(chance))
+    return TestOutcome(
+        "spectrum of residuals: chance of the highest line",
+        float(chance[top]),
+        0.05,
+        bool(chance[top] >= 0.05),
+        f"{height[top] / (1e-3 * MILLIMETRE):.2g} µm at a period of {period[top] * 1e3:.4g} mm, where the line is "
+        "least likely",
+    )
+
+
+def _notes(
+    fit: CalibrationFit, calibrated: tuple[Quantity, ...], count: int, reason: str, *, chosen: bool
+) -> tuple[str, ...]:
+    """What was modelled, and what its u holds.
+
+    count    of the cyclic orders modelled
+    reason   for these
+    chosen   the tests chose them, not the sheet
+    """
+    micrometre = 1e-3 * MILLIMETRE
+    notes = [
+        reason,
+        f"{count} cyclic {'order is' if count == 1 else 'orders are'} modelled"
+        + ("; " + ", ".join(_amplitude(calibrated, fit, k, count) for k in range(count)) if count else ""),
+        f"u of the offset from the scatter alone {np.sqrt(fit.scattered[0, 0]) / micrometre:.2g} µm; the rest are "
+        "interferometer, air and start as the sheet states them",
+        "the orders were chosen by the tests from these readings; their u takes the choice as given"
+        if chosen and count
+        else "",
+        *scatter_notes(fit, "µm", micrometre),
+    ]
+    return tuple(note for note in notes if note)
+
+
 def _calibration(
     readings: SheetReadings,
     rail: Rail,
@@ -204,39 +259,8 @@ def _calibration(
     on, residual = fit.active, fit.residual / micrometre
     noise = _covariance(rail, fit)[np.ix_(on, on)]
     period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, rail.half)
-    top = int(np.argmin(chance))
-    line = TestOutcome(
-        "spectrum of residuals: chance of the highest line",
-        float(chance[top]),
-        0.05,
-        bool(chance[top] >= 0.05),
-        f"{height[top] / micrometre:.2g} µm at a period of {period[top] * 1e3:.4g} mm, where the line is least likely",
-    )
-    rows = tuple(
-        (
-            float(rail.length[k]),
-            float(readings.numbers["range_m"][k]),
-            float(rail.observed[k] / micrometre),
-            float(rail.phase[k]),
-            float(residual[k]),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     smooth = rail.observed - fit.predicted
     dense = np.linspace(rail.length[on].min(), rail.length[on].max(), 2000)
-    notes = [
-        reason,
-        f"{count} cyclic {'order is' if count == 1 else 'orders are'} modelled"
-        + ("; " + ", ".join(_amplitude(calibrated, fit, k, count) for k in range(count)) if count else ""),
-        f"u of the offset from the scatter alone {np.sqrt(fit.scattered[0, 0]) / micrometre:.2g} µm; the rest are "
-        "interferometer, air and start as the sheet states them",
-        "the orders were chosen by the tests from these readings; their u takes the choice as given"
-        if sheet.orders is None and count
-        else "",
-        *scatter_notes(fit, "µm", micrometre),
-    ]
     return Calibration(
         kind=KIND,
         title=f"Zero and linearity of {sheet.instrument} against an interferometer",
@@ -252,11 +276,11 @@ def _calibration(
             fit.test,
             "state",
         ),
-        rows=rows,
-        decisions=(*decisions, line),
+        rows=_rows(readings, rail, fit),
+        decisions=(*decisions, _line_decision(period, height, chance)),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=tuple(note for note in notes if note),
+        notes=_notes(fit, calibrated, count, reason, chosen=sheet.orders is None),
         curve={
             "readings": (rail.length[on], rail.observed[on] / micrometre),
             "left out": (rail.length[~on], rail.observed[~on] / micrometre),

@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -144,6 +144,24 @@ def _scatter(readings: SheetReadings) -> ObservedScatter:
     return ObservedScatter(claimed, unknown)
 
 
+def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
+    """When and where each retroreflector was read, its range, and how it fits."""
+    hours, range_ = readings.hours(), readings.get("range_m")
+    positions = readings.words.get("position", ("",) * len(readings))
+    return tuple(
+        (
+            float(hours[k]),
+            positions[k] or "-",
+            readings.words["retroreflector"][k],
+            float(range_[k]),
+            float(fit.residual[k] / (1e-3 * MILLIMETRE)),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
 def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
@@ -154,26 +172,12 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
         for name in unknown
     ]
     calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
-    hours, range_, on = readings.hours(), readings.get("range_m"), fit.active
-    names = readings.words["retroreflector"]
+    hours, on = readings.hours(), fit.active
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
     held = fit.x.copy()
     held[count + 1 :: 2] *= 0.0 if sheet.drift else 1.0
     line = (fit.predicted - _design(readings, unknown) @ held) / micrometre
     drawn = line + fit.residual / micrometre
-    given = readings.words.get("position", ("",) * len(readings))
-    rows = tuple(
-        (
-            float(hours[k]),
-            given[k] or "-",
-            names[k],
-            float(range_[k]),
-            float(fit.residual[k] / micrometre),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     order = np.argsort(hours)
     drifts = fit.x[count + 1 :: 2] / micrometre if sheet.drift else np.zeros(0)
     scatter = np.sqrt(np.diag(fit.scattered)[:count]) / micrometre
@@ -185,7 +189,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
         quantities=calibrated,
         covariance=covariance,
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
-        rows=rows,
+        rows=_rows(readings, fit),
         decisions=(
             TestOutcome(
                 "seatings",
