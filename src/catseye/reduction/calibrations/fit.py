@@ -141,6 +141,25 @@ class CalibrationFit:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class FitOptions:
+    """Which observed values take part, and how they are tested.
+
+    active     (m,) bool: takes part at the start; all if None
+    together   (m,) labels: values of one label leave together, as both quadratures of a phasor; each alone if None
+    reject     leave out what the test rejects, worst first, one at a time
+    level      of the tests, chance of any false alarm among all
+    """
+
+    active: np.ndarray | None = None
+    together: np.ndarray | None = None
+    reject: bool = False
+    level: float = 0.05
+
+
+EVERY_VALUE = FitOptions()
+
+
 def fit_readings(
     observed: np.ndarray,
     design: np.ndarray,
@@ -148,10 +167,7 @@ def fit_readings(
     *,
     names: Sequence[str],
     effects: Sequence[Effect] = (),
-    active: np.ndarray | None = None,
-    together: np.ndarray | None = None,
-    reject: bool = False,
-    level: float = 0.05,
+    options: FitOptions = EVERY_VALUE,
 ) -> CalibrationFit:
     """The parameters of a linear model that fit readings best.
 
@@ -160,24 +176,21 @@ def fit_readings(
     scatter    of the observed values
     names      (p,) of the parameters, for messages
     effects    systematic, with priors
-    active     (m,) bool: takes part at the start; all if None
-    together   (m,) labels: values of one label leave together, as both quadratures of a phasor
-    reject     leave out what the test rejects, worst first, one at a time
-    level      of the tests, chance of any false alarm among all
+    options    which values take part, and the tests
 
-    Returns a Fit. Raises EstimationError where the readings do not hold every parameter, or where a third of them
+    Raises EstimationError where the readings do not hold every parameter, or where a third of them
     would have to go.
 
     Source: [FOERSTNER16] chapter 4 (Gauss-Markov model with priors); [BAARDA68] (w test), [POPE76] (tau test);
     [PATTERSON71] (scatter from the readings).
     """
     m = len(observed)
-    on = np.ones(m, dtype=bool) if active is None else np.array(active, dtype=bool)
+    on = np.ones(m, dtype=bool) if options.active is None else np.array(options.active, dtype=bool)
     start = int(on.sum())
-    labels = np.arange(m) if together is None else np.asarray(together)
+    labels = np.arange(m) if options.together is None else np.asarray(options.together)
     while True:
-        fit = _fitted(observed, design, scatter, names=names, effects=effects, on=on, level=level)
-        if not reject or not fit.suspects.any():
+        fit = _fitted(observed, design, scatter, names=names, effects=effects, on=on, level=options.level)
+        if not options.reject or not fit.suspects.any():
             return fit
         worst = int(np.argmax(np.where(fit.suspects, np.abs(fit.statistic), -1.0)))
         on = on & (labels != labels[worst])

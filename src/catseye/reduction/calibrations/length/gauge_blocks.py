@@ -15,7 +15,13 @@ from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
 from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -120,9 +126,7 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
             Effect("film, µm", -films * grown * 1e-3, sheet.u_film_um),
             *_warmth(sheet, -cold, temperature),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     on, line = fit.active, np.argsort(length)
     keys = [
@@ -173,9 +177,7 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
             Effect("scale of the instrument, ppm", -observed * PPM, sheet.u_scale_ppm),
             *_warmth(sheet, observed, temperature),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     keys = [(f"{name}_mm", "mm", f"length of {name} at 20 °C") for name in names]
     return Calibration(

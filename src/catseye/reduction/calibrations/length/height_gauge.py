@@ -25,7 +25,7 @@ from catseye.records.files.record import Uncertainty, Within, broken_rule
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.length.gauge_blocks import Block
 
@@ -136,7 +136,11 @@ def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Cal
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(sheet.u_reading_mm**2 * eye)
     solution = fit_curved(
-        observed, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level
+        observed,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, solution, [name for name in OFFSETS if name in sought])
 

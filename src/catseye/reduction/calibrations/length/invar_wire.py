@@ -14,7 +14,13 @@ from catseye.geometry.catenary import expanded, span, unstretched
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, Cell
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -132,9 +138,7 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         scatter,
         names=["distance" if known is None else "wire"],
         effects=effects,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, fit, distance)
 

@@ -29,7 +29,7 @@ from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadin
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "alignment"
@@ -123,10 +123,9 @@ def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibr
         predict,
         parameters,
         scatter,
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
     return _calibration(readings, solution)
 

@@ -25,7 +25,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "autocollimation"
@@ -121,10 +121,9 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
         predict,
         parameters,
         _scatter(readings, shaking),
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
     return _calibration(readings, solution, flat, shown)
 

@@ -21,7 +21,7 @@ from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 
 KIND = "both-faces"
@@ -90,7 +90,11 @@ def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calib
     if readings.sheet.u_distance_mm is not None:
         scatter = ObservedScatter((readings.sheet.u_distance_mm * MILLIMETRE) ** 2 * eye)
     solution = fit_curved(
-        measured, predict, parameters, scatter, active=readings.active, reject=reject, level=readings.sheet.level
+        measured,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=readings.sheet.level),
     )
     return _calibration(readings, solution, words, known)
 

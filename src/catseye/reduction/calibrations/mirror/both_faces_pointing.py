@@ -26,7 +26,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 
@@ -127,10 +127,12 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
         predict,
         parameters,
         scatter,
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=readings.sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2),
+            together=np.repeat(np.arange(m), 2),
+            reject=reject,
+            level=readings.sheet.level,
+        ),
     )
     return _calibration(readings, solution)
 

@@ -23,7 +23,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
 
 KIND = "detector-focus"
@@ -151,7 +151,9 @@ def _fitted(
         else ObservedScatter(u**2 * eye)
     )
     on = readings.active if active is None else active
-    return fit_curved(observed, model, parameters, scatter, active=on, reject=reject, level=readings.sheet.level)
+    return fit_curved(
+        observed, model, parameters, scatter, options=FitOptions(active=on, reject=reject, level=readings.sheet.level)
+    )
 
 
 def _derived(values: np.ndarray, model: Model) -> np.ndarray:

@@ -22,7 +22,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "encoder"
@@ -114,7 +114,11 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
         u = sheet.u_reading_arcsec * ARCSECOND * COUNTS_PER_RADIAN
         scatter = ObservedScatter((sheet.u_counts**2 + u**2) * eye)
     solution = fit_curved(
-        counts, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level
+        counts,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, solution, turn + solution.values[waves : waves + n][which])
 

@@ -15,7 +15,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes, student
 
 KIND = "limits"
@@ -74,9 +74,7 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
             for name, there in (("low", ~high), ("high", high))
         ],
         scatter,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     single = claimed if claimed is not None else solution.fit.components["scatter of a touch"]
     return _calibration(readings, solution, single)

@@ -29,7 +29,7 @@ from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 from catseye.reduction.site.stations import imperfections_of, station_covariance, station_of
@@ -142,10 +142,9 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
         predict,
         parameters,
         ObservedScatter(np.diag(_u_counts(readings).ravel() ** 2)),
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
     return _calibration(readings, solution, predict)
 

@@ -14,7 +14,13 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.azimuth_sheet import KIND, LAYOUT, AzimuthSheet
 from catseye.reduction.calibrations.monument.directions import (
@@ -230,9 +236,7 @@ def _fitted(
         scatter,
         names=names[: linear.design.shape[1]],
         effects=linear.effects,
-        active=active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=active, reject=reject, level=sheet.level),
     )
 
 
@@ -282,6 +286,20 @@ def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple
     )
 
 
+def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[TestOutcome]:
+    """The closure of each set that visited the lab twice, against three of its u."""
+    return [
+        TestOutcome(
+            f"closure of set {name}, arcsec",
+            closure / ARCSECOND,
+            CLOSURE_FACTOR * u / ARCSECOND,
+            bool(abs(closure) <= CLOSURE_FACTOR * u),
+            "circle against the mount, lab after less before; limit three standard uncertainties",
+        )
+        for name, closure, u in _closures(sights, fit, effects)
+    ]
+
+
 def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: LinearisedDirections) -> Calibration:
     readings, sheet = sights.readings, sights.readings.sheet
     azimuth = float(np.mod(fit.x[0], TWO_PI))
@@ -292,16 +310,6 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
     keys = [
         ("azimuth_deg", "degrees", "azimuth of the line fixed point to v-block (z^), clockwise from the frame's north"),
         ("alpha1_rad", "rad", "pi - azimuth, turn of the mount about y^"),
-    ]
-    decisions = [
-        TestOutcome(
-            f"closure of set {name}, arcsec",
-            closure / ARCSECOND,
-            CLOSURE_FACTOR * u / ARCSECOND,
-            bool(abs(closure) <= CLOSURE_FACTOR * u),
-            "circle against the mount, lab after less before; limit three standard uncertainties",
-        )
-        for name, closure, u in _closures(sights, fit, linear.effects)
     ]
     residual = fit.residual / ARCSECOND
     number = np.arange(1, len(readings) + 1)
@@ -315,7 +323,7 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
         columns=("set", "place", "target", "face", "direction_deg", "azimuth_deg", "zenith_deg", "residual_arcsec",
                  fit.test, "state"),
         rows=_rows(sights, fit, azimuth),
-        decisions=(*decisions, *fit.decisions()),
+        decisions=(*_closure_decisions(sights, fit, linear.effects), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(

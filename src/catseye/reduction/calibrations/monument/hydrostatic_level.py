@@ -22,7 +22,13 @@ from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadin
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 
 KIND = "hydrostatic-level"
@@ -137,9 +143,7 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         scatter,
         names=names,
         effects=effects,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     loops = _loops(fit, design, effects, climb)
     return _calibration(readings, fit, marks, density, loops)

@@ -24,7 +24,13 @@ from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import UAngle
 
@@ -148,10 +154,12 @@ def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Cal
             table.scatter(at),
             names=table.names,
             effects=effects,
-            active=np.tile(active, 2),
-            together=np.tile(np.arange(len(readings)), 2),
-            reject=reject and turn > 2,
-            level=readings.sheet.level,
+            options=FitOptions(
+                active=np.tile(active, 2),
+                together=np.tile(np.arange(len(readings)), 2),
+                reject=reject and turn > 2,
+                level=readings.sheet.level,
+            ),
         )
         moved = np.abs(fit.x - at) / np.maximum(np.abs(fit.x), table.sizes)
         at, active = fit.x, fit.active[: len(readings)]

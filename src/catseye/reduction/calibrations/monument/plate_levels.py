@@ -21,7 +21,13 @@ from catseye.geometry.mirror.mount import gamma
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Cell
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle, frame_of
 
@@ -79,7 +85,12 @@ def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibratio
     def fitted(acting: list[Effect], active: np.ndarray, leave: bool) -> CalibrationFit:
         names = ["tilt of x^", "tilt of z^", "level's zero"]
         return fit_readings(
-            observed, design, scatter, names=names, effects=acting, active=active, reject=leave, level=sheet.level
+            observed,
+            design,
+            scatter,
+            names=names,
+            effects=acting,
+            options=FitOptions(active=active, reject=leave, level=sheet.level),
         )
 
     first = fitted(effects, readings.active, reject)

@@ -12,7 +12,7 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient
@@ -84,13 +84,13 @@ def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibr
         scatter,
         names=names[:wanted],
         effects=effects,
-        active=on,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=on, reject=reject, level=sheet.level),
     )
     longer = None
     if wanted == 2 and fit.active.sum() > 4 and len(set(amplitude[fit.active])) > 2:
-        longer = fit_readings(observed, design, scatter, names=names, effects=effects, active=fit.active)
+        longer = fit_readings(
+            observed, design, scatter, names=names, effects=effects, options=FitOptions(active=fit.active)
+        )
     return _calibration(readings, fit, observed, levels[:, 0], longer)
 
 

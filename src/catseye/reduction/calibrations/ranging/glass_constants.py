@@ -16,7 +16,13 @@ from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, Cell
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -137,9 +143,7 @@ def _dimensions(
             Effect("offset of the thermometer, °C", observed * expansion, sheet.u_temperature_c),
             Effect("expansion, ppm/°C", observed * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
 
 

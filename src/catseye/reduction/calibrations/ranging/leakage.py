@@ -12,7 +12,7 @@ import numpy as np
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 
@@ -54,10 +54,7 @@ def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibrat
         np.kron(np.eye(2), np.ones((m, 1))),
         _scatter(readings, names, len(sessions)),
         names=["real part", "imaginary part"],
-        active=np.tile(on, 2),
-        together=np.tile(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=np.tile(on, 2), together=np.tile(np.arange(m), 2), reject=reject, level=sheet.level),
     )
     return _calibration(readings, fit, z, names, len(sessions))
 

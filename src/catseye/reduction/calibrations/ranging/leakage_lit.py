@@ -15,7 +15,7 @@ from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 from catseye.signal.systematics.leakage import circle_leakage
@@ -85,10 +85,9 @@ def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationF
         np.concatenate(design),
         _scatter(readings, 2),
         names=[f"{part} part of the {name}" for name in names for part in ("real", "imaginary")],
-        active=np.tile(readings.active, 2),
-        together=np.tile(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.tile(readings.active, 2), together=np.tile(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
 
 
@@ -107,9 +106,7 @@ def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> Calibration
             design,
             scatter,
             names=["real part of the leakage", "imaginary part of the leakage", "amplitude of the light"],
-            active=on,
-            reject=reject,
-            level=readings.sheet.level,
+            options=FitOptions(active=on, reject=reject, level=readings.sheet.level),
         )
         point = point + fit.x
         on = fit.active

@@ -14,7 +14,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
 from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.rail import KIND, LAYOUT, LinearitySheet, Rail, rail_of
@@ -72,9 +72,7 @@ def _fit(
         rail.scatter,
         names=names,
         effects=effects,
-        active=active,
-        reject=reject,
-        level=level,
+        options=FitOptions(active=active, reject=reject, level=level),
     )
 
 

@@ -14,7 +14,13 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.air import WEATHER, AirSheet, group_air, half_wavelength, ranger_effects
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -94,9 +100,7 @@ def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) 
         _scatter(readings, half),
         names=["D0", "scale"][: 1 + sheet.estimate_scale],
         effects=_effects(readings, length, phase, half, ranger_effects(readings, air, length)),
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, fit, observed=observed, cycles=cycles, margin=margin)
 

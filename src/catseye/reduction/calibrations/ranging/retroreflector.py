@@ -14,7 +14,7 @@ from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, Sheet
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 
@@ -83,9 +83,7 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
         _scatter(readings),
         names=_parameters(readings, unknown),
         effects=cyclic_effects(phase, sheet.u_cyclic_mm),
-        active=on,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=on, reject=reject, level=sheet.level),
     )
     return _calibration(readings, fit, unknown)
 
@@ -162,6 +160,18 @@ def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...
     )
 
 
+def _seatings_decision(readings: SheetReadings, count: int) -> TestOutcome:
+    """Whether each of the retroreflectors, `count` unknown ones and the reference, was seated more than once."""
+    alternations = int(np.max(_seatings(readings))) + 1
+    return TestOutcome(
+        "seatings",
+        float(alternations),
+        float(2 * (count + 1)),
+        alternations >= 2 * (count + 1),
+        "each retroreflector should be seated twice or more: a single one cannot show a bad seat",
+    )
+
+
 def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
@@ -181,7 +191,6 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
     order = np.argsort(hours)
     drifts = fit.x[count + 1 :: 2] / micrometre if sheet.drift else np.zeros(0)
     scatter = np.sqrt(np.diag(fit.scattered)[:count]) / micrometre
-    alternations = int(np.max(_seatings(readings))) + 1
     return Calibration(
         kind=KIND,
         title=f"Range constant of {', '.join(unknown)} against {sheet.reference}",
@@ -190,16 +199,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
         covariance=covariance,
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
         rows=_rows(readings, fit),
-        decisions=(
-            TestOutcome(
-                "seatings",
-                float(alternations),
-                float(2 * (count + 1)),
-                alternations >= 2 * (count + 1),
-                "each retroreflector should be seated twice or more: a single one cannot show a bad seat",
-            ),
-            *fit.decisions(),
-        ),
+        decisions=(_seatings_decision(readings, count), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
