@@ -25,7 +25,7 @@ from catseye.reduction.calibrations.calibration import TestOutcome
 
 @dataclass(frozen=True, eq=False)
 class BaselineCalibration:
-    """All that a baseline told.
+    """The outcome of a baseline's calibration: pillars, instrument, tests.
 
     observations   as read
     settings       assumptions

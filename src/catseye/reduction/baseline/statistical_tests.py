@@ -120,7 +120,7 @@ def decisions_of(
 
 
 def _standard(
-    test: FullTest | str, claimed: FullTest | None, settings, against: "Baseline | None"
+    test: FullTest | str, claimed: FullTest | None, settings: "BaselineSettings", against: "Baseline | None"
 ) -> list[TestOutcome]:
     """The standard's three questions; sets, each one distance, are the sample."""
     if isinstance(test, str) or claimed is None:

@@ -46,9 +46,9 @@ class ModelParameter:
 
 @dataclass(frozen=True, eq=False)
 class CurvedFit:
-    """The outcome.
+    """The outcome of `fit_curved` over p parameters.
 
-    parameters    as they were given
+    parameters    as they went in
     values        (p,) of all of them
     covariance    (p, p); rows and columns of held ones are zero
     fit           the last linear one: residuals, tests; `predicted` is what the values predict

@@ -86,13 +86,13 @@ class Reader:
 
 
 def members(heights: PanelHeights) -> list[Reader]:
-    """One of each member, in order of names."""
+    """How well each member of the crew reads, in order of names."""
     who = np.array(heights.readings.member)
     return [_reader(heights, name, who == name) for name in sorted(set(heights.readings.member))]
 
 
 def sessions(heights: PanelHeights) -> list[Reader]:
-    """One of each session, in the order of the table: the points of the control chart."""
+    """How well each session's readings agree, in the order of the table: the points of the control chart."""
     return [_reader(heights, name, heights.readings.session == k) for k, name in enumerate(heights.readings.sessions)]
 
 

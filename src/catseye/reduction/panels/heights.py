@@ -53,7 +53,7 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class PanelHeights:
-    """What a table of readings says; arrays (p, 4) are by panel and place of the layout used, m.
+    """Heights of panel corners from a table of readings; arrays (p, 4) by panel and place of the layout used, m.
 
     layout            panels that were read
     readings, model, solution   how it came about

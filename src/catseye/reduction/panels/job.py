@@ -1,4 +1,4 @@
-"""From the files of a crew to everything that is told of its work."""
+"""From the files of a crew to heights as found and as left, what turning the screws did, and notes for its report."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class PanelFiles:
 
 @dataclass(frozen=True, eq=False)
 class PanelWork:
-    """What was found, and what the screws did if there are readings as left.
+    """Heights as found and, if the crew read again, as left, with what turning the screws did between.
 
     layout    the whole one
     found, left   heights as found and as left

@@ -124,7 +124,7 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
                 for k, block in enumerate(sheet.block)
             ),
             Effect("film, µm", -films * grown * 1e-3, sheet.u_film_um),
-            *_warmth(sheet, -cold, temperature),
+            *_temperature_effects(sheet, -cold, temperature),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
@@ -175,7 +175,7 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
         effects=[
             Effect("zero of the instrument, mm", -np.ones(m), sheet.u_zero_mm),
             Effect("scale of the instrument, ppm", -observed * PPM, sheet.u_scale_ppm),
-            *_warmth(sheet, observed, temperature),
+            *_temperature_effects(sheet, observed, temperature),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
@@ -214,7 +214,7 @@ def _scatter(sheet: LengthSheet, m: int) -> ObservedScatter:
     return ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
 
 
-def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
+def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
     """Thermometer and expansion; `length` is what a factor of 1 + expansion (t - 20) multiplies, with its sign.
 
     A thermometer that reads u too high, or an expansion taken too large: the true length is smaller than computed, the

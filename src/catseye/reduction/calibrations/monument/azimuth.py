@@ -127,8 +127,8 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDi
     sheet = sights.readings.sheet
     m = len(sights.observed)
 
-    def predicted(azimuth: float, given: SightConditions) -> np.ndarray:
-        turned, zenith = geometry_of(sights, azimuth, given)
+    def predicted(azimuth: float, changed: SightConditions) -> np.ndarray:
+        turned, zenith = geometry_of(sights, azimuth, changed)
         lean = leaning(sights, turned, zenith, sheet.lean_x_arcsec * ARCSECOND, sheet.lean_z_arcsec * ARCSECOND)
         return turned + lean
 
@@ -146,8 +146,8 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDi
     effects = _instrument_effects(sights, turned, zenith)
     if tied:
         effects.append(Effect("circle's zero of the plate, arcsec", np.full(m, ARCSECOND), sheet.u_plate_zero_arcsec))
-    for name, u, step, given in _changes(sights):
-        effects.append(Effect(name, slope(step, (at[0], given(step)), (at[0], given(-step))), u))
+    for name, u, step, change in _changes(sights):
+        effects.append(Effect(name, slope(step, (at[0], change(step)), (at[0], change(-step))), u))
     return LinearisedDirections(off + design @ at, design, effects)
 
 

@@ -147,21 +147,21 @@ def _share(readings: SheetReadings, place: np.ndarray, sets: tuple[str, ...]) ->
     return share
 
 
-def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightConditions) -> tuple[np.ndarray, np.ndarray]:
+def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditions) -> tuple[np.ndarray, np.ndarray]:
     """Direction from z^ about the plumb line, and zenith angle, of each sight: (m,), (m,).
 
     sights       the table
     azimuth_z    rad, of z^ in the ground frame
-    given        changes of what is known
+    changed        changes of what is known
     """
     sheet, readings = sights.readings.sheet, sights.readings
-    frame = frame_of(sheet, xi=given.xi, eta=given.eta)
+    frame = frame_of(sheet, xi=changed.xi, eta=changed.eta)
     points = np.array([[sheet.x_mm, sheet.y_mm, sheet.z_mm], *([p.x_mm, p.y_mm, p.z_mm] for p in sheet.point)])
-    points = points * MILLIMETRE + (0.0 if given.points is None else given.points)
+    points = points * MILLIMETRE + (0.0 if changed.points is None else changed.points)
     plumb = plumb_from_ground(frame, points[0])
     mount = gamma(np.pi - azimuth_z, sheet.alpha2_rad, sheet.alpha3_rad)
     offset = np.array([sheet.instrument_dx_mm, sheet.instrument_dy_mm, sheet.instrument_dz_mm]) * MILLIMETRE
-    instrument = points[0] + mount.T @ (offset + given.offset)
+    instrument = points[0] + mount.T @ (offset + changed.offset)
     zero = azimuth(plumb @ np.array([np.sin(azimuth_z), np.cos(azimuth_z), 0.0]))
     turned = np.zeros(len(readings))
     zenith = readings.numbers.get("zenith_deg", np.full(len(readings), 90.0)) * DEGREE
@@ -182,8 +182,11 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightCondition
                 latitude,
                 longitude,
                 height=float(points[0, 2]) + frame.height,
-                ut1_utc=sheet.ut1_utc_s + given.time,
-                pole=(sheet.pole_x_arcsec * ARCSECOND + given.pole[0], sheet.pole_y_arcsec * ARCSECOND + given.pole[1]),
+                ut1_utc=sheet.ut1_utc_s + changed.time,
+                pole=(
+                    sheet.pole_x_arcsec * ARCSECOND + changed.pole[0],
+                    sheet.pole_y_arcsec * ARCSECOND + changed.pole[1],
+                ),
             )
             turned[rows], zenith[rows] = at - zero, high
     return turned, zenith

@@ -116,13 +116,13 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
     for row, (first, last) in enumerate(zip(*ends, strict=True)):
         climb[row, marks.index(first)] -= 1.0
         climb[row, marks.index(last)] += 1.0
-    density, by_warmth = _density(readings)
+    density, by_temperature = _density(readings)
     shown = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE
     observed = shown + density - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
     # observed = climb of the others - side C
     design, names = climb[:, 1:], [f"height of {mark}" for mark in marks[1:]]
     effects = [
-        Effect("thermometers, °C", side * by_warmth, sheet.u_temperature_c),
+        Effect("thermometers, °C", side * by_temperature, sheet.u_temperature_c),
         Effect("micrometers, ppm", PPM * shown, sheet.u_scale_ppm),
         Effect("height of the held mark, mm", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm),
     ]
@@ -133,7 +133,7 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         effects.append(Effect("constant of the instrument, mm", -side * MILLIMETRE, sheet.u_constant_mm))
     else:
         design, names = np.column_stack([design, -side]), [*names, "constant (exchange the vessels)"]
-    claimed = np.diag((sheet.u_tube_c * by_warmth) ** 2)
+    claimed = np.diag((sheet.u_tube_c * by_temperature) ** 2)
     scatter = ObservedScatter(claimed, {"scatter of one difference": np.eye(m)}, size=float(np.max(np.abs(observed))))
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(claimed + (sheet.u_reading_mm * MILLIMETRE) ** 2 * np.eye(m))

@@ -87,11 +87,11 @@ def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
         state = f"is there {len(rows)} times" if rows else "is not there"
         raise refusal(readings.file, f"point {shown(sheet.point)} of {readings.sheet_file} {state} (expected once)")
     row = rows[0]
-    given = np.array([readings.get(f"{k}_m")[row] for k in NAMES])
+    coordinates = np.array([readings.get(f"{k}_m")[row] for k in NAMES])
     frame = frame_of(sheet)
     try:
-        values, covariance = monument_place(frame, given, _covariance(readings, row), system=sheet.system)
-        covariance = covariance + _by_deflection(sheet, given)
+        values, covariance = monument_place(frame, coordinates, _covariance(readings, row), system=sheet.system)
+        covariance = covariance + _by_deflection(sheet, coordinates)
     except ValueError as problem:
         raise refusal(readings.file, f"{readings.where[row]}, {problem}") from problem
     return _calibration(readings, row, frame, values, covariance)
@@ -126,10 +126,10 @@ def monument_place(
             axis=-1,
         )
 
-    given = np.asarray(coordinates, dtype=float)
-    slope = (every(given + STEP * np.eye(3)) - every(given - STEP * np.eye(3))).T / (2.0 * STEP)
+    at_point = np.asarray(coordinates, dtype=float)
+    slope = (every(at_point + STEP * np.eye(3)) - every(at_point - STEP * np.eye(3))).T / (2.0 * STEP)
     full = slope @ np.asarray(covariance, dtype=float) @ slope.T
-    return every(given), 0.5 * (full + full.T)
+    return every(at_point), 0.5 * (full + full.T)
 
 
 def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
@@ -143,12 +143,14 @@ def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
     return matrix * MILLIMETRE**2
 
 
-def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
+def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> np.ndarray:
     """What the deflection's u adds to the covariance: heights above the geoid tilt with it, 1 mm at 2" and 100 m."""
     total = np.zeros((len(KEYS), len(KEYS)))
     for name in ("xi", "eta"):
         ends = [
-            monument_place(frame_of(sheet, **{name: sign * TILT}), given, np.zeros((3, 3)), system=sheet.system)[0]
+            monument_place(frame_of(sheet, **{name: sign * TILT}), coordinates, np.zeros((3, 3)), system=sheet.system)[
+                0
+            ]
             for sign in (1.0, -1.0)
         ]
         slope = (ends[0] - ends[1]) / (2.0 * TILT)
