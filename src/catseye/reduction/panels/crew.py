@@ -82,6 +82,7 @@ class Reader:
 
     @property
     def in_control(self) -> bool:
+        """Whether the variance factor lies within its limits."""
         return bool(self.low <= self.variance_factor <= self.high)
 
 

@@ -65,18 +65,23 @@ class PanelColumns:
 
     @property
     def size(self) -> int:
+        """How many parameters there are."""
         return 4 * self.panels + self.corners + 6 * self.sessions
 
     def height(self, panel: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Columns of the heights of panels' corners, by panel and place 0 to 3."""
         return 4 * panel + place
 
     def shaft(self, corner: np.ndarray) -> np.ndarray:
+        """Columns of the shafts' heights, by corner of the dish."""
         return 4 * self.panels + corner
 
     def zero(self, session: np.ndarray, gauge: np.ndarray) -> np.ndarray:
+        """Columns of the gauges' zeros, by session and gauge 0 to 3."""
         return 4 * self.panels + self.corners + 6 * session + gauge
 
     def level(self, session: np.ndarray, axis: int) -> np.ndarray:
+        """Columns of the level's zeros, by session and axis 0 or 1."""
         return 4 * self.panels + self.corners + 6 * session + 4 + axis
 
 
