@@ -6,7 +6,7 @@ from scipy.optimize import curve_fit
 
 from catseye.errors import EstimationError
 from catseye.reduction.calibrations.curved import ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 
 X = np.linspace(0.0, 3.0, 15)
 
@@ -66,7 +66,13 @@ def test_a_wrong_row_leaves_with_all_its_values_and_is_told():
     y = decay([5.0, 0.8])
     y[6] += 1.0
     rows = np.arange(len(X)) // 3
-    found = fit_curved(y, decay, parameters(), ObservedScatter(0.05**2 * np.eye(len(X))), together=rows, reject=True)
+    found = fit_curved(
+        y,
+        decay,
+        parameters(),
+        ObservedScatter(0.05**2 * np.eye(len(X))),
+        options=FitOptions(together=rows, reject=True),
+    )
     assert (~found.fit.active).nonzero()[0].tolist() == [6, 7, 8]
     np.testing.assert_allclose(found.values, [5.0, 0.8], atol=1e-6)
     ends = row_ends(found.fit, [""] * 5, 3)

@@ -6,7 +6,7 @@ from scipy import optimize, stats
 
 from calibration_scene import RUNS
 from catseye.errors import EstimationError
-from catseye.reduction.calibrations.fit import Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import Effect, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 
@@ -91,7 +91,7 @@ def test_false_alarms_come_as_often_as_the_level_says(runs):
     for _ in range(runs):
         y = rng.standard_normal(20)
         for scatter in (ObservedScatter(np.eye(20)), ObservedScatter(np.zeros((20, 20)), {"s": np.eye(20)})):
-            fit = fit_readings(y, design, scatter, names=["p", "q"], level=0.05)
+            fit = fit_readings(y, design, scatter, names=["p", "q"], options=FitOptions(level=0.05))
             alarms[fit.test] += bool(fit.suspects.any())
     # Šidák's level is slightly safe with correlations: less than the slack of the count.
     for count in alarms.values():
@@ -119,7 +119,7 @@ def test_what_cannot_be_rejected_is_refused():
     design, rng = line(12, 7)
     y = 50.0 * rng.standard_normal(12)
     with pytest.raises(EstimationError, match="more than 33% of the readings would have to be rejected"):
-        fit_readings(y, design, ObservedScatter(np.eye(12)), names=["p", "q"], reject=True)
+        fit_readings(y, design, ObservedScatter(np.eye(12)), names=["p", "q"], options=FitOptions(reject=True))
     with pytest.raises(EstimationError, match="rank deficient: p, twice p not held"):
         fit_readings(y, design[:, [0, 0]], ObservedScatter(np.eye(12)), names=["p", "twice p"])
 
@@ -129,7 +129,11 @@ def test_an_alternative_value_leaves_with_its_partner():
     y = np.zeros(12)
     y[3] = 9.0
     fit = fit_readings(
-        y, design, ObservedScatter(np.eye(12)), names=["p", "q"], reject=True, together=np.tile(np.arange(6), 2)
+        y,
+        design,
+        ObservedScatter(np.eye(12)),
+        names=["p", "q"],
+        options=FitOptions(reject=True, together=np.tile(np.arange(6), 2)),
     )
     assert np.flatnonzero(~fit.active).tolist() == [3, 9]
     assert fit.state(("",) * 12)[9] == "rejected"

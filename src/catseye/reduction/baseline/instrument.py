@@ -5,7 +5,7 @@ the standard adds to readings is -zero.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -25,7 +25,7 @@ from catseye.reduction.calibrations.calibration import TestOutcome
 
 @dataclass(frozen=True, eq=False)
 class BaselineCalibration:
-    """All that a baseline told.
+    """The outcome of a baseline's calibration: pillars, instrument, tests.
 
     observations   as read
     settings       assumptions
@@ -71,7 +71,7 @@ class BaselineCalibration:
 
 
 def calibrate_baseline(
-    seen: BaselineShots,
+    shots: BaselineShots,
     heights: Heights | None = None,
     against: Baseline | None = None,
     *,
@@ -80,7 +80,7 @@ def calibrate_baseline(
 ) -> BaselineCalibration:
     """Pillars and instrument from one table of shots.
 
-    seen       shots
+    shots      as read, with the weather of each
     heights    of the pillars; None takes them for level
     against    known pillars; None finds them, the scale being as good as the instrument's frequency
     settings   assumptions
@@ -89,21 +89,27 @@ def calibrate_baseline(
     Raises InputError for tables that do not join, EstimationError where the shots do not determine the answer.
     """
     with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
-        return _calibrated(seen, heights, against, settings or BaselineSettings(), progress)
+        return _calibrated(shots, heights, against, settings or BaselineSettings(), progress)
 
 
-def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Progress | None) -> BaselineCalibration:
+def _calibrated(
+    shots: BaselineShots,
+    heights: Heights | None,
+    against: Baseline | None,
+    settings: BaselineSettings,
+    progress: Progress | None,
+) -> BaselineCalibration:
     notes: list[str] = []
-    seen_names = _ordered(seen, heights, against)
-    seen = _renumbered(seen, seen_names)
-    height, u_height, reference = _heights(seen, heights, against, settings, notes)
-    lengths = reduce_lengths(seen, height, u_height, reference or 0.0, settings)
+    names = _ordered(shots, heights, against)
+    shots = _renumbered(shots, names)
+    height, u_height, reference = _heights(shots, heights, against, settings, notes)
+    lengths = reduce_lengths(shots, height, u_height, reference or 0.0, settings)
     if against is None and settings.u_scale_ppm > 0.0:
         by_scale = lengths.stretch**2 * lengths.distance * settings.u_scale_ppm * PPM
         columns = np.concatenate([lengths.systematic, by_scale[:, None]], axis=1)
         lengths = replace(lengths, systematic=columns, effects=(*lengths.effects, "scale of the instrument"))
     known = None if against is None else _known(against)
-    job = BaselineJob(seen, lengths, settings, known, notes)
+    job = BaselineJob(shots, lengths, settings, known, notes)
     keep, rejected, suspects, solution = job.cleaned(progress)
     solution, cyclic = job.with_cyclic(keep, solution)
     _refuse_gross(solution, job, keep)
@@ -119,17 +125,17 @@ def _calibrated(seen, heights, against, settings: BaselineSettings, progress: Pr
         against=against,
         suspects=suspects,
     )
-    notes += _notes(seen, solution, settings, against)
+    notes += _notes(shots, solution, settings, against)
     if any(d.name == FOLLOWS and d.passed is False for d in decisions) and not settings.corrected:
-        share = np.mean((lengths.first / seen.slope)[keep]) / PPM
+        share = np.mean((lengths.first / shots.slope)[keep]) / PPM
         notes.append(
             f"the light did not follow the weather: if the lengths were corrected in the field, all are wrong by "
             f"{share:+.1f} ppm in the mean, and no u here contains that; compare with --corrected"
         )
     return BaselineCalibration(
-        seen,
+        shots,
         settings,
-        seen.names,
+        shots.names,
         height if heights is not None else None,
         reference,
         lengths,
@@ -151,48 +157,54 @@ def _refuse_gross(solution: BaselineSolution, job: BaselineJob, keep: np.ndarray
     """A scatter at the ceiling of what is estimated is no noise; the row is the worst before anything was adjusted."""
     noise = solution.noise
     if np.isfinite(solution.u_noise).any() and np.any(np.array([noise.shot, noise.set, noise.air]) > 0.999 * CEILING):
-        seen, x, y = job.seen, job.x, job.y
-        straight = np.hypot(x[seen.end] - x[seen.start], y[seen.end] - y[seen.start])
+        shots, x, y = job.shots, job.x, job.y
+        straight = np.hypot(x[shots.end] - x[shots.start], y[shots.end] - y[shots.start])
         worst = int(np.argmax(np.where(keep, np.abs(job.lengths.distance - straight), -1.0)))
         raise EstimationError(
-            f"{seen.file}: shots contradict each other by more than any noise of a distance meter (0.1 m, 1000 ppm); "
-            f"look for a wrong pillar or digit, at {seen.where[worst]} first"
+            f"{shots.file}: shots contradict each other by more than any noise of a distance meter (0.1 m, 1000 ppm); "
+            f"look for a wrong pillar or digit, at {shots.where[worst]} first"
         )
 
 
-def _ordered(seen: BaselineShots, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
+def _ordered(shots: BaselineShots, heights: Heights | None, against: Baseline | None) -> tuple[str, ...]:
     if against is not None:
-        numbers_of(against, seen.names, seen.file)
+        numbers_of(against, shots.names, shots.file)
         return against.pillars
     if heights is None:
-        return seen.names
-    for name in seen.names:
+        return shots.names
+    for name in shots.names:
         if name not in heights.height:
-            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
-    return tuple(name for name in heights.height if name in seen.names)
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {shots.file} is missing (expected its height)")
+    return tuple(name for name in heights.height if name in shots.names)
 
 
-def _renumbered(seen: BaselineShots, names: tuple[str, ...]) -> BaselineShots:
+def _renumbered(shots: BaselineShots, names: tuple[str, ...]) -> BaselineShots:
     from copy import copy
 
-    number = np.array([names.index(n) for n in seen.names])
-    found = copy(seen)
-    found.names, found.start, found.end = names, number[seen.start], number[seen.end]
-    return found
+    number = np.array([names.index(n) for n in shots.names])
+    renumbered = copy(shots)
+    renumbered.names, renumbered.start, renumbered.end = names, number[shots.start], number[shots.end]
+    return renumbered
 
 
-def _heights(seen, heights: Heights | None, against: Baseline | None, settings: BaselineSettings, notes: list[str]):
+def _heights(
+    shots: BaselineShots,
+    heights: Heights | None,
+    against: Baseline | None,
+    settings: BaselineSettings,
+    notes: list[str],
+) -> tuple[np.ndarray, np.ndarray, float | None]:
     """Heights and their u by the pillars' numbers, and the reference height (None: unknown)."""
-    n = len(seen.names)
+    n = len(shots.names)
     if heights is None:
         if settings.reference_height is not None:
             raise InputError("--reference-height-m needs --heights: without heights there is none to refer to")
         notes.append("no heights of pillars: they are taken for level, which makes lengths on a slope too long")
         return np.zeros(n), np.zeros(n), None
-    touched = {seen.names[i] for i in (*seen.start, *seen.end)}
+    touched = {shots.names[i] for i in (*shots.start, *shots.end)}
     for name in touched:
         if name not in heights.height:
-            raise InputError(f"{heights.file}: pillar {shown(name)} of {seen.file} is missing (expected its height)")
+            raise InputError(f"{heights.file}: pillar {shown(name)} of {shots.file} is missing (expected its height)")
     reference = settings.reference_height
     if against is not None:
         if reference is not None and reference != against.reference_height_m:
@@ -204,8 +216,8 @@ def _heights(seen, heights: Heights | None, against: Baseline | None, settings: 
         if reference is None:
             notes.append("the known baseline has no heights: distances are compared at the first pillar's height")
     first = next(h for name, h in heights.height.items() if name in touched)
-    height = np.array([heights.height.get(name, first) for name in seen.names])
-    u = np.array([heights.u.get(name, 0.0) for name in seen.names])
+    height = np.array([heights.height.get(name, first) for name in shots.names])
+    u = np.array([heights.u.get(name, 0.0) for name in shots.names])
     return height, u, first if reference is None else reference
 
 
@@ -216,14 +228,16 @@ def _known(against: Baseline) -> KnownPlaces:
     return KnownPlaces(np.array(against.x_m), np.array(against.y_m), np.array(rows), against.covariance)
 
 
-def _notes(seen, solution: BaselineSolution, settings: BaselineSettings, against: Baseline | None) -> list[str]:
+def _notes(
+    shots: BaselineShots, solution: BaselineSolution, settings: BaselineSettings, against: Baseline | None
+) -> list[str]:
     notes = []
     if against is None:
         notes.append(
             "the scale is not determined without a known baseline: the pillars carry the instrument's, "
             f"{settings.u_scale_ppm:g} ppm (1σ)"
         )
-        if not np.isfinite(seen.direction).any():
+        if not np.isfinite(shots.direction).any():
             notes.append("no horizontal directions: the pillars are taken to stand in a straight line")
     if settings.unit_length is None:
         notes.append("no cyclic terms: the instrument's unit length is not given (--unit-length-m)")
@@ -237,18 +251,33 @@ def _notes(seen, solution: BaselineSolution, settings: BaselineSettings, against
     return notes
 
 
-def record_values(found: BaselineCalibration) -> dict[str, Any]:
+class BaselineRecordValues(TypedDict):
+    """Keys of BASELINE.toml that a calibration fills in; `records.laboratory.baseline.Baseline` explains them."""
+
+    reference_height_m: float | None
+    pillars: tuple[str, ...]
+    x_m: tuple[float, ...]
+    y_m: tuple[float, ...]
+    known: tuple[str, ...]
+    covariance_mm2: tuple[tuple[float, ...], ...]
+    s_mm: float | None
+    degrees_of_freedom: int | None
+    zero_mm: float
+    u_zero_mm: float
+
+
+def record_values(calibration: BaselineCalibration) -> BaselineRecordValues:
     """What BASELINE.toml keeps of a calibration, pillars in their order along the line."""
-    s, order = found.solution, found.order
+    s, order = calibration.solution, calibration.order
     rows, covariance = s.places
     n = len(s.x)
     wanted = [int(np.flatnonzero(rows == r)[0]) for axis in (0, n) for r in order + axis if r in rows]
-    labels = [f"{'x' if rows[k] < n else 'y'} {found.names[rows[k] % n]}" for k in wanted]
+    labels = [f"{'x' if rows[k] < n else 'y'} {calibration.names[rows[k] % n]}" for k in wanted]
     zero, u_zero = s.of("zero")
-    test = found.test if isinstance(found.test, FullTest) else None
+    test = calibration.test if isinstance(calibration.test, FullTest) else None
     return {
-        "reference_height_m": found.reference_height,
-        "pillars": tuple(found.names[i] for i in order),
+        "reference_height_m": calibration.reference_height,
+        "pillars": tuple(calibration.names[i] for i in order),
         "x_m": tuple(s.x[order].tolist()),
         "y_m": tuple(s.y[order].tolist()),
         "known": tuple(labels),

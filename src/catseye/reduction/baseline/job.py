@@ -16,8 +16,9 @@ from catseye.estimation.baseline.adjustment import (
 )
 from catseye.estimation.baseline.iso17123 import FullTest, full_test
 from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, KnownPlaces
-from catseye.reduction.baseline.lengths import BaselineSettings
-from catseye.reduction.baseline.statistical_tests import suspects_of
+from catseye.records.laboratory.baseline import BaselineShots
+from catseye.reduction.baseline.lengths import BaselineSettings, Lengths
+from catseye.reduction.baseline.statistical_tests import SuspectShot, suspects_of
 
 Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in all
 
@@ -25,32 +26,48 @@ Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in
 class BaselineJob:
     """The adjustments of one calibration, which differ in what they leave out or add."""
 
-    def __init__(self, seen, lengths, settings: BaselineSettings, known: KnownPlaces | None, notes: list[str]):
-        self.seen, self.lengths, self.settings, self.known, self.notes = seen, lengths, settings, known, notes
-        count = len(seen.names)
-        u_direction = np.hypot(seen.u_rounding, settings.u_direction_arcsec * ARCSECOND)
+    def __init__(
+        self,
+        shots: BaselineShots,
+        lengths: Lengths,
+        settings: BaselineSettings,
+        known: KnownPlaces | None,
+        notes: list[str],
+    ) -> None:
+        """Sights and approximate places of the pillars.
+
+        shots      renumbered along the line
+        lengths    their horizontal distances
+        settings   assumptions
+        known      pillars of a known baseline
+        notes      for a person; what is left out adds its line here
+        """
+        self.shots, self.lengths, self.settings, self.known, self.notes = shots, lengths, settings, known, notes
+        count = len(shots.names)
+        u_direction = np.hypot(shots.u_rounding, settings.u_direction_arcsec * ARCSECOND)
         self.sights = BaselineSights(
-            seen.start,
-            seen.end,
-            seen.set,
-            seen.setup,
+            shots.start,
+            shots.end,
+            shots.set,
+            shots.setup,
             lengths.distance,
             lengths.stretch,
             lengths.systematic,
             lengths.effects,
-            seen.direction,
+            shots.direction,
             u_direction,
         )
         if known is None:
             try:
-                self.x = places_in_line(seen.start, seen.end, lengths.distance, count)
+                self.x = places_in_line(shots.start.tolist(), shots.end.tolist(), lengths.distance, count)
             except EstimationError as problem:
-                raise EstimationError(named(str(problem), seen.names)) from problem
+                raise EstimationError(named(str(problem), shots.names)) from problem
             self.y = np.zeros(count)
         else:
             self.x, self.y = known.x, known.y
 
-    def solved(self, keep, *, extra: Extra | None = None, noise: Claim | None = None) -> BaselineSolution:
+    def solved(self, keep: np.ndarray, *, extra: Extra | None = None, noise: Claim | None = None) -> BaselineSolution:
+        """The adjustment of the shots kept (m,), with further unknowns, the noise estimated or given."""
         part = None if extra is None else Extra(extra.names, extra.columns[keep])
         try:
             return adjust_baseline(
@@ -65,9 +82,9 @@ class BaselineJob:
                 claim=self._specified(keep),
             )
         except EstimationError as problem:
-            raise EstimationError(named(str(problem), self.seen.names)) from problem
+            raise EstimationError(named(str(problem), self.shots.names)) from problem
 
-    def _specified(self, keep) -> Claim:
+    def _specified(self, keep: np.ndarray) -> Claim:
         """The maker's claim as variances; repeats from their own scatter, or a tenth of the claim."""
         sights = self.sights.only(keep)
         a = (self.settings.specified_mm * MILLIMETRE) ** 2
@@ -79,7 +96,7 @@ class BaselineJob:
         """Standard deviation that the maker claims, linear in the distance, m."""
         return self.settings.specified_mm * MILLIMETRE + self.settings.specified_ppm * PPM * distance
 
-    def agreement(self, solution: BaselineSolution, cyclic: tuple[str, ...], keep) -> BaselineSolution:
+    def agreement(self, solution: BaselineSolution, cyclic: tuple[str, ...], keep: np.ndarray) -> BaselineSolution:
         """Sets against the known pillars, a set's variance being what the maker claims; without directions."""
         used = solution.used
         shot = max(solution.noise.shot, 1e-16)
@@ -96,12 +113,14 @@ class BaselineJob:
             noise=Claim(shot, sets, 0.0),
         )
 
-    def cleaned(self, progress: Progress | None):
-        """Shots used, why others are not, what is suspect, and the solution; one rejection a step."""
-        keep = np.ones(len(self.seen), bool)
-        rejected = [""] * len(self.seen)
-        most = max(1, len(self.seen) // 10)
-        for step in range(len(self.seen)):
+    def cleaned(
+        self, progress: Progress | None
+    ) -> tuple[np.ndarray, tuple[str, ...], tuple[SuspectShot, ...], BaselineSolution]:
+        """Shots used (m,), why others are not, what is suspect, and the solution; one rejection a step."""
+        keep = np.ones(len(self.shots), bool)
+        rejected = [""] * len(self.shots)
+        most = max(1, len(self.shots) // 10)
+        for step in range(len(self.shots)):
             if progress is not None:
                 progress("adjusting", step, 0)
             solution = self.solved(keep)
@@ -130,11 +149,12 @@ class BaselineJob:
         """cos and sin of the length shown, in unit lengths; what coefficient 1 m adds."""
         if not names or self.settings.unit_length is None:
             return None
-        phase = TWO_PI * self.seen.slope / self.settings.unit_length
+        phase = TWO_PI * self.shots.slope / self.settings.unit_length
         columns = [self.lengths.stretch * f((k + 1) * phase) for k in range(len(names) // 2) for f in (np.cos, np.sin)]
         return Extra(names, np.stack(columns, axis=1))
 
-    def with_cyclic(self, keep, solution: BaselineSolution) -> tuple[BaselineSolution, tuple[str, ...]]:
+    def with_cyclic(self, keep: np.ndarray, solution: BaselineSolution) -> tuple[BaselineSolution, tuple[str, ...]]:
+        """The solution with cyclic terms and their names; that without and no names where nothing tells them apart."""
         if self.settings.unit_length is None:
             return solution, ()
         names = tuple(f"cyclic {f} {k + 1}" for k in range(self.settings.orders) for f in ("cosine", "sine"))
@@ -167,12 +187,12 @@ class BaselineJob:
         number = np.full(len(y), -1)
         number[touched] = np.arange(len(touched))
 
-        def of(distance, start, end, sigma=None):
+        def of(distance: np.ndarray, start: np.ndarray, end: np.ndarray, sigma: np.ndarray | None = None) -> FullTest:
             line = np.sqrt(distance**2 - (y[end] - y[start]) ** 2)
-            found = full_test(number[start], number[end], line, number[order], sigma)
+            test = full_test(number[start], number[end], line, number[order], sigma)
             places = np.full(len(y), np.nan)
-            places[touched] = found.x
-            return replace(found, x=places)
+            places[touched] = test.x
+            return replace(test, x=places)
 
         steep = used.distance - (used.stretch - 1.0) * solution.of("zero")[0]  # its part along the slope
         start, end, mean = used.start[used.first], used.end[used.first], used.mean(steep)
@@ -182,7 +202,7 @@ class BaselineJob:
         except EstimationError as problem:
             return str(problem), None, None
 
-    def weather(self, keep, solution: BaselineSolution, cyclic: tuple[str, ...]) -> tuple[float, float]:
+    def weather(self, keep: np.ndarray, solution: BaselineSolution, cyclic: tuple[str, ...]) -> tuple[float, float]:
         """Which share of the correction's changes the light followed: 1 - b, where b of them is left in the distances.
 
         The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.
@@ -195,10 +215,10 @@ class BaselineJob:
         if solution.freedom_sets < 6 or np.ptp(index[keep]) < 0.2 * PPM:
             return float("nan"), float("nan")
         try:
-            found = self.solved(keep, extra=Extra(names, columns))
+            extended = self.solved(keep, extra=Extra(names, columns))
         except EstimationError:
             return float("nan"), float("nan")
-        b, u = found.of("weather")
+        b, u = extended.of("weather")
         return 1.0 - b, u
 
 

@@ -115,30 +115,30 @@ def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, 
 
 
 def reduce_lengths(
-    seen: BaselineShots, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
+    shots: BaselineShots, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
 ) -> Lengths:
     """Horizontal distances at one height, with what each common effect does to them.
 
-    seen               shots
-    height, u_height   (n,) of the pillars by their numbers in `seen`, m
+    shots              as read
+    height, u_height   (n,) of the pillars by their numbers in `shots`, m
     reference_height   m
     settings           assumptions
     """
     light = {"wavelength_um": settings.wavelength_um, "co2_ppm": settings.co2_ppm, "model": settings.air_model}
-    state = air(seen.temperature_c, seen.pressure_hpa, seen.humidity_percent, **light)
-    shown_length = seen.slope
+    state = air(shots.temperature_c, shots.pressure_hpa, shots.humidity_percent, **light)
+    shown_length = shots.slope
     first = first_velocity_correction(shown_length, settings.reference_index, state.group_index)
     first = np.zeros_like(first) if settings.corrected else first
     along = shown_length + first
     second = second_velocity_correction(along, refraction=settings.refraction)
     chord = arc_to_chord_correction(along, refraction=settings.refraction)
     straight = along + second + chord
-    one, other = height[seen.start] + seen.instrument, height[seen.end] + seen.target
+    one, other = height[shots.start] + shots.instrument, height[shots.end] + shots.target
     try:
         distance = horizontal_distance(straight, one, other, reference_height=reference_height)
     except ValidityError as problem:
         k = int(np.flatnonzero(~(np.abs(other - one) < straight))[0])
-        raise refusal(seen.file, f"{seen.where[k]}, {problem}") from problem
+        raise refusal(shots.file, f"{shots.where[k]}, {problem}") from problem
     slopes = state.sensitivity
     rise = other - one
     stretch = distance * straight / ((straight - rise) * (straight + rise))
@@ -150,9 +150,9 @@ def reduce_lengths(
         "formula of the index": per_index * state.standard_uncertainty,
     }
     for k in np.flatnonzero(u_height > 0.0).tolist():
-        per_start = (rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.start == k)
-        per_end = (-rise / distance - 0.5 * distance / EARTH_RADIUS) * (seen.end == k)
-        effects[f"height of {seen.names[k]}"] = (per_start + per_end) * u_height[k]
+        per_start = (rise / distance - 0.5 * distance / EARTH_RADIUS) * (shots.start == k)
+        per_end = (-rise / distance - 0.5 * distance / EARTH_RADIUS) * (shots.end == k)
+        effects[f"height of {shots.names[k]}"] = (per_start + per_end) * u_height[k]
     columns = np.stack(list(effects.values()), axis=1)
     level = distance - straight
     return Lengths(state.group_index, first, second, chord, level, distance, stretch, columns, tuple(effects))

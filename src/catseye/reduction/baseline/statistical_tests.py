@@ -48,7 +48,7 @@ def suspects_of(solution: BaselineSolution, rows: np.ndarray, level: float) -> t
     Source: [BAARDA68] data snooping; [POPE76] tau.
     """
     used = solution.used
-    found = []
+    suspects = []
     several = np.flatnonzero(np.isfinite(solution.w_shot))
     tests = len(several) + len(solution.w_set)
     estimated = bool(np.isfinite(solution.u_noise[1:]).any())
@@ -57,16 +57,16 @@ def suspects_of(solution: BaselineSolution, rows: np.ndarray, level: float) -> t
         if p < level:
             pair = np.flatnonzero((used.set == used.set[i]) & (np.arange(len(used)) != i))
             twins = rows[pair] if len(pair) == 1 else rows[:0]
-            found.append(
+            suspects.append(
                 SuspectShot("shot", (int(rows[i]),), float(solution.w_shot[i]), float(p), tuple(twins.tolist()))
             )
     of_sets = _p_tau(solution.w_set, solution.freedom_sets if estimated else np.inf)
     wrong = tests * of_sets < level
     for i in np.flatnonzero(wrong):
         twin = wrong & (np.abs(solution.alike[i]) > ALIKE) & (np.arange(len(wrong)) != i)
-        mine, others = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
-        found.append(SuspectShot("set", mine, float(solution.w_set[i]), float(tests * of_sets[i]), others))
-    return tuple(sorted(found, key=lambda s: (s.p, -abs(s.w))))
+        its_rows, others = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
+        suspects.append(SuspectShot("set", its_rows, float(solution.w_set[i]), float(tests * of_sets[i]), others))
+    return tuple(sorted(suspects, key=lambda s: (s.p, -abs(s.w))))
 
 
 def _p_tau(w: np.ndarray, freedom: float) -> np.ndarray:
@@ -120,7 +120,7 @@ def decisions_of(
 
 
 def _standard(
-    test: FullTest | str, claimed: FullTest | None, settings, against: "Baseline | None"
+    test: FullTest | str, claimed: FullTest | None, settings: "BaselineSettings", against: "Baseline | None"
 ) -> list[TestOutcome]:
     """The standard's three questions; sets, each one distance, are the sample."""
     if isinstance(test, str) or claimed is None:
@@ -128,7 +128,7 @@ def _standard(
     claim = within_claim(claimed.s**2, claimed.degrees_of_freedom, settings.level)
     words = f"{settings.specified_mm:g} mm + {settings.specified_ppm:g} ppm"
     text = f"sets scatter {'as' if claim.passed else 'more than'} specified ({words})"
-    made = [TestOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
+    outcomes = [TestOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
     if against is not None and against.s_mm is not None and against.degrees_of_freedom:
         same = same_precision(
             test.s / MILLIMETRE, test.degrees_of_freedom, against.s_mm, against.degrees_of_freedom, settings.level
@@ -137,11 +137,11 @@ def _standard(
             f"s {test.s / MILLIMETRE:.3f} mm here, {against.s_mm:.3f} mm at the known baseline; "
             f"the ratio of squares must be {same.lower:.3g} at least, too"
         )
-        made.append(TestOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
+        outcomes.append(TestOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
     zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, settings.level)
     text = f"zero {test.zero / MILLIMETRE:+.3f} ± {test.u_zero / MILLIMETRE:.3f} mm is "
     text += "not significant" if zero.passed else "significant: correct for it"
-    return [*made, TestOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
+    return [*outcomes, TestOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
 
 
 def _setups(solution: BaselineSolution, level: float) -> TestOutcome:
@@ -178,18 +178,18 @@ def _weather(weather: tuple[float, float], freedom: int, level: float) -> TestOu
 
 def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: float) -> tuple[TestOutcome, ...]:
     """Zero and scale against known pillars, and whether the sets agree with those as well as the maker claims."""
-    made = []
+    outcomes = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)
         test = is_nothing(value, u, solution.freedom_of(key), level)
         text = f"{key} {value / scale:+.3f} ± {u / scale:.3f} {unit} against the known pillars"
-        made.append(TestOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
+        outcomes.append(TestOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
     freedom = agreement.freedom_sets
     if freedom > 0:
         fit = within_claim(agreement.sets_squares / freedom, freedom, level)
         text = f"sets {'agree' if fit.passed else 'do not agree'} with the known pillars as well as is claimed for both"
-        made.append(TestOutcome("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
-    return tuple(made)
+        outcomes.append(TestOutcome("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
+    return tuple(outcomes)
 
 
 def _outliers(suspects: tuple[SuspectShot, ...]) -> str:

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
+Cell = str | int | float  # of a table of readings
+RecordValue = str | float | list[str] | list[float] | dict[str, float]  # a dict where several records have a part
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class Calibration:
     quantities: tuple[Quantity, ...]
     covariance: np.ndarray
     columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
+    rows: tuple[tuple[Cell, ...], ...]
     decisions: tuple[TestOutcome, ...] = ()
     variance_factor: float = float("nan")
     degrees_of_freedom: int = 0
@@ -82,13 +84,13 @@ class Calibration:
     curve: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     axes: tuple[str, str] = ("", "")
     method: str = ""
-    record: dict[str, Any] = field(default_factory=dict)
+    record: dict[str, RecordValue] = field(default_factory=dict)
     equal_axes: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:
         """What became of each reading; empty where the rows are results and no readings."""
-        return tuple(row[-1] for row in self.rows) if self.columns and self.columns[-1] == STATE else ()
+        return tuple(str(row[-1]) for row in self.rows) if self.columns and self.columns[-1] == STATE else ()
 
     def value(self, key: str) -> float:
         """The quantity of that key; KeyError where there is none."""

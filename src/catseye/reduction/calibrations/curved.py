@@ -12,11 +12,13 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.reduction.calibrations.calibration import Quantity
 from catseye.reduction.calibrations.fit import (
+    EVERY_VALUE,
     REJECTED,
     SUSPECT,
     USED,
     CalibrationFit,
     Effect,
+    FitOptions,
     ObservedScatter,
     fit_readings,
 )
@@ -44,9 +46,9 @@ class ModelParameter:
 
 @dataclass(frozen=True, eq=False)
 class CurvedFit:
-    """The outcome.
+    """The outcome of `fit_curved` over p parameters.
 
-    parameters    as they were given
+    parameters    as they went in
     values        (p,) of all of them
     covariance    (p, p); rows and columns of held ones are zero
     fit           the last linear one: residuals, tests; `predicted` is what the values predict
@@ -88,17 +90,15 @@ def fit_curved(
     parameters: Sequence[ModelParameter],
     scatter: ObservedScatter,
     *,
-    active: np.ndarray | None = None,
-    together: np.ndarray | None = None,
-    reject: bool = False,
-    level: float = 0.05,
+    options: FitOptions = EVERY_VALUE,
 ) -> CurvedFit:
     """The parameters that fit readings best, where these depend on them by a curve.
 
     observed     (m,)
     predict      function of the values (p,) of the parameters -> (m,)
     parameters   p, each sought or with a standard uncertainty beforehand
-    scatter, active, together, reject, level   as for `fit_readings`
+    scatter      of the observed values
+    options      which values take part, and the tests
 
     Raises EstimationError where the readings do not hold every sought parameter (it names them), where too many would
     be rejected, or where the search does not end.
@@ -108,7 +108,7 @@ def fit_curved(
     values = np.array([p.start for p in parameters], dtype=float)
     sought = np.array([np.isinf(p.u) for p in parameters], dtype=bool)
     acting = np.array([not np.isinf(p.u) and p.u > 0.0 for p in parameters], dtype=bool)
-    start, on, rejecting = values.copy(), active, False
+    start, rejecting = values.copy(), False
     for _ in range(ROUNDS):
         slopes = _slopes(predict, values, parameters)
         back = np.where(acting, values - start, 0.0)  # priors stay about their own values
@@ -120,22 +120,19 @@ def fit_curved(
             effects=[
                 Effect(p.name, slopes[:, k], p.u) for k, p in enumerate(parameters) if acting[k]
             ],
-            active=on,
-            together=together,
-            reject=rejecting,
-            level=level,
+            options=replace(options, reject=rejecting),
         )  # fmt: skip
-        found = values.copy()
-        found[sought] += fit.x
-        found[acting] = start[acting] + [fit.effects[p.name][0] for k, p in enumerate(parameters) if acting[k]]
+        latest = values.copy()
+        latest[sought] += fit.x
+        latest[acting] = start[acting] + [fit.effects[p.name][0] for k, p in enumerate(parameters) if acting[k]]
         covariance = _covariance(slopes, scatter, fit, parameters)
         u = np.sqrt(np.diag(covariance))
-        moved = np.max(np.abs(found - values) / np.where(u > 0.0, u, np.inf), initial=0.0)
-        values = found
+        moved = np.max(np.abs(latest - values) / np.where(u > 0.0, u, np.inf), initial=0.0)
+        values = latest
         if not np.isfinite(values).all():
             break
         if moved < SETTLED:
-            if rejecting or not reject:
+            if rejecting or not options.reject:
                 return CurvedFit(tuple(parameters), values, covariance, replace(fit, predicted=predict(values)))
             rejecting = True  # far from the answer every reading looks wrong
     raise EstimationError(
@@ -180,9 +177,9 @@ def row_ends(fit: CalibrationFit, reasons: Sequence[str], each: int) -> list[tup
     """
     states = fit.state([reason for reason in reasons for _ in range(each)])
     order = (USED, SUSPECT, REJECTED)
-    told = []
+    ends = []
     for k in range(0, len(states), each):
         statistic = max(fit.statistic[k : k + each], key=abs)
         state = max(states[k : k + each], key=lambda s: order.index(s) if s in order else len(order))
-        told.append((float(statistic), state))
-    return told
+        ends.append((float(statistic), state))
+    return ends

@@ -92,12 +92,12 @@ class CalibrationFit:
 
     def decisions(self, level: float = SCATTER_LIMIT) -> tuple[TestOutcome, ...]:
         """Tests of the scatter and of the single readings."""
-        told = []
+        outcomes = []
         if self.test == "w" and self.degrees_of_freedom > 0.5:
             test = global_test(self.variance_factor * self.degrees_of_freedom, self.degrees_of_freedom, level)
             low, high = test.lower, test.upper
             limit = high if self.variance_factor >= 1.0 else low
-            told.append(
+            outcomes.append(
                 TestOutcome(
                     "scatter: variance factor",
                     self.variance_factor,
@@ -107,7 +107,7 @@ class CalibrationFit:
                 )
             )
         elif self.test == "tau":
-            told.append(
+            outcomes.append(
                 TestOutcome(
                     "scatter: variance factor",
                     float("nan"),
@@ -117,7 +117,7 @@ class CalibrationFit:
                 )
             )
         else:
-            told.append(
+            outcomes.append(
                 TestOutcome("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings")
             )
         tested = self.active & self.checked
@@ -125,12 +125,12 @@ class CalibrationFit:
             worst = float(np.max(np.abs(self.statistic[tested])))
             count = int(np.count_nonzero(self.suspects))
             text = "no reading stands out" if not count else f"{count} of the values used stand out: look at them"
-            told.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
+            outcomes.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
         else:
-            told.append(
+            outcomes.append(
                 TestOutcome("outliers", float("nan"), float("nan"), None, "no reading is checked by the others")
             )
-        return tuple(told)
+        return tuple(outcomes)
 
     def state(self, reasons: Sequence[str]) -> tuple[str, ...]:
         """(m,) of each value: used, suspect, rejected, or the reason why it was left out beforehand."""
@@ -141,6 +141,25 @@ class CalibrationFit:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class FitOptions:
+    """Which observed values take part, and how they are tested.
+
+    active     (m,) bool: takes part at the start; all if None
+    together   (m,) labels: values of one label leave together, as both quadratures of a phasor; each alone if None
+    reject     leave out what the test rejects, worst first, one at a time
+    level      of the tests, chance of any false alarm among all
+    """
+
+    active: np.ndarray | None = None
+    together: np.ndarray | None = None
+    reject: bool = False
+    level: float = 0.05
+
+
+EVERY_VALUE = FitOptions()
+
+
 def fit_readings(
     observed: np.ndarray,
     design: np.ndarray,
@@ -148,10 +167,7 @@ def fit_readings(
     *,
     names: Sequence[str],
     effects: Sequence[Effect] = (),
-    active: np.ndarray | None = None,
-    together: np.ndarray | None = None,
-    reject: bool = False,
-    level: float = 0.05,
+    options: FitOptions = EVERY_VALUE,
 ) -> CalibrationFit:
     """The parameters of a linear model that fit readings best.
 
@@ -160,24 +176,21 @@ def fit_readings(
     scatter    of the observed values
     names      (p,) of the parameters, for messages
     effects    systematic, with priors
-    active     (m,) bool: takes part at the start; all if None
-    together   (m,) labels: values of one label leave together, as both quadratures of a phasor
-    reject     leave out what the test rejects, worst first, one at a time
-    level      of the tests, chance of any false alarm among all
+    options    which values take part, and the tests
 
-    Returns a Fit. Raises EstimationError where the readings do not hold every parameter, or where a third of them
+    Raises EstimationError where the readings do not hold every parameter, or where a third of them
     would have to go.
 
     Source: [FOERSTNER16] chapter 4 (Gauss-Markov model with priors); [BAARDA68] (w test), [POPE76] (tau test);
     [PATTERSON71] (scatter from the readings).
     """
     m = len(observed)
-    on = np.ones(m, dtype=bool) if active is None else np.array(active, dtype=bool)
+    on = np.ones(m, dtype=bool) if options.active is None else np.array(options.active, dtype=bool)
     start = int(on.sum())
-    labels = np.arange(m) if together is None else np.asarray(together)
+    labels = np.arange(m) if options.together is None else np.asarray(options.together)
     while True:
-        fit = _fitted(observed, design, scatter, names=names, effects=effects, on=on, level=level)
-        if not reject or not fit.suspects.any():
+        fit = _fitted(observed, design, scatter, names=names, effects=effects, on=on, level=options.level)
+        if not options.reject or not fit.suspects.any():
             return fit
         worst = int(np.argmax(np.where(fit.suspects, np.abs(fit.statistic), -1.0)))
         on = on & (labels != labels[worst])
@@ -242,31 +255,31 @@ def _outcome(
     level: float,
     effective: np.ndarray,
 ) -> CalibrationFit:
-    found, p = solution.fits[0], len(effective)
+    group, p = solution.fits[0], len(effective)
     full = solution.covariance
     block = np.ix_(on, on)
     design = readings.matrix[:, :p]
     weight = np.linalg.inv(readings.covariance[block])
     scattered = np.linalg.inv(design[on].T @ weight @ design[on])
-    degrees = float(np.sum(found.redundancy[on]))
-    factor = found.pvv / degrees if degrees > 1e-6 else float("nan")
-    tested = checked(found) & on
+    degrees = float(np.sum(group.redundancy[on]))
+    factor = group.pvv / degrees if degrees > 1e-6 else float("nan")
+    tested = checked(group) & on
     single = single_level(level, max(int(tested.sum()), 1))
     estimated = bool(components) and degrees > 1.5
     critical = tau_critical(single, degrees) if estimated else w_critical(single)
-    statistic = found.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
+    statistic = group.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
     return CalibrationFit(
         x=solution.x[:p],
         covariance=full[:p, :p],
         scattered=scattered,
         effects={name: (float(solution.x[p + k]), float(np.sqrt(full[p + k, p + k]))) for k, name in enumerate(acting)},
         components=components,
-        residual=found.residual,
+        residual=group.residual,
         predicted=design @ solution.x[:p],
-        sigma=found.sigma,
+        sigma=group.sigma,
         statistic=statistic,
         active=on,
-        checked=checked(found),
+        checked=checked(group),
         test="tau" if components else "w",
         critical=critical,
         variance_factor=float("nan") if components else factor,

@@ -31,13 +31,13 @@ class CalibrationKind:
 def provenance(readings: SheetReadings) -> dict[str, Any]:
     """Who measured what with which files, then every other key of the sheet as it was given."""
     sheet = readings.sheet
-    said = {key: getattr(sheet, key) for key in PROVENANCE}
+    stated = {key: getattr(sheet, key) for key in PROVENANCE}
     rest = {
         key: value
         for key, value in sheet.model_dump().items()
-        if key not in said and key not in ("format", "kind") and value is not None
+        if key not in stated and key not in ("format", "kind") and value is not None
     }
-    return {**said, "inputs_sha256": dict(readings.hashes), "sheet": rest}
+    return {**stated, "inputs_sha256": dict(readings.hashes), "sheet": rest}
 
 
 def quantities(
@@ -98,19 +98,19 @@ def scatter_notes(fit: CalibrationFit, unit: str, scale: float, sought: int | No
     """
     from scipy.special import stdtrit
 
-    told = []
+    notes = []
     for name, deviation in fit.components.items():
-        told.append(f"{name}: {deviation / scale:.3g} {unit} (standard deviation, estimated from the readings)")
+        notes.append(f"{name}: {deviation / scale:.3g} {unit} (standard deviation, estimated from the readings)")
     least = float(np.min(fit.effective[:sought]))
     if np.isfinite(least):
         factor = float(stdtrit(least, 0.975))
-        told.append(
+        notes.append(
             f"the estimated scatter has {least:.3g} effective degrees of freedom: for it alone the coverage factor of "
             f"95 % is {factor:.2f}; the intervals count it"
         )
     if fit.suspects.any():
-        told.append(
+        notes.append(
             f"{np.count_nonzero(fit.suspects)} suspect values are still used; --reject leaves them out, or a reason in "
             "the column left_out"
         )
-    return tuple(told)
+    return tuple(notes)

@@ -35,10 +35,10 @@ class CornerStanding:
     median_u: float
 
 
-def standing(found: PanelHeights, chosen: np.ndarray | None = None) -> CornerStanding:
+def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerStanding:
     """The standing of corners (p, 4) bool, all that are known if None."""
-    known = found.known if chosen is None else found.known & chosen
-    h, u, p = found.relative[known], found.u_relative[known], found.conforms[known]
+    known = heights.known if chosen is None else heights.known & chosen
+    h, u, p = heights.relative[known], heights.u_relative[known], heights.conforms[known]
     if not len(h):
         return CornerStanding(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
     square = float(np.mean(h**2))
@@ -47,7 +47,7 @@ def standing(found: PanelHeights, chosen: np.ndarray | None = None) -> CornerSta
         corners=len(h),
         rms=square**0.5,
         rms_true=max(square - float(np.mean(u**2)), 0.0) ** 0.5,
-        within=float(np.mean(np.abs(h) <= found.sheet.goal_um * 1e-6)),
+        within=float(np.mean(np.abs(h) <= heights.sheet.goal_um * 1e-6)),
         expected_within=float(np.mean(p)),
         surely=surely,
         surely_not=not_so,
@@ -82,48 +82,49 @@ class Reader:
 
     @property
     def in_control(self) -> bool:
+        """Whether the variance factor lies within its limits."""
         return bool(self.low <= self.variance_factor <= self.high)
 
 
-def members(found: PanelHeights) -> list[Reader]:
-    """One of each member, in order of names."""
-    who = np.array(found.readings.member)
-    return [_reader(found, name, who == name) for name in sorted(set(found.readings.member))]
+def members(heights: PanelHeights) -> list[Reader]:
+    """How well each member of the crew reads, in order of names."""
+    who = np.array(heights.readings.member)
+    return [_reader(heights, name, who == name) for name in sorted(set(heights.readings.member))]
 
 
-def sessions(found: PanelHeights) -> list[Reader]:
-    """One of each session, in the order of the table: the points of the control chart."""
-    return [_reader(found, name, found.readings.session == k) for k, name in enumerate(found.readings.sessions)]
+def sessions(heights: PanelHeights) -> list[Reader]:
+    """How well each session's readings agree, in the order of the table: the points of the control chart."""
+    return [_reader(heights, name, heights.readings.session == k) for k, name in enumerate(heights.readings.sessions)]
 
 
-def _reader(found: PanelHeights, name: str, rows: np.ndarray) -> Reader:
-    part, redundancy = weighed_squares(found)
-    mine = rows[found.model.tips.row] & np.isfinite(part)
-    degrees = float(np.sum(redundancy[mine]))
-    factor = float(np.sum(part[mine])) / degrees if degrees > 0.5 else np.nan
+def _reader(heights: PanelHeights, name: str, rows: np.ndarray) -> Reader:
+    part, redundancy = weighed_squares(heights)
+    used = rows[heights.model.tips.row] & np.isfinite(part)
+    degrees = float(np.sum(redundancy[used]))
+    factor = float(np.sum(part[used])) / degrees if degrees > 0.5 else np.nan
     low, high = chi2.ppf([0.00135, 0.99865], degrees) / degrees if degrees > FEWEST else (np.nan, np.nan)
-    places = {found.readings.where[k] for k in np.flatnonzero(rows)}
+    places = {heights.readings.where[k] for k in np.flatnonzero(rows)}
     return Reader(
         name=name,
-        readings=int(np.sum(mine)),
+        readings=int(np.sum(used)),
         degrees_of_freedom=degrees,
         variance_factor=factor,
         low=float(low),
         high=float(high),
-        u_gauge=found.sheet.u_gauge_um * 1e-6 * max(factor, 0.0) ** 0.5,
-        doubts=sum(d.where in places for d in found.doubts),
-        closure=_closure(found, rows),
+        u_gauge=heights.sheet.u_gauge_um * 1e-6 * max(factor, 0.0) ** 0.5,
+        doubts=sum(d.where in places for d in heights.doubts),
+        closure=_closure(heights, rows),
     )
 
 
-def _closure(found: PanelHeights, rows: np.ndarray) -> tuple[float, float, float, float]:
+def _closure(heights: PanelHeights, rows: np.ndarray) -> tuple[float, float, float, float]:
     """Last reading on the flat less the first, by gauge, mean over sessions."""
-    readings = found.readings
+    readings = heights.readings
     changes = []
     for s in range(len(readings.sessions)):
-        mine = np.flatnonzero(rows & (readings.corner < 0) & (readings.session == s))
-        if len(mine) > 1:
-            changes.append(readings.reading[mine[-1]] - readings.reading[mine[0]])
+        on_flat = np.flatnonzero(rows & (readings.corner < 0) & (readings.session == s))
+        if len(on_flat) > 1:
+            changes.append(readings.reading[on_flat[-1]] - readings.reading[on_flat[0]])
     a, b, c, d = np.mean(changes, axis=0) if changes else np.full(4, np.nan)
     return float(a), float(b), float(c), float(d)
 
@@ -149,11 +150,11 @@ class Setting:
     scatter: float
 
 
-def setting(found: PanelHeights, left: PanelHeights) -> Setting | None:
+def setting(as_found: PanelHeights, as_left: PanelHeights) -> Setting | None:
     """How the crew's turns came out, or None where the two tables have fewer than three corners in common."""
-    where = {(p, c): (i, k) for i, k, p, c in _named(found)}
+    where = {(p, c): (i, k) for i, k, p, c in _named(as_found)}
     names, a, b = [], [], []
-    for i, k, p, c in _named(left):
+    for i, k, p, c in _named(as_left):
         if (p, c) in where:
             names.append((p, c))
             a.append(where[p, c])
@@ -161,10 +162,10 @@ def setting(found: PanelHeights, left: PanelHeights) -> Setting | None:
     if len(names) < 3:
         return None
     one, two = tuple(np.array(a).T), tuple(np.array(b).T)
-    wanted = -found.relative[one]
-    got = left.relative[two] - found.relative[one]
-    u = np.hypot(found.u_relative[one], left.u_relative[two])
-    weight = 1.0 / (u**2 + (found.sheet.screw.u_turn * found.sheet.screw.pitch_mm * 1e-3) ** 2)
+    wanted = -as_found.relative[one]
+    got = as_left.relative[two] - as_found.relative[one]
+    u = np.hypot(as_found.u_relative[one], as_left.u_relative[two])
+    weight = 1.0 / (u**2 + (as_found.sheet.screw.u_turn * as_found.sheet.screw.pitch_mm * 1e-3) ** 2)
     gain = float(np.sum(weight * wanted * got) / np.sum(weight * wanted**2))
     rest = got - gain * wanted
     return Setting(
@@ -177,17 +178,19 @@ def setting(found: PanelHeights, left: PanelHeights) -> Setting | None:
     )
 
 
-def _named(found: PanelHeights) -> list[tuple[int, int, str, str]]:
-    layout = found.layout
-    return [(int(i), int(k), layout.panels[i], layout.corners[layout.quad[i, k]]) for i, k in np.argwhere(found.known)]
+def _named(heights: PanelHeights) -> list[tuple[int, int, str, str]]:
+    layout = heights.layout
+    return [
+        (int(i), int(k), layout.panels[i], layout.corners[layout.quad[i, k]]) for i, k in np.argwhere(heights.known)
+    ]
 
 
-def zeros(found: PanelHeights) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def zeros(heights: PanelHeights) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Each session's name, (4,) zeros of the gauges and their u, m."""
-    at = found.model.columns
+    at = heights.model.columns
     gauge = np.arange(4)
-    told = []
-    for s, name in enumerate(found.readings.sessions):
-        value, u = found.value(at.zero(np.full(4, s), gauge))
-        told.append((name, value, u))
-    return told
+    zeros_by_session = []
+    for s, name in enumerate(heights.readings.sessions):
+        value, u = heights.value(at.zero(np.full(4, s), gauge))
+        zeros_by_session.append((name, value, u))
+    return zeros_by_session

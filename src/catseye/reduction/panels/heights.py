@@ -53,7 +53,7 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class PanelHeights:
-    """What a table of readings says; arrays (p, 4) are by panel and place of the layout used, m.
+    """Heights of panel corners from a table of readings; arrays (p, 4) by panel and place of the layout used, m.
 
     layout            panels that were read
     readings, model, solution   how it came about
@@ -123,24 +123,24 @@ def reduce_panels(
     used, _, corners = used_layout(readings, layout, sheet)
     number = np.full(len(layout.corners), -1)
     number[corners] = np.arange(len(corners))
-    seen = _renumbered(readings, number)
+    used_readings = _renumbered(readings, number)
     known = None if survey is None else _survey_of(survey, number)
-    model = panel_model(seen, used, sheet, survey=known, maps=maps)
+    model = panel_model(used_readings, used, sheet, survey=known, maps=maps)
     active = [np.ones(len(g.observed), dtype=bool) for g in model.groups]
     solution = _solved(model, active)
-    first = _doubts(model, seen, sheet, solution)
+    first = _doubts(model, used_readings, sheet, solution)
     out: list[tuple[tuple[int, int], Doubt]] = []
     for _ in range(ROUNDS if reject else 0):
-        found = _worst_of_corners(_doubts(model, seen, sheet, solution))
-        if not found:
+        worst = _worst_of_corners(_doubts(model, used_readings, sheet, solution))
+        if not worst:
             break
-        for at, doubt in found:
+        for at, doubt in worst:
             active[at[0]][at[1]] = False
             out.append((at, doubt))
         solution = _solved(model, active)
     named = [_left_out(d) for _, d in out] if reject else [d for _, d in _worst_of_corners(first)]
     return _heights(
-        used, sheet, seen, model, solution, tuple(sorted(named, key=lambda d: -abs(d.w))), known is not None
+        used, sheet, used_readings, model, solution, tuple(sorted(named, key=lambda d: -abs(d.w))), known is not None
     )
 
 
@@ -175,7 +175,7 @@ def _doubts(
     if not many:
         return []
     critical = w_critical(single_level(LEVEL, many))
-    found = []
+    doubts = []
     for g, (fit, test, block) in enumerate(zip(fits, tested, model.blocks, strict=True)):
         size = np.abs(np.where(test, fit.standardised, 0.0))
         corner = model.tips.corner[block]
@@ -184,8 +184,8 @@ def _doubts(
             others = [int(j) for j in alike if j != k]
             doubt = _doubt(model, readings, sheet, block[k], fit.estimated_error[k], fit.standardised[k])
             rivals = tuple(_reading(model, readings, sheet, block[j]) for j in others)
-            found.append(((g, int(k)), Doubt(**{**doubt.__dict__, "rivals": rivals}), [(g, j) for j in others]))
-    return sorted(found, key=lambda item: -abs(item[1].w))
+            doubts.append(((g, int(k)), Doubt(**{**doubt.__dict__, "rivals": rivals}), [(g, j) for j in others]))
+    return sorted(doubts, key=lambda item: -abs(item[1].w))
 
 
 def _worst_of_corners(
@@ -193,14 +193,14 @@ def _worst_of_corners(
 ) -> list[tuple[tuple[int, int], Doubt]]:
     """Of each corner the worst reading with its rivals."""
     worst: dict[str, tuple[tuple[int, int], Doubt, list[tuple[int, int]]]] = {}
-    told = {at: d for at, d, _ in doubts}
+    doubt_at = {at: d for at, d, _ in doubts}
     for item in doubts:
         worst.setdefault(item[1].corner, item)
-    found = []
+    doubted = []
     for at, doubt, rivals in worst.values():
-        found.append((at, doubt))
-        found += [(other, told.get(other, doubt)) for other in rivals if other in told]
-    return found
+        doubted.append((at, doubt))
+        doubted += [(other, doubt_at.get(other, doubt)) for other in rivals if other in doubt_at]
+    return doubted
 
 
 def _reading(model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, tip: int) -> str:
@@ -210,13 +210,13 @@ def _reading(model: PanelModel, readings: PanelReadings, sheet: PanelInstrument,
 def _doubt(
     model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, tip: int, error: float, w: float
 ) -> Doubt:
-    told = model.tips
+    tips = model.tips
     return Doubt(
-        corner=model.layout.corners[told.corner[tip]],
-        panel=model.layout.panels[told.panel[tip]],
-        gauge=sheet.gauge[told.gauge[tip]].name,
-        member=readings.member[told.row[tip]],
-        where=readings.where[told.row[tip]],
+        corner=model.layout.corners[tips.corner[tip]],
+        panel=model.layout.panels[tips.panel[tip]],
+        gauge=sheet.gauge[tips.gauge[tip]].name,
+        member=readings.member[tips.row[tip]],
+        where=readings.where[tips.row[tip]],
         error=float(error),
         w=float(w),
         rivals=(),
@@ -230,8 +230,8 @@ def times_read(model: PanelModel, solution: LeastSquaresSolution) -> np.ndarray:
     for fit, block in zip(solution.fits, model.blocks, strict=False):
         tip = block[fit.active]
         panel, corner = model.tips.panel[tip], model.tips.corner[tip]
-        mine = model.layout.quad[panel] == corner[:, None]
-        row, place = np.nonzero(mine)
+        at_corner = model.layout.quad[panel] == corner[:, None]
+        row, place = np.nonzero(at_corner)
         np.add.at(times, (panel[row], place), 1)
     return times
 
@@ -248,6 +248,48 @@ def meetings(layout: PanelLayout, taken: np.ndarray) -> np.ndarray:
     return meet
 
 
+@dataclass(frozen=True, eq=False)
+class CornerHeights:
+    """Heights at corners from those of the panels that were read there, m.
+
+    relative, u_relative   (p, 4) beside the mean of those that meet, nan where fewer than two do
+    mean, u_mean           (c,) of those that meet, nan where none was read
+    """
+
+    relative: np.ndarray
+    u_relative: np.ndarray
+    mean: np.ndarray
+    u_mean: np.ndarray
+
+
+def _corner_heights(
+    layout: PanelLayout, model: PanelModel, solution: LeastSquaresSolution, departure: np.ndarray, times: np.ndarray
+) -> CornerHeights:
+    """What the panels' departures (p, 4) say at each corner, of those that were read there `times` above none."""
+    meet = meetings(layout, times > 0)
+    on = meet >= 0
+    count = on.sum(axis=1)
+    flat, u_map = departure.ravel(), model.u_target.ravel()
+    share = np.where(on, 1.0 / np.maximum(count, 1)[:, None], 0.0)
+    mean = np.where(count > 0, np.sum(np.where(on, flat[meet], 0.0) * share, axis=1), np.nan)
+    maps = np.where(on, u_map[meet] ** 2, 0.0)
+
+    def variance(weight: np.ndarray) -> np.ndarray:
+        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
+        inside = solution.q.products(meet, weight)
+        return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
+
+    beside, u_beside = np.full(len(flat), np.nan), np.full(len(flat), np.nan)
+    several = count > 1
+    for k in range(meet.shape[1]):
+        here = several & on[:, k]
+        weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
+        beside[meet[here, k]] = flat[meet[here, k]] - mean[here]
+        u_beside[meet[here, k]] = np.sqrt(variance(weight)[here])
+    u_mean = np.where(count > 0, np.sqrt(variance(share)), np.nan)
+    return CornerHeights(beside.reshape(departure.shape), u_beside.reshape(departure.shape), mean, u_mean)
+
+
 def _heights(
     layout: PanelLayout,
     sheet: PanelInstrument,
@@ -262,27 +304,7 @@ def _heights(
     departure = solution.x[:many].reshape(shape) - model.target
     u_departure = np.hypot(np.sqrt(solution.q.diagonal()[:many].reshape(shape)), model.u_target)
     times = times_read(model, solution)
-    meet = meetings(layout, times > 0)
-    on = meet >= 0
-    count = on.sum(axis=1)
-    flat, u_map = departure.ravel(), model.u_target.ravel()
-    share = np.where(on, 1.0 / np.maximum(count, 1)[:, None], 0.0)
-    mean = np.where(count > 0, np.sum(np.where(on, flat[meet], 0.0) * share, axis=1), np.nan)
-    maps = np.where(on, u_map[meet] ** 2, 0.0)
-
-    def variance(weight: np.ndarray) -> np.ndarray:
-        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
-        inside = solution.q.products(meet, weight)
-        return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
-
-    beside, u_beside = np.full(many, np.nan), np.full(many, np.nan)
-    several = count > 1
-    for k in range(meet.shape[1]):
-        mine = several & on[:, k]
-        weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
-        beside[meet[mine, k]] = flat[meet[mine, k]] - mean[mine]
-        u_beside[meet[mine, k]] = np.sqrt(variance(weight)[mine])
-    relative, u_relative = beside.reshape(shape), u_beside.reshape(shape)
+    corners = _corner_heights(layout, model, solution, departure, times)
     goal, pitch = sheet.goal_um * 1e-6, sheet.screw.pitch_mm * MILLIMETRE
     sense = 1.0 if sheet.screw.clockwise == "raises" else -1.0
     fit, u_fit = panel_fits(layout, solution, departure, model.u_target)
@@ -296,13 +318,13 @@ def _heights(
         times=times,
         departure=departure,
         u_departure=u_departure,
-        relative=relative,
-        u_relative=u_relative,
-        conforms=conformity(relative, u_relative, goal),
-        turns=-sense * relative / pitch,
-        u_turns=u_relative / pitch,
-        actuator=mean,
-        u_actuator=np.where(count > 0, np.sqrt(variance(share)), np.nan),
+        relative=corners.relative,
+        u_relative=corners.u_relative,
+        conforms=conformity(corners.relative, corners.u_relative, goal),
+        turns=-sense * corners.relative / pitch,
+        u_turns=corners.u_relative / pitch,
+        actuator=corners.mean,
+        u_actuator=corners.u_mean,
         fit=fit,
         u_fit=u_fit,
         doubts=doubts,
@@ -341,26 +363,26 @@ def panel_fits(
     return np.einsum("pkc,pc->pk", gain, departure), np.sqrt(variance)
 
 
-def surface_rms(found: PanelHeights, departure: np.ndarray) -> tuple[float, np.ndarray]:
+def surface_rms(heights: PanelHeights, departure: np.ndarray) -> tuple[float, np.ndarray]:
     """Rms (m) of departures (p, 4) about the rigid motion of the whole dish that fits them best, and what is left.
 
     Shift and tilts only, five columns: normals, and arms × normals about x and y; a turn about the axis does nothing.
     """
-    at = axes(found.layout.xy[found.layout.quad].reshape(-1, 2), found.layout.focal_length)
+    at = axes(heights.layout.xy[heights.layout.quad].reshape(-1, 2), heights.layout.focal_length)
     arm = np.cross(at.origin, at.z)
     design = np.column_stack([at.z, arm[:, :2] / 50.0])
     rest = departure.ravel() - design @ np.linalg.lstsq(design, departure.ravel(), rcond=1e-9)[0]
     return float(np.sqrt(np.mean(rest**2))), rest.reshape(departure.shape)
 
 
-def weighed_squares(found: PanelHeights) -> tuple[np.ndarray, np.ndarray]:
+def weighed_squares(heights: PanelHeights) -> tuple[np.ndarray, np.ndarray]:
     """Of each tip: its part of v' C^-1 v and its redundancy; they add up to a variance factor of any set of readings.
 
     Part is v (C^-1 v), exact in sum also with correlations; nan of readings left out.
     """
-    part = np.full(len(found.model.tips.row), np.nan)
+    part = np.full(len(heights.model.tips.row), np.nan)
     redundancy = np.full(len(part), np.nan)
-    for fit, block in zip(found.solution.fits, found.model.blocks, strict=False):
+    for fit, block in zip(heights.solution.fits, heights.model.blocks, strict=False):
         pv = fit.standardised * NONCENTRALITY / fit.detectable_error
         part[block] = np.where(fit.active, fit.residual * pv, np.nan)
         redundancy[block] = np.where(fit.active, fit.redundancy, np.nan)

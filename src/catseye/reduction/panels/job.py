@@ -1,4 +1,4 @@
-"""From the files of a crew to everything that is told of its work."""
+"""From the files of a crew to heights as found and as left, what turning the screws did, and notes for its report."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class PanelFiles:
 
 @dataclass(frozen=True, eq=False)
 class PanelWork:
-    """What was found, and what the screws did if there are readings as left.
+    """Heights as found and, if the crew read again, as left, with what turning the screws did between.
 
     layout    the whole one
     found, left   heights as found and as left
@@ -75,9 +75,9 @@ def panel_work(
     progress   told of each step
     """
 
-    def say(what: str, done: int) -> None:
+    def say(what: str, turning: int) -> None:
         if progress is not None:
-            progress(what, done, 4)
+            progress(what, turning, 4)
 
     say("reading", 0)
     sheet = read_record(files.sheet, PanelInstrument)
@@ -100,42 +100,55 @@ def panel_work(
     readings = read_panel_readings(files.readings, layout, sheet)
     inputs[readings.file] = readings.digest
     say("solving as found", 2)
-    found = reduce_panels(readings, layout, sheet, survey=survey, maps=maps, reject=reject)
-    left = None
+    as_found = reduce_panels(readings, layout, sheet, survey=survey, maps=maps, reject=reject)
+    as_left = None
     if files.as_left is not None:
         again = read_panel_readings(files.as_left, layout, sheet)
         inputs[again.file] = again.digest
         say("solving as left", 3)
-        left = reduce_panels(again, layout, sheet, survey=later, maps=maps, reject=reject)
-    done = None if left is None else setting(found, left)
-    return PanelWork(layout, sheet, found, left, done, maps, inputs, tuple(_notes(files, layout, found, left, done)))
+        as_left = reduce_panels(again, layout, sheet, survey=later, maps=maps, reject=reject)
+    turning = None if as_left is None else setting(as_found, as_left)
+    return PanelWork(
+        layout,
+        sheet,
+        as_found,
+        as_left,
+        turning,
+        maps,
+        inputs,
+        tuple(_notes(files, layout, as_found, as_left, turning)),
+    )
 
 
-def verdicts(found: PanelHeights) -> np.ndarray:
+def verdicts(heights: PanelHeights) -> np.ndarray:
     """(p, 4) words: "leave", "turn", "read" where no reading is used, "alone" where no other panel is beside it.
 
     Left alone is what is within the goal with a probability of 0.95, and what a turn would not bring nearer to that by
     0.05: after it a corner is known as well as now, and as well as a turn is made.
     """
-    screw = found.sheet.screw
-    after = np.hypot(found.u_relative, screw.u_turn * screw.pitch_mm * MILLIMETRE)
-    gained = conformity(np.zeros_like(after), after, found.sheet.goal_um * 1e-6) - found.conforms
-    said = np.where((found.conforms >= SURE) | (gained < 1.0 - SURE), "leave", "turn")
-    return np.where(found.known, said, np.where(found.times > 0, "alone", "read"))
+    screw = heights.sheet.screw
+    after = np.hypot(heights.u_relative, screw.u_turn * screw.pitch_mm * MILLIMETRE)
+    gained = conformity(np.zeros_like(after), after, heights.sheet.goal_um * 1e-6) - heights.conforms
+    verdict = np.where((heights.conforms >= SURE) | (gained < 1.0 - SURE), "leave", "turn")
+    return np.where(heights.known, verdict, np.where(heights.times > 0, "alone", "read"))
 
 
-def beyond_lean(found: PanelHeights) -> list[str]:
+def beyond_lean(heights: PanelHeights) -> list[str]:
     """Placements whose lean is over the sheet's limit."""
-    lean = np.hypot(*found.readings.lean.T) / ARCSECOND / 60.0
-    far = np.flatnonzero(np.nan_to_num(lean) > found.sheet.lean_limit_arcmin)
-    return [f"{found.readings.where[k]} ({lean[k]:.1f}′)" for k in far]
+    lean = np.hypot(*heights.readings.lean.T) / ARCSECOND / 60.0
+    far = np.flatnonzero(np.nan_to_num(lean) > heights.sheet.lean_limit_arcmin)
+    return [f"{heights.readings.where[k]} ({lean[k]:.1f}′)" for k in far]
 
 
 def _notes(
-    files: PanelFiles, layout: PanelLayout, found: PanelHeights, left: PanelHeights | None, done: Setting | None
+    files: PanelFiles,
+    layout: PanelLayout,
+    as_found: PanelHeights,
+    as_left: PanelHeights | None,
+    turning: Setting | None,
 ) -> list[str]:
     notes = []
-    if not found.surveyed:
+    if not as_found.surveyed:
         notes.append(
             "No survey of the actuators: heights of the whole surface hang on u_set_um alone, only relative heights "
             "at a corner are measured; the gauges touch panels beside the corner, so that even these carry the "
@@ -143,14 +156,16 @@ def _notes(
         )
     if files.maps is None:
         notes.append("No maps of panels: corners are set as if every panel had its design's shape.")
-    elif not found.model.mapped.all():
-        bare = [n for n, mapped in zip(found.layout.panels, found.model.mapped, strict=True) if not mapped]
-        notes.append(f"{len(bare)} of {len(found.layout.panels)} panels read have no map ({bare[0]} among them).")
-    if len(found.layout.panels) < len(layout.panels):
-        notes.append(f"{len(found.layout.panels)} of {len(layout.panels)} panels were read; the rest is not told of.")
-    if np.isnan(found.readings.lean[found.readings.corner >= 0, 0]).any():
+    elif not as_found.model.mapped.all():
+        bare = [n for n, mapped in zip(as_found.layout.panels, as_found.model.mapped, strict=True) if not mapped]
+        notes.append(f"{len(bare)} of {len(as_found.layout.panels)} panels read have no map ({bare[0]} among them).")
+    if len(as_found.layout.panels) < len(layout.panels):
+        notes.append(
+            f"{len(as_found.layout.panels)} of {len(layout.panels)} panels were read; the rest is not told of."
+        )
+    if np.isnan(as_found.readings.lean[as_found.readings.corner >= 0, 0]).any():
         notes.append("Where no lean was read, the shaft counts as upright within the sheet's limit over root three.")
-    for name, one in (("as found", found), ("as left", left)):
+    for name, one in (("as found", as_found), ("as left", as_left)):
         if one is None:
             continue
         far = beyond_lean(one)
@@ -162,6 +177,6 @@ def _notes(
                 f"{name}: at {', '.join(again[:6])}{' ...' if len(again) > 6 else ''} nothing tells which of two "
                 "readings is wrong; a placement in another turn would."
             )
-    if left is not None and done is None:
+    if as_left is not None and turning is None:
         notes.append("As found and as left have fewer than three corners in common: nothing is said of the turns.")
     return notes

@@ -58,35 +58,35 @@ class FittedMap:
         return np.linalg.solve(normal + 1e-9 * np.eye(3), right)[:, 0, 0]
 
 
-def fitted_map(given: PanelMap) -> FittedMap:
+def fitted_map(panel_map: PanelMap) -> FittedMap:
     """Piston and two tilts that fit a map best, robustly, and the shape that is left.
 
-    given   a map; its own tilt is how the panel lay on the machine and says nothing of the panel
+    panel_map   a map; its own tilt is how the panel lay on the machine and says nothing of the panel
 
     Huber's weights with the scale from the median absolute residual.
 
     Source: [HUBER09] (reweighting).
     """
-    k = len(given.deviation)
-    design = np.column_stack([np.ones(k), given.xy])
-    size = np.array([1.0, *np.maximum(np.abs(given.xy).max(axis=0), 1e-3)])
+    k = len(panel_map.deviation)
+    design = np.column_stack([np.ones(k), panel_map.xy])
+    size = np.array([1.0, *np.maximum(np.abs(panel_map.xy).max(axis=0), 1e-3)])
     weight, fit = np.ones(k), np.zeros(3)
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
-        found = np.linalg.lstsq(design / size * root[:, None], given.deviation * root, rcond=None)[0] / size
-        rest = given.deviation - design @ found
-        moved = float(np.max(np.abs(design @ (found - fit))))
-        fit = found
+        refitted = np.linalg.lstsq(design / size * root[:, None], panel_map.deviation * root, rcond=None)[0] / size
+        rest = panel_map.deviation - design @ refitted
+        moved = float(np.max(np.abs(design @ (refitted - fit))))
+        fit = refitted
         scale = MAD_TO_SIGMA * float(np.median(np.abs(rest)))
         if moved < SETTLED or scale == 0.0:
             break
         weight = huber(rest / scale)
-    rest = given.deviation - design @ fit
+    rest = panel_map.deviation - design @ fit
     s = float(np.sqrt(np.sum(weight * rest**2) / max(k - 3, 1)))
     q = np.linalg.inv(design.T @ (design * weight[:, None]))
     return FittedMap(
-        given.panel,
-        given.xy,
+        panel_map.panel,
+        panel_map.xy,
         rest,
         fit,
         s * np.sqrt(np.diag(q)),

@@ -65,18 +65,23 @@ class PanelColumns:
 
     @property
     def size(self) -> int:
+        """How many parameters there are."""
         return 4 * self.panels + self.corners + 6 * self.sessions
 
     def height(self, panel: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Columns of the heights of panels' corners, by panel and place 0 to 3."""
         return 4 * panel + place
 
     def shaft(self, corner: np.ndarray) -> np.ndarray:
+        """Columns of the shafts' heights, by corner of the dish."""
         return 4 * self.panels + corner
 
     def zero(self, session: np.ndarray, gauge: np.ndarray) -> np.ndarray:
+        """Columns of the gauges' zeros, by session and gauge 0 to 3."""
         return 4 * self.panels + self.corners + 6 * session + gauge
 
     def level(self, session: np.ndarray, axis: int) -> np.ndarray:
+        """Columns of the level's zeros, by session and axis 0 or 1."""
         return 4 * self.panels + self.corners + 6 * session + 4 + axis
 
 
@@ -104,7 +109,7 @@ class Tips:
     rise: np.ndarray
 
 
-def tips(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument) -> Tips:
+def tips_of(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument) -> Tips:
     """What each reading touched; InputError for one where no panel is."""
     on = np.isfinite(readings.reading) & (readings.corner >= 0)[:, None]
     row, gauge = np.nonzero(on)
@@ -125,27 +130,27 @@ def tips(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument) -
     return Tips(row, gauge, corner, panel, share, tool, place, at, rise)
 
 
-def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, told: Tips) -> np.ndarray:
+def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, tips: Tips) -> np.ndarray:
     """(n,) m, readings without what the sheet knows of the gauges.
 
     r + linearity, over 1 + scale, less zero per °C; a tip sags by sag · cos(slope) on the dish and by sag on the flat,
     so that it reads sag (1 - cos) too low. Raises InputError where a correction needs a column that is not there.
     """
-    raw = readings.reading[told.row, told.gauge]
-    result = gauge_corrected(raw, told.gauge, sheet)
-    warm = np.array([g.zero_um_per_c for g in sheet.gauge])[told.gauge] * MICROMETRE
-    sag = np.array([g.sag_um for g in sheet.gauge])[told.gauge] * MICROMETRE
+    raw = readings.reading[tips.row, tips.gauge]
+    result = gauge_corrected(raw, tips.gauge, sheet)
+    warm = np.array([g.zero_um_per_c for g in sheet.gauge])[tips.gauge] * MICROMETRE
+    sag = np.array([g.sag_um for g in sheet.gauge])[tips.gauge] * MICROMETRE
     for name, factor, values in (
-        ("temperature_c", warm, readings.temperature_c[told.row]),
-        ("elevation_deg", sag, readings.elevation[told.row]),
+        ("temperature_c", warm, readings.temperature_c[tips.row]),
+        ("elevation_deg", sag, readings.elevation[tips.row]),
     ):
         missing = (factor != 0.0) & np.isnan(values)
         if missing.any():
-            where = readings.where[told.row[int(np.argmax(missing))]]
+            where = readings.where[tips.row[int(np.argmax(missing))]]
             raise refusal(readings.file, f"{where}, {name} is blank (expected a value: the sheet's gauges need it)")
-    warmer = np.nan_to_num(readings.temperature_c[told.row] - sheet.flat_temperature_c)
-    normal = axes(layout.xy[told.corner], layout.focal_length).z
-    upright = cosine_of_slope(normal, np.nan_to_num(readings.elevation[told.row], nan=np.pi / 2.0))
+    warmer = np.nan_to_num(readings.temperature_c[tips.row] - sheet.flat_temperature_c)
+    normal = axes(layout.xy[tips.corner], layout.focal_length).z
+    upright = cosine_of_slope(normal, np.nan_to_num(readings.elevation[tips.row], nan=np.pi / 2.0))
     return result - warm * warmer + np.where(sag != 0.0, sag * (1.0 - upright), 0.0)
 
 
@@ -153,11 +158,11 @@ def gauge_corrected(raw: np.ndarray, gauge: np.ndarray, sheet: PanelInstrument) 
     """Readings (n,) m of gauges (n,) with linearity and scale taken out."""
     result = np.array(raw)
     for k, g in enumerate(sheet.gauge):
-        mine = gauge == k
+        of_gauge = gauge == k
         if g.linearity:
             at, correction = np.array(g.linearity).T
-            result[mine] += np.interp(result[mine], at * MILLIMETRE, correction * MICROMETRE)
-        result[mine] /= 1.0 + g.scale_ppm * 1e-6
+            result[of_gauge] += np.interp(result[of_gauge], at * MILLIMETRE, correction * MICROMETRE)
+        result[of_gauge] /= 1.0 + g.scale_ppm * 1e-6
     return result
 
 
@@ -212,24 +217,24 @@ def panel_model(
     survey     heights of shafts
     maps       by panel
     """
-    told = tips(readings, layout, sheet)
+    tips = tips_of(readings, layout, sheet)
     columns = PanelColumns(len(layout.panels), len(layout.corners), len(readings.sessions))
     places = corner_places(layout)
-    shape, between = _mapped(layout, told, places, maps or {})
+    shape, between = _mapped(layout, tips, places, maps or {})
     mapped = np.array([name in (maps or {}) for name in layout.panels])
-    observed = corrected(readings, layout, sheet, told) - told.rise - between
-    lean = readings.lean[told.row]
+    observed = corrected(readings, layout, sheet, tips) - tips.rise - between
+    lean = readings.lean[tips.row]
     read = np.isfinite(lean[:, 0])
-    observed = observed - np.sum(np.nan_to_num(lean) * told.tool, axis=1)
+    observed = observed - np.sum(np.nan_to_num(lean) * tips.tool, axis=1)
     names = np.array([-1])
-    level = [np.where(read, columns.level(readings.session[told.row], k), names) for k in (0, 1)]
+    level = [np.where(read, columns.level(readings.session[tips.row], k), names) for k in (0, 1)]
     at = np.column_stack(
-        [columns.height(told.panel[:, None], np.arange(4)), columns.shaft(told.corner),
-         columns.zero(readings.session[told.row], told.gauge), *level]
+        [columns.height(tips.panel[:, None], np.arange(4)), columns.shaft(tips.corner),
+         columns.zero(readings.session[tips.row], tips.gauge), *level]
     )  # fmt: skip
     n = len(observed)
-    factor = np.column_stack([told.share, -np.ones(n), np.ones(n), np.where(read[:, None], -told.tool, 0.0)])
-    groups, blocks = _reading_groups(layout, sheet, told, mapped, (observed, at, factor, read))
+    factor = np.column_stack([tips.share, -np.ones(n), np.ones(n), np.where(read[:, None], -tips.tool, 0.0)])
+    groups, blocks = _reading_groups(layout, sheet, tips, mapped, (observed, at, factor, read))
     prior, target = sheet.panel, layout.offset + shape
     u_target = np.where(mapped, prior.u_map_um * MICROMETRE, 0.0)[:, None] * np.ones(4)
     more = [
@@ -238,28 +243,28 @@ def panel_model(
         _warps(layout, sheet, places, target, mapped),
         _shafts(layout, sheet, columns, survey),
     ]
-    return PanelModel(layout, columns, told, (*groups, *more), blocks, target, u_target, mapped)
+    return PanelModel(layout, columns, tips, (*groups, *more), blocks, target, u_target, mapped)
 
 
 def _mapped(
-    layout: PanelLayout, told: Tips, places: np.ndarray, maps: Mapping[str, FittedMap]
+    layout: PanelLayout, tips: Tips, places: np.ndarray, maps: Mapping[str, FittedMap]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shape of panels at their corners (p, 4), and at tips (n,) beside what the corners share out, m."""
-    shape, between = np.zeros((len(layout.panels), 4)), np.zeros(len(told.row))
-    own = panel_axes(layout, told.panel, told.at)
+    shape, between = np.zeros((len(layout.panels), 4)), np.zeros(len(tips.row))
+    own = panel_axes(layout, tips.panel, tips.at)
     for p, name in enumerate(layout.panels):
         if name in maps:
             shape[p] = maps[name].at(places[p])
-            mine = np.flatnonzero(told.panel == p)
-            if len(mine):
-                between[mine] = maps[name].at(own[mine]) - told.share[mine] @ shape[p]
+            on_panel = np.flatnonzero(tips.panel == p)
+            if len(on_panel):
+                between[on_panel] = maps[name].at(own[on_panel]) - tips.share[on_panel] @ shape[p]
     return shape, between
 
 
 def _reading_groups(
     layout: PanelLayout,
     sheet: PanelInstrument,
-    told: Tips,
+    tips: Tips,
     mapped: np.ndarray,
     rows: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
 ) -> tuple[list[OwnColumns], tuple[np.ndarray, ...]]:
@@ -269,11 +274,11 @@ def _reading_groups(
     single = (sheet.u_gauge_um**2 + sheet.resolution_um**2 / 12.0) * MICROMETRE**2
     lean = (sheet.u_lean_arcsec * ARCSECOND) ** 2
     free = (sheet.lean_limit_arcmin * 60.0 * ARCSECOND) ** 2 / 3.0
-    slope = np.where(mapped, prior.u_map_slope_urad, prior.u_slope_urad)[told.panel] * 1e-6
-    shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)[told.panel] * MICROMETRE
-    at_home = np.any(layout.quad[told.panel] == told.corner[:, None], axis=1)
+    slope = np.where(mapped, prior.u_map_slope_urad, prior.u_slope_urad)[tips.panel] * 1e-6
+    shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)[tips.panel] * MICROMETRE
+    at_home = np.any(layout.quad[tips.panel] == tips.corner[:, None], axis=1)
     shape = np.where(at_home, 0.0, shape)  # a panel without a corner here: its edge may lie off its corners' line
-    _, start, count = np.unique(told.corner, return_index=True, return_counts=True)
+    _, start, count = np.unique(tips.corner, return_index=True, return_counts=True)
     groups, blocks = [], []
     for size in np.unique(count):
         which = (start[count == size][:, None] + np.arange(size)).astype(int)  # (b, r)
@@ -287,9 +292,9 @@ def _reading_groups(
             return values[which][:, :, None] == values[which][:, None, :]
 
         weight = read.astype(float)
-        c = single * np.eye(size) + np.where(same(told.row), pairs(told.tool), 0.0) * pairs(weight) * lean
-        c = c + pairs(told.place) * pairs(1.0 - weight) * free
-        c = c + np.where(same(told.panel), pairs(told.place) * pairs(slope) + pairs(shape), 0.0)
+        c = single * np.eye(size) + np.where(same(tips.row), pairs(tips.tool), 0.0) * pairs(weight) * lean
+        c = c + pairs(tips.place) * pairs(1.0 - weight) * free
+        c = c + np.where(same(tips.panel), pairs(tips.place) * pairs(slope) + pairs(shape), 0.0)
         flat = which.ravel()
         groups.append(OwnColumns(f"readings of {size}", observed[flat], c, at[flat], factor[flat]))
         blocks.append(flat)
@@ -303,11 +308,13 @@ def flat_means(readings: PanelReadings, sheet: PanelInstrument) -> tuple[np.ndar
     warm = np.nan_to_num(readings.temperature_c - sheet.flat_temperature_c)
     for s in range(sessions):
         for g, gauge in enumerate(sheet.gauge):
-            mine = np.flatnonzero((readings.corner < 0) & (readings.session == s) & np.isfinite(readings.reading[:, g]))
-            many[s, g] = len(mine)
-            if len(mine):
-                value = gauge_corrected(readings.reading[mine, g], np.full(len(mine), g), sheet)
-                mean[s, g] = np.mean(value - gauge.zero_um_per_c * MICROMETRE * warm[mine])
+            on_flat = np.flatnonzero(
+                (readings.corner < 0) & (readings.session == s) & np.isfinite(readings.reading[:, g])
+            )
+            many[s, g] = len(on_flat)
+            if len(on_flat):
+                value = gauge_corrected(readings.reading[on_flat, g], np.full(len(on_flat), g), sheet)
+                mean[s, g] = np.mean(value - gauge.zero_um_per_c * MICROMETRE * warm[on_flat])
     return mean, many
 
 
@@ -343,8 +350,8 @@ def _warps(
     """A panel is stiff: its four corners lie as it was made, but for the twist that four screws force on it."""
     null = warps(places)
     prior = sheet.panel
-    made = np.where(mapped, prior.u_map_um, prior.u_shape_um)
-    u = np.sqrt(prior.u_twist_um**2 + made**2 * np.sum(null**2, axis=1)) * MICROMETRE
+    u_shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)
+    u = np.sqrt(prior.u_twist_um**2 + u_shape**2 * np.sum(null**2, axis=1)) * MICROMETRE
     at = np.arange(4 * len(layout.panels)).reshape(-1, 4)
     return OwnColumns("warps", np.sum(null * target, axis=1), u**2, at, null)
 
@@ -369,12 +376,12 @@ def used_layout(
 
     Raises InputError where nothing was read but the flat.
     """
-    told = tips(readings, layout, sheet)
-    panels = np.unique(told.panel)
+    tips = tips_of(readings, layout, sheet)
+    panels = np.unique(tips.panel)
     if not len(panels):
         raise InputError(f"{readings.file}: holds no reading at a corner (expected placements beside {'FLAT'})")
     corners = np.unique(layout.quad[panels])
-    lost = np.setdiff1d(told.corner, corners)
+    lost = np.setdiff1d(tips.corner, corners)
     if len(lost):
         raise InputError(
             f"{readings.file}: at {layout.corners[lost[0]]} no panel with a corner there was read (expected one)"

@@ -14,8 +14,7 @@ right that the secant multiplies: a distance changes by less than the depth does
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +24,14 @@ from catseye.optics.retroreflector import prism
 from catseye.signal.cycles.whole import whole_cycles
 
 Array = NDArray[np.float64]
+Values = float | Array
 
 
 @dataclass(frozen=True, eq=False)
 class TripletReadings:
     """Readings and constants, arrays that broadcast together; metres, radians. `_fp` is after the flip.
+
+    A number becomes an array without axes.
 
     phi_1, phi_2, phi_zrg, phi_cal            phases, prisms towards the ranger
     phi_bcfp, phi_zrg_fp, phi_cal_fp          phases, ball towards the ranger
@@ -42,38 +44,38 @@ class TripletReadings:
     modulation_hz                             Hz
     """
 
-    phi_1: Any
-    phi_2: Any
-    phi_zrg: Any
-    phi_cal: Any
-    phi_bcfp: Any
-    phi_zrg_fp: Any
-    phi_cal_fp: Any
-    eta_a: Any
-    eta_a_fp: Any
-    d_toppl: Any
-    h_s: Any
-    d_12: Any
-    l_1: Any
-    l_2: Any
-    l_bt: Any
-    l_post: Any
-    height_1: Any
-    height_2: Any
-    hrp_1: Any
-    hrp_2: Any
-    pc_1: Any
-    pc_2: Any
-    pc_b: Any
-    r_1: Any
-    n: Any
-    ball_along: Any = 0.0
-    ball_up: Any = 0.0
-    modulation_hz: Any = 1500e6
+    phi_1: Array
+    phi_2: Array
+    phi_zrg: Array
+    phi_cal: Array
+    phi_bcfp: Array
+    phi_zrg_fp: Array
+    phi_cal_fp: Array
+    eta_a: Array
+    eta_a_fp: Array
+    d_toppl: Array
+    h_s: Array
+    d_12: Array
+    l_1: Array
+    l_2: Array
+    l_bt: Array
+    l_post: Array
+    height_1: Array
+    height_2: Array
+    hrp_1: Array
+    hrp_2: Array
+    pc_1: Array
+    pc_2: Array
+    pc_b: Array
+    r_1: Array
+    n: Array
+    ball_along: Array = field(default_factory=lambda: np.asarray(0.0))
+    ball_up: Array = field(default_factory=lambda: np.asarray(0.0))
+    modulation_hz: Array = field(default_factory=lambda: np.asarray(1500e6))
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
+        for each in fields(self):
+            object.__setattr__(self, each.name, np.asarray(getattr(self, each.name), dtype=float))
 
     def moved(self, by: Mapping[str, Array]) -> "TripletReadings":
         """The same with some readings changed by something."""

@@ -16,32 +16,32 @@ MERCURY = (640.0, 790.0)  # a barometer's reading in mm of mercury below 1.4 km
 HPA_OF_MERCURY = 1.33322
 
 
-def triplet_notes(found: TripletReduction) -> Iterator[str]:
+def triplet_notes(reduction: TripletReduction) -> Iterator[str]:
     """Lines about whole cycles, contradictions, the memo's own formulas, the glass and the sheet."""
-    yield from _placements(found)
-    yield from _memo(found)
-    yield from _glass(found)
-    yield from _sheet(found)
+    yield from _placements(reduction)
+    yield from _memo(reduction)
+    yield from _glass(reduction)
+    yield from _sheet(reduction)
 
 
-def _placements(found: TripletReduction) -> Iterator[str]:
-    for number, status in enumerate(found.status, start=1):
+def _placements(reduction: TripletReduction) -> Iterator[str]:
+    for number, status in enumerate(reduction.status, start=1):
         if status not in ("good", "suspect"):
-            margin = float(found.cycles.margin[number - 1]) * 1e3
+            margin = float(reduction.cycles.margin[number - 1]) * 1e3
             yield f"placement {number}: {status}, margin {margin:.1f} mm: check d_toppl_mm and the phases"
-    seen: dict[tuple[float, ...], int] = {}
-    for number, each in enumerate(found.measurement.placement, start=1):
+    number_of: dict[tuple[float, ...], int] = {}
+    for number, each in enumerate(reduction.measurement.placement, start=1):
         phases = (each.spacer_mm, each.d_toppl_mm, each.phi_1_rad, each.phi_2_rad, each.phi_bcfp_rad)
-        first = seen.setdefault(phases, number)
+        first = number_of.setdefault(phases, number)
         if first != number:
             yield f"placement {number} repeats the phases of placement {first} to the last digit: no new measurement"
-    names = [str(k + 1) for k in found.suspects]
-    rest = found.h_corr_without_suspects
+    names = [str(k + 1) for k in reduction.suspects]
+    rest = reduction.h_corr_without_suspects
     if names and np.isfinite(rest):
         yield f"placement {', '.join(names)}: contradicts the others; kept; without: H_corr {rest * 1e3:+.4f} mm"
     elif names:
         yield f"placements {', '.join(names)} contradict each other: nothing says which is wrong; all are kept"
-    for number, (step, u) in enumerate(zip(found.steps, found.u_steps, strict=True), start=1):
+    for number, (step, u) in enumerate(zip(reduction.steps, reduction.u_steps, strict=True), start=1):
         if np.isfinite(step) and abs(step) > 4.0 * u > 0.0:
             yield (
                 f"placement {number}: by ranging the stops stand {step * 1e6:+.1f} µm (u {u * 1e6:.1f}) from where the "
@@ -49,9 +49,9 @@ def _placements(found: TripletReduction) -> Iterator[str]:
             )
 
 
-def _memo(found: TripletReduction) -> Iterator[str]:
-    own, memo = found.cycles, found.memo
-    for k in range(len(found.h)):
+def _memo(reduction: TripletReduction) -> Iterator[str]:
+    own, memo = reduction.cycles, reduction.memo
+    for k in range(len(reduction.h)):
         slips = [
             f"{name} = {int(theirs[k])} for {int(ours[k])}"
             for name, ours, theirs in (
@@ -63,38 +63,38 @@ def _memo(found: TripletReduction) -> Iterator[str]:
             yield f"placement {k + 1}: the memo's INT rule gives {', '.join(slips)}: a slip of a half wavelength"
         if np.isnan([memo.n_1[k], memo.n_2[k], memo.n_bc[k]]).any():
             yield f"placement {k + 1}: Phi_ZRG + Phi_Cal is far beyond the memo's 3.4b: no N by it; ours needs none"
-    off = memo.h_corr - found.h
+    off = memo.h_corr - reduction.h
     if np.any(np.abs(off[np.isfinite(off)]) > NOTABLE):
         worst = float(off[np.nanargmax(np.abs(off))])
         yield f"the memo's series for D_MP (3.19b) would move H_corr by up to {worst * 1e6:+.1f} µm: not used"
 
 
-def _glass(found: TripletReduction) -> Iterator[str]:
-    if abs(found.air_in_glass) > NOTABLE:
+def _glass(reduction: TripletReduction) -> Iterator[str]:
+    if abs(reduction.air_in_glass) > NOTABLE:
         yield (
-            f"if the index ratio belongs to 20 °C, 933 hPa, 50 %, H_corr is {found.air_in_glass * 1e6:+.2f} µm more: "
-            "give bk7_group_index to have it follow the air"
+            f"if the index ratio belongs to 20 °C, 933 hPa, 50 %, H_corr is {reduction.air_in_glass * 1e6:+.2f} µm "
+            "more: give bk7_group_index to have it follow the air"
         )
-    yield from _against_vacuum(found)
-    if np.isfinite(found.difference) and abs(found.difference) > 3.0 * found.u_difference:
-        text = f"ranging and surface plate differ by {found.difference / found.u_difference:+.1f} u"
-        if abs(found.agreeing_ratio - found.measurement.bk7_to_air_group_index_ratio) < ANY_MELT:
+    yield from _against_vacuum(reduction)
+    if np.isfinite(reduction.difference) and abs(reduction.difference) > 3.0 * reduction.u_difference:
+        text = f"ranging and surface plate differ by {reduction.difference / reduction.u_difference:+.1f} u"
+        if abs(reduction.agreeing_ratio - reduction.measurement.bk7_to_air_group_index_ratio) < ANY_MELT:
             text += (
-                f"; an index ratio of {found.agreeing_ratio:.6f} (u {found.u_agreeing_ratio:.6f}) would join them: "
-                "compare with other units"
+                f"; an index ratio of {reduction.agreeing_ratio:.6f} (u {reduction.u_agreeing_ratio:.6f}) would join "
+                "them: compare with other units"
             )
         yield text
-    if found.plate.paint is None:
+    if reduction.plate.paint is None:
         yield "no thickness of paint puts all three points within 0.15 mm of the bare top plate"
 
 
-def _against_vacuum(found: TripletReduction) -> Iterator[str]:
+def _against_vacuum(reduction: TripletReduction) -> Iterator[str]:
     """Told where the ratio is the makers' index of BK 7, which is against air, divided by the air's once more."""
-    m = found.measurement
+    m = reduction.measurement
     n, wavelength = m.bk7_to_air_group_index_ratio, m.wavelength_um
     if m.bk7_group_index is not None or not BK7_UM[0] <= wavelength <= BK7_UM[1]:
         return
-    eta = float(np.mean(found.readings.eta_a))
+    eta = float(np.mean(reduction.readings.eta_a))
     if abs(n - float(group_index(wavelength)) / eta) > SAME:
         return
     change = float(absolute_index(wavelength).group) / eta - n
@@ -107,8 +107,8 @@ def _against_vacuum(found: TripletReduction) -> Iterator[str]:
     )
 
 
-def _sheet(found: TripletReduction) -> Iterator[str]:
-    m = found.measurement
+def _sheet(reduction: TripletReduction) -> Iterator[str]:
+    m = reduction.measurement
     n = m.bk7_to_air_group_index_ratio
     if m.right_prism.serial != m.left_prism.serial + 1:
         yield f"serials {m.left_prism.serial} and {m.right_prism.serial} are no pair (figure 3: n and n + 1)"

@@ -13,14 +13,14 @@ place of H_corr it would leave e_b + e_p, and what R_1 is wrong by.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, SPEED_OF_LIGHT, TWO_PI
 from catseye.optics.retroreflector.prism import obliquity_correction
-from catseye.reduction.triplet.geometry import TripletReadings, triplet_cycles, triplet_lengths
+from catseye.reduction.triplet.geometry import TripletReadings, Values, triplet_cycles, triplet_lengths
 from catseye.reduction.triplet.tolerances import D_12, RATIO, TOLERANCE, ratio_change
 from catseye.reduction.triplet.use import ball_distance, median
 
@@ -45,35 +45,35 @@ class Departures:
     lean_x, lean_y                  on the telescope: the plate's normal beside where it is taken to point
     """
 
-    spacing: Any = 0.0
-    along: Any = 0.0
-    across: Any = 0.0
-    slip_along: Any = 0.0
-    slip_up: Any = 0.0
-    slip_out: Any = 0.0
-    scan_height: Any = 0.0
-    index: Any = 0.0
-    index_flipped: Any = 0.0
-    ratio: Any = 0.0
-    height: Any = 0.0
-    radius_1: Any = 0.0
-    radius_2: Any = 0.0
-    lean_x: Any = 0.0
-    lean_y: Any = 0.0
+    spacing: Values = 0.0
+    along: Values = 0.0
+    across: Values = 0.0
+    slip_along: Values = 0.0
+    slip_up: Values = 0.0
+    slip_out: Values = 0.0
+    scan_height: Values = 0.0
+    index: Values = 0.0
+    index_flipped: Values = 0.0
+    ratio: Values = 0.0
+    height: Values = 0.0
+    radius_1: Values = 0.0
+    radius_2: Values = 0.0
+    lean_x: Values = 0.0
+    lean_y: Values = 0.0
 
     @property
-    def prism_excess(self) -> Any:
+    def prism_excess(self) -> Values:
         """How much too long a range to a prism is, at normal incidence, m."""
         return (RATIO + self.ratio) * (HEIGHT + self.height) - RATIO * HEIGHT
 
     @property
-    def ball_excess(self) -> Any:
+    def ball_excess(self) -> Values:
         """How much too long a range to the ball's centre is, m."""
         small, large = R_1 + self.radius_1, R_2 + self.radius_2
         return (RATIO + self.ratio) * (small + large) - small - RATIO * (R_1 + R_2) + R_1
 
 
-def calibration_error(d: Departures, *, depth: Any = 18.0, aside: Any = 0.0, above: Any = 0.0) -> Array:
+def calibration_error(d: Departures, *, depth: Values = 18.0, aside: Values = 0.0, above: Values = 0.0) -> Array:
     """H_corr as the calibration finds it less the true one, m.
 
     d               departures
@@ -100,17 +100,25 @@ def calibration_error(d: Departures, *, depth: Any = 18.0, aside: Any = 0.0, abo
     cycle = 0.5 * SPEED_OF_LIGHT / MODULATION
     phi = [np.mod(-TWO_PI * way / cycle, TWO_PI) for way in ways]
     face = POST + FIDUCIALS + HEIGHT / RATIO
+    numbers = {
+        "phi_zrg": 0.0, "phi_cal": 0.0, "phi_zrg_fp": 0.0, "phi_cal_fp": 0.0, "eta_a": INDEX, "eta_a_fp": INDEX,
+        "d_12": D_12, "l_1": face, "l_2": face, "l_post": POST, "height_1": HEIGHT, "height_2": HEIGHT,
+        "hrp_1": HEIGHT / RATIO, "hrp_2": HEIGHT / RATIO, "pc_1": pc, "pc_2": pc, "pc_b": pc_b,
+        "r_1": R_1, "n": RATIO, "modulation_hz": MODULATION,
+    }  # fmt: skip
     readings = TripletReadings(
-        phi_1=phi[0], phi_2=phi[1], phi_bcfp=phi[2], phi_zrg=0.0, phi_cal=0.0, phi_zrg_fp=0.0, phi_cal_fp=0.0,
-        eta_a=INDEX, eta_a_fp=INDEX, d_toppl=depth, h_s=np.asarray(above) - d.scan_height, d_12=D_12,
-        l_1=face, l_2=face, l_bt=POST + BALL - R_1 - d.radius_1, l_post=POST,
-        height_1=HEIGHT, height_2=HEIGHT, hrp_1=HEIGHT / RATIO, hrp_2=HEIGHT / RATIO, pc_1=pc, pc_2=pc, pc_b=pc_b,
-        r_1=R_1, n=RATIO, modulation_hz=MODULATION,
-    )  # fmt: skip
+        phi_1=phi[0],
+        phi_2=phi[1],
+        phi_bcfp=phi[2],
+        d_toppl=np.asarray(depth),
+        h_s=np.asarray(above) - d.scan_height,
+        l_bt=np.asarray(POST + BALL - R_1 - d.radius_1),
+        **{name: np.asarray(number) for name, number in numbers.items()},
+    )
     return triplet_lengths(readings, triplet_cycles(readings)).h_corr - (BALL - FIDUCIALS)
 
 
-def telescope_error(d: Departures, *, scan_point: Any, h_error: Any = 0.0) -> Array:
+def telescope_error(d: Departures, *, scan_point: ArrayLike, h_error: Values = 0.0) -> Array:
     """Distance to the ball as two prism ranges give it less the true one to its centre, m.
 
     d            departures; of these the laboratory's (slips, indices of its air, h_S) do nothing here
@@ -217,9 +225,9 @@ def _causes() -> list[tuple[str, str, float, Mapping[str, float]]]:
     ]
 
 
-def _length(a: tuple[Any, ...], b: tuple[Any, ...]) -> Array:
+def _length(a: tuple[Values, ...], b: tuple[Values, ...]) -> Array:
     return np.asarray(np.sqrt(sum((np.asarray(p, dtype=float) - q) ** 2 for p, q in zip(a, b, strict=True))))
 
 
-def _obliquity(cosine: Any) -> Array:
+def _obliquity(cosine: Values) -> Array:
     return obliquity_correction(HEIGHT, RATIO, cosine)

@@ -54,7 +54,7 @@ def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, c
         for name, move in moves.items():
             stacked[name][2 * row] += move
             stacked[name][2 * row + 1] -= move
-    found: TripletLengths = triplet_lengths(readings.moved(stacked), cycles)
+    moved: TripletLengths = triplet_lengths(readings.moved(stacked), cycles)
 
     def half(values: Array) -> Array:
         values = np.broadcast_to(values, (2 * len(inputs), count))
@@ -62,9 +62,9 @@ def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, c
 
     return TripletShares(
         groups=tuple(group for group, _ in inputs),
-        h_corr=half(found.h_corr),
-        depth=half(found.depth_mp),
-        l_mpbc=half(found.l_mpbc)[:, 0],
+        h_corr=half(moved.h_corr),
+        depth=half(moved.depth_mp),
+        l_mpbc=half(moved.l_mpbc)[:, 0],
     )
 
 

@@ -56,12 +56,11 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
     difference = best.value - l_mpbc
     u_difference = float(np.linalg.norm(share - shares.l_mpbc)) if valid else math.nan
     others = np.setdiff1d(used, best.suspects)
-    slope = 0.5 * sum(p.height_mm for p in measurement.prisms) - measurement.ball.r1_mm - measurement.ball.r2_mm
-    by_sizes = np.array([group != "index ratio" for group in shares.groups])
+    agreeing_ratio, u_agreeing_ratio = _agreeing_ratio(measurement, shares, difference, share)
     steps, u_steps = _steps(measurement, lengths, shares)
     status = tuple(_status(measurement, k, lengths, cycles, best.suspects) for k in range(len(measurement.placement)))
     memo = memo_numbers(readings, cycles, lengths)
-    found = TripletReduction(
+    reduction = TripletReduction(
         measurement=measurement,
         readings=readings,
         cycles=cycles,
@@ -93,14 +92,12 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
         steps=steps,
         u_steps=u_steps,
         air_in_glass=_air_in_glass(measurement, readings, best.weights),
-        agreeing_ratio=measurement.bk7_to_air_group_index_ratio - difference / (slope * 1e-3),
-        u_agreeing_ratio=(
-            float(np.linalg.norm((share - shares.l_mpbc)[by_sizes])) / abs(slope * 1e-3) if valid else math.nan
-        ),
+        agreeing_ratio=agreeing_ratio,
+        u_agreeing_ratio=u_agreeing_ratio if valid else math.nan,
         status=status,
         notes=(),
     )
-    return _with_notes(found)
+    return replace(reduction, notes=tuple(triplet_notes(reduction)))
 
 
 def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
@@ -116,6 +113,9 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
 
     def column(name: str) -> Array:
         return np.array([getattr(each, name) for each in m.placement], dtype=float)
+
+    def metres(length_mm: float) -> Array:
+        return np.asarray(length_mm * 1e-3)
 
     def after(quantity: str, unit: str) -> Array:
         return np.array([each.flipped(quantity, unit) for each in m.placement], dtype=float)
@@ -141,21 +141,21 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
         eta_a_fp=eta_fp,
         d_toppl=column("d_toppl_mm") * 1e-3,
         h_s=column("h_s_mm") * 1e-3,
-        d_12=m.d12_mm * 1e-3,
-        l_1=plate.l1_mm * 1e-3,
-        l_2=plate.l2_mm * 1e-3,
-        l_bt=plate.l_bt_mm * 1e-3,
-        l_post=plate.l_post_mm * 1e-3,
-        height_1=left.height_mm * 1e-3,
-        height_2=right.height_mm * 1e-3,
-        hrp_1=left.hrp_mm * 1e-3,
-        hrp_2=right.hrp_mm * 1e-3,
+        d_12=metres(m.d12_mm),
+        l_1=metres(plate.l1_mm),
+        l_2=metres(plate.l2_mm),
+        l_bt=metres(plate.l_bt_mm),
+        l_post=metres(plate.l_post_mm),
+        height_1=metres(left.height_mm),
+        height_2=metres(right.height_mm),
+        hrp_1=metres(left.hrp_mm),
+        hrp_2=metres(right.hrp_mm),
         pc_1=(left.pc_mm - left.height_mm * extra) * 1e-3,
         pc_2=(right.pc_mm - right.height_mm * extra) * 1e-3,
         pc_b=(m.ball.pc_b_mm - (m.ball.r1_mm + m.ball.r2_mm) * extra_fp) * 1e-3,
-        r_1=m.ball.r1_mm * 1e-3,
-        n=n,
-        modulation_hz=m.modulation_hz,
+        r_1=metres(m.ball.r1_mm),
+        n=np.asarray(n),
+        modulation_hz=np.asarray(m.modulation_hz),
     )
 
 
@@ -241,6 +241,20 @@ def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
     return budget
 
 
+def _agreeing_ratio(
+    m: TripletMeasurement, shares: TripletShares, difference: float, share: Array
+) -> tuple[float, float]:
+    """The index ratio with which ranging and surface plate would agree, and its u.
+
+    difference   m, H_corr by ranging less that by the surface plate
+    share        (q,) m, of each input in H_corr by ranging
+    """
+    slope = 0.5 * sum(p.height_mm for p in m.prisms) - m.ball.r1_mm - m.ball.r2_mm
+    by_sizes = np.array([group != "index ratio" for group in shares.groups])
+    u = float(np.linalg.norm((share - shares.l_mpbc)[by_sizes])) / abs(slope * 1e-3)
+    return m.bk7_to_air_group_index_ratio - difference / (slope * 1e-3), u
+
+
 def _steps(m: TripletMeasurement, lengths: TripletLengths, shares: TripletShares) -> tuple[Array, Array]:
     """How far ranging puts the stops from where it put them in the first placement, and its u."""
     spacer = np.array([each.spacer_mm for each in m.placement]) * 1e-3
@@ -271,7 +285,3 @@ def _status(
     if float(cycles.margin[k]) < SIGMAS * m.u_d_toppl_mm * 1e-3:
         return THIN
     return SUSPECT if k in suspects else GOOD
-
-
-def _with_notes(found: TripletReduction) -> TripletReduction:
-    return replace(found, notes=tuple(triplet_notes(found)))

@@ -21,7 +21,6 @@ What lies beside the mid-point counts here, as it does not at the calibration: t
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -203,8 +202,10 @@ def ball_ranges(
             f"ranges have shape {d.shape} and covariance {given.shape}; expected ({n}, {k}, 2) and "
             f"({2 * n * k}, {2 * n * k}) for {n} triplets and {k} scan points"
         )
-    found = [_one(unit, s, rows) for unit, rows in zip(units, d, strict=True)]
-    incidence, obliquity, d_mp, d_bc, memo, by_range, by_unit = (np.stack(part) for part in zip(*found, strict=True))
+    by_triplet = [_one(unit, s, rows) for unit, rows in zip(units, d, strict=True)]
+    incidence, obliquity, d_mp, d_bc, memo, by_range, by_unit = (
+        np.stack(part) for part in zip(*by_triplet, strict=True)
+    )
     slope = by_range.reshape(n * k, 2)
     known = np.isfinite(d_bc).ravel()
     blocks = np.where(np.isfinite(given), given, 0.0).reshape(n * k, 2, n * k, 2)
@@ -276,7 +277,7 @@ def _one(unit: MountedTriplet, s: Array, d: Array) -> tuple[Array, ...]:
     )
 
 
-def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Any]:
+def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Array]:
     """The offset along the sight, and its square length."""
     e, v = np.asarray(sight, dtype=float), np.asarray(offset, dtype=float)
     return np.sum(e * v, axis=-1), np.sum(v * v, axis=-1)

@@ -5,7 +5,7 @@
 A block that stands in several stacks brings its certificate's uncertainty into all of them, as one effect.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,8 +14,14 @@ from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
-from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -118,11 +124,9 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
                 for k, block in enumerate(sheet.block)
             ),
             Effect("film, µm", -films * grown * 1e-3, sheet.u_film_um),
-            *_warmth(sheet, -cold, temperature),
+            *_temperature_effects(sheet, -cold, temperature),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     on, line = fit.active, np.argsort(length)
     keys = [
@@ -171,11 +175,9 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
         effects=[
             Effect("zero of the instrument, mm", -np.ones(m), sheet.u_zero_mm),
             Effect("scale of the instrument, ppm", -observed * PPM, sheet.u_scale_ppm),
-            *_warmth(sheet, observed, temperature),
+            *_temperature_effects(sheet, observed, temperature),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     keys = [(f"{name}_mm", "mm", f"length of {name} at 20 °C") for name in names]
     return Calibration(
@@ -212,7 +214,7 @@ def _scatter(sheet: LengthSheet, m: int) -> ObservedScatter:
     return ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
 
 
-def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
+def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
     """Thermometer and expansion; `length` is what a factor of 1 + expansion (t - 20) multiplies, with its sign.
 
     A thermometer that reads u too high, or an expansion taken too large: the true length is smaller than computed, the
@@ -224,8 +226,20 @@ def _warmth(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> 
     ]
 
 
-def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> dict[str, Any]:
-    """What both kinds tell alike."""
+class CommonParts(TypedDict):
+    """What calibrations by blocks and of spacers have alike; see `Calibration` for the words."""
+
+    provenance: dict[str, Any]
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    decisions: tuple[TestOutcome, ...]
+    variance_factor: float
+    degrees_of_freedom: int
+    notes: tuple[str, ...]
+
+
+def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> CommonParts:
+    """What both kinds report alike."""
     word = next(iter(readings.words))
     rows = tuple(
         (readings.words[word][k], float(readings.get("reads_mm")[k]), float(length[k]),

@@ -13,7 +13,7 @@ Signs by the notes: from the ball to the mirror, up the mount's own axes.
 """
 
 import re
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,9 +23,9 @@ from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within, broken_rule
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.length.gauge_blocks import Block
 
@@ -135,14 +135,20 @@ def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Cal
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": eye}, size=float(np.abs(observed).max()))
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(sheet.u_reading_mm**2 * eye)
-    found = fit_curved(observed, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level)
-    return _told(readings, found, [name for name in OFFSETS if name in sought])
+    solution = fit_curved(
+        observed,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
+    )
+    return _calibration(readings, solution, [name for name in OFFSETS if name in sought])
 
 
 def _placed(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(m, 3, 3) plate axes (right, front, up) in mount axes; (m,) whether the mirror is touched; (m,) +1, 0, -1."""
     turned = np.zeros((len(readings), 3, 3))
-    seen: dict[str, tuple[str, str]] = {}
+    places: dict[str, tuple[str, str]] = {}
     for row in range(len(readings)):
         words = {name: readings.words[name][row] for name in ("setup", "up", "front", "feature", "touch")}
         for name in ("up", "front"):
@@ -162,7 +168,7 @@ def _placed(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, np.ndarray
                 readings.sheet_file, f"{needed} is missing (expected, as {readings.file} touches its {words['touch']})"
             )
         place = (words["up"], words["front"])
-        if seen.setdefault(words["setup"], place) != place:
+        if places.setdefault(words["setup"], place) != place:
             raise readings.refuse(
                 row, f"setup = {words['setup']!r} stands another way than before (expected a new name)"
             )
@@ -219,31 +225,31 @@ def _parameters(
     return shared + [ModelParameter(f"block {block.name}", 0.0, 1e-3, block.u_mm) for block in sheet.block]
 
 
-def _told(readings: SheetReadings, found: CurvedFit, sought: list[str]) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
-    given, covariance = found.quantities(
+def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
+    calibrated, covariance = solution.quantities(
         [
             (name, f"{name}_mm", "mm", f"from the tooling ball to the mirror along the mount's {name[1]}", 1.0)
             for name in sought
         ]
     )
-    record: dict[str, Any] = {q.key: q.value for q in given}
-    record["u_offset_mm"] = max(found.u(name) for name in OFFSETS)
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
+    record["u_offset_mm"] = max(solution.u(name) for name in OFFSETS)
     words = ("setup", "up", "front", "feature", "touch")
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (*(readings.words[word][k] for word in words), float(fit.predicted[k] + fit.residual[k]),
          float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
         for k, state in enumerate(fit.state(readings.left_out))
     )  # fmt: skip
     leans = [
-        f'{name} {found.value(name) / ARCSECOND:+.2g}" (u {found.u(name) / ARCSECOND:.2g}")'
+        f'{name} {solution.value(name) / ARCSECOND:+.2g}" (u {solution.u(name) / ARCSECOND:.2g}")'
         for name in (f"{offset[1]} set-ups lean {way}" for offset in sought for way in WAYS)
     ]
     return Calibration(
         kind=KIND,
         title=f"Mirror offsets of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=(*words, "height_mm", "residual_um", fit.test, "state"),
         rows=rows,

@@ -13,8 +13,14 @@ from catseye.constants import MILLIMETRE, PPM
 from catseye.geometry.catenary import expanded, span, unstretched
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -110,7 +116,7 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
     """
     sheet, m = readings.sheet, len(readings)
     values = {name: readings.get(name) for name in (*STEPS, "scale_sum_mm")}
-    seen = _distance_mm(values, sheet.hanging)
+    distance = _distance_mm(values, sheet.hanging)
     effects = [
         Effect(label, _slope(values, name, sheet.hanging), getattr(sheet, f"u_{name}"))
         for name, label in SHARED.items()
@@ -118,9 +124,9 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
     ]
     known = sheet.known_distance_mm
     if known is None:
-        observed, design = seen, np.ones((m, 1))
+        observed, design = distance, np.ones((m, 1))
     else:  # observed = how much longer the wire is than certified, times its slope
-        observed, design = known - seen, _slope(values, "certified_mm", sheet.hanging)[:, None]
+        observed, design = known - distance, _slope(values, "certified_mm", sheet.hanging)[:, None]
         effects = [Effect(e.name, -e.column, e.u) for e in effects]
         effects.append(Effect("known distance, mm", np.ones(m), sheet.u_known_distance_mm))
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
@@ -132,11 +138,9 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         scatter,
         names=["distance" if known is None else "wire"],
         effects=effects,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
-    return _told(readings, fit, seen)
+    return _calibration(readings, fit, distance)
 
 
 def _distance_mm(values: dict[str, np.ndarray], hanging: bool) -> np.ndarray:
@@ -175,7 +179,7 @@ def _slope(values: dict[str, np.ndarray], name: str, hanging: bool) -> np.ndarra
     return (moved(step) - moved(-step)) / (2.0 * step)
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit, seen: np.ndarray) -> Calibration:
+def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndarray) -> Calibration:
     sheet = readings.sheet
     known = sheet.known_distance_mm
     if known is None:
@@ -187,10 +191,10 @@ def _told(readings: SheetReadings, fit: CalibrationFit, seen: np.ndarray) -> Cal
             "length of the wire at 20 °C and certified tension",
         )
     value = float(fit.x[0]) + shift
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             *(float(column[k]) for column in readings.numbers.values()),
-            float(seen[k]),
+            float(distance[k]),
             float(1e3 * fit.residual[k]),
             float(fit.statistic[k]),
             state,

@@ -15,7 +15,7 @@ What it does to pointing and range is computed with exact rays (`geometry.mirror
 the pointing by itself; it moves no range to first order, as the wave's phase is the same all across.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -27,9 +27,9 @@ from catseye.geometry.mirror.mount import gamma
 from catseye.geometry.mirror.pointing import MirrorStation, aim
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "alignment"
@@ -118,17 +118,16 @@ def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibr
     scatter = ObservedScatter(np.zeros_like(eye), {"scatter of a spot": eye})
     if sheet.u_spot_mm is not None:
         scatter = ObservedScatter(sheet.u_spot_mm**2 * eye)
-    found = fit_curved(
+    solution = fit_curved(
         observed.ravel(),
         predict,
         parameters,
         scatter,
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
-    return _told(readings, found)
+    return _calibration(readings, solution)
 
 
 def effect(
@@ -160,8 +159,8 @@ def effect(
     return way - distance, counts - np.stack([ideal.azimuth_counts, ideal.elevation_counts], axis=-1)
 
 
-def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
+def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
     wanted = [
         (f"beam {axis}", f"beam_{axis}_mm", "mm", f"laser beam from the azimuth axis at the mirror, along {axis}", 1.0)
         for axis in "xy"
@@ -169,10 +168,10 @@ def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
         (f"tilt {axis}", f"beam_tilt_{axis}_rad", "rad", f"{axis} of the direction that the laser beam comes from", 1.0)
         for axis in "xy"
     ]  # fmt: skip
-    given, covariance = found.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in given}
-    record["u_axis_mm"] = max(found.u("beam x"), found.u("beam y"))
-    record["u_tilt_rad"] = max(found.u("tilt x"), found.u("tilt y"), sheet.u_face_tilt_rad)
+    calibrated, covariance = solution.quantities(wanted)
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
+    record["u_axis_mm"] = max(solution.u("beam x"), solution.u("beam y"))
+    record["u_tilt_rad"] = max(solution.u("tilt x"), solution.u("tilt y"), sheet.u_face_tilt_rad)
     if sheet.u_face_tilt_rad > 0.0:
         record["face_tilt_rad"] = sheet.face_tilt_rad
     residual = fit.residual.reshape(-1, 2)
@@ -186,7 +185,7 @@ def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
         kind=KIND,
         title=f"Laser beam of {sheet.instrument} against its azimuth axis",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("screen", "path_m", "azimuth_counts", "p_mm", "q_mm", "residual_p_mm",
                  "residual_q_mm", fit.test, "state"),
@@ -195,12 +194,12 @@ def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
-            *_effects(sheet, found),
+            *_effects(sheet, solution),
             "a mirror's record has one u_axis_mm for four values and one u_tilt_rad for three; these are of the beam "
             "alone: keep the larger of them and the record's",
             *scatter_notes(fit, "mm", 1.0, 4),
         ),
-        curve=_circles(readings, found),
+        curve=_circles(readings, solution),
         axes=("p, from the screen's middle (mm)", "q, from the screen's middle (mm)"),
         method="Spots of the beam on screens that turn with the mount go round circles; their radius vectors at "
         "different distances along the unfolded beam give its place at the mirror and its tilt. Each screen's place "
@@ -210,35 +209,35 @@ def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
     )  # fmt: skip
 
 
-def _effects(sheet: AlignmentSheet, found: CurvedFit) -> list[str]:
+def _effects(sheet: AlignmentSheet, solution: CurvedFit) -> list[str]:
     """What the beam and the face do to range and pointing, the worst of all azimuths."""
     theta = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)
-    tilts = np.array([sheet.face_tilt_rad, found.value("tilt x"), found.value("tilt y")])
-    beam = np.array([found.value("beam x"), found.value("beam y")])
-    told = []
+    tilts = np.array([sheet.face_tilt_rad, solution.value("tilt x"), solution.value("tilt y")])
+    beam = np.array([solution.value("beam x"), solution.value("beam y")])
+    effects = []
     for phi in sheet.effect_phi_deg:
         change, counts = effect(tilts, beam, theta=theta, phi=phi * DEGREE, distance=sheet.effect_distance_m)
         counts[:, 0] = np.remainder(counts[:, 0] + HALF_TURN, 2.0 * HALF_TURN) - HALF_TURN
         low, high = counts.min(axis=0), counts.max(axis=0)
-        told.append(
+        effects.append(
             f"at Phi = {phi:g} degrees and {sheet.effect_distance_m:g} m, round the azimuth, the range changes by "
             f"{1e6 * change.min():+.3f} to {1e6 * change.max():+.3f} µm, the azimuth counts by {low[0]:+.1f} to "
             f"{high[0]:+.1f}, the elevation counts by {low[1]:+.1f} to {high[1]:+.1f}"
         )
-    return told
+    return effects
 
 
-def _circles(readings: SheetReadings, found: CurvedFit) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _circles(readings: SheetReadings, solution: CurvedFit) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Spots about the middle of their screens, and the circles."""
     names = list(dict.fromkeys(readings.words["screen"]))
     which = np.array([names.index(word) for word in readings.words["screen"]])
-    middle = found.values[4:].reshape(-1, 4)[which, :2]
+    middle = solution.values[4:].reshape(-1, 4)[which, :2]
     spot = np.column_stack([readings.get("p_mm"), readings.get("q_mm")]) - middle
-    on = found.fit.active.reshape(-1, 2).all(axis=1)
+    on = solution.fit.active.reshape(-1, 2).all(axis=1)
     turn, lines = np.linspace(0.0, 2.0 * np.pi, 181), []
     for k in range(len(names)):
         length = readings.get("path_m")[np.argmax(which == k)] / MILLIMETRE
-        radius = np.hypot(*(found.values[:2] - length * found.values[2:4]))
+        radius = np.hypot(*(solution.values[:2] - length * solution.values[2:4]))
         lines += [radius * np.column_stack([np.cos(turn), np.sin(turn)]), np.full((1, 2), np.nan)]
     line = np.concatenate(lines)
     return {

@@ -23,9 +23,9 @@ from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "autocollimation"
@@ -106,27 +106,26 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
         shaft = 0.5 * elevation_angle(ne + aside[1], p["N_e0"])
         normal = face_normal(theta, shaft, p["face tilt"], p["axis tilt"])
         beta, alignment = [p["beta1"], p["beta2"]], [p["lean x"], p["lean y"], p["roll"]]
-        seen = mirror_reading(normal, beta, alignment)
+        reading = mirror_reading(normal, beta, alignment)
         if flat.any():
-            seen[flat] = flat_reading(normal[flat], beta, alignment, [p["flat up"], p["flat along"]])
-        return (shown * (1.0 + p["scale"]) * seen).ravel()
+            reading[flat] = flat_reading(normal[flat], beta, alignment, [p["flat up"], p["flat along"]])
+        return (shown * (1.0 + p["scale"]) * reading).ravel()
 
     start = np.array([p.start for p in parameters])
     shaking = np.zeros((2 * m, 2 * m))
     for axis in ((1.0, 0.0), (0.0, 1.0)):  # a count moves both coordinates of its own reading
         slope = 0.5 * sheet.u_count * (predict(start, axis) - predict(start, (-axis[0], -axis[1])))
         shaking += np.outer(slope, slope) * np.kron(np.eye(m), np.ones((2, 2)))
-    found = fit_curved(
+    solution = fit_curved(
         observed,
         predict,
         parameters,
         _scatter(readings, shaking),
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
-    return _told(readings, found, flat, shown)
+    return _calibration(readings, solution, flat, shown)
 
 
 def _flat(readings: SheetReadings) -> np.ndarray:
@@ -194,16 +193,16 @@ WANTED = (
 )
 
 
-def _told(readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: float) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
-    sought = {p.name for p in found.parameters if np.isinf(p.u)}
+def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, shown: float) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
+    sought = {p.name for p in solution.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
-    given, covariance = found.quantities(wanted)
-    record = {q.key: q.value for q in given}
-    record["u_beta_rad"] = max(found.u("beta1"), found.u("beta2"))
-    record["u_zero_counts"] = max(found.u("N_e0"), found.u("N_a0"))
+    calibrated, covariance = solution.quantities(wanted)
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
+    record["u_beta_rad"] = max(solution.u("beta1"), solution.u("beta2"))
+    record["u_zero_counts"] = max(solution.u("N_e0"), solution.u("N_a0"))
     if "face tilt" in sought:
-        record["u_tilt_rad"] = found.u("face tilt")
+        record["u_tilt_rad"] = solution.u("face tilt")
     residual = fit.residual.reshape(-1, 2) / ARCSECOND
     rows = tuple(
         ("flat" if flat[k] else "mirror", float(readings.get("azimuth_counts")[k]),
@@ -216,16 +215,16 @@ def _told(readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: fl
         kind=KIND,
         title=f"Mirror axes and encoder zeros of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("into", "azimuth_counts", "elevation_counts", "x_arcsec", "y_arcsec", "residual_x_arcsec",
                  "residual_y_arcsec", fit.test, "state"),
         rows=rows,
-        decisions=(_tilt_decision(found, sheet.face_tilt_limit_arcsec), *fit.decisions()),
+        decisions=(_tilt_decision(solution, sheet.face_tilt_limit_arcsec), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=_notes(found, bool(flat.any())),
-        curve=_circles(readings, found, flat, shown),
+        notes=_notes(solution, bool(flat.any())),
+        curve=_circles(readings, solution, flat, shown),
         axes=("x (arcsec of the mirror)", "y (arcsec of the mirror)"),
         method="The light's way from the autocollimator by the mirror, and by the flat, back is computed exactly for "
         "each reading; all readings are adjusted together. The autocollimator's alignment and scale, the flat and the "
@@ -235,54 +234,54 @@ def _told(readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: fl
     )  # fmt: skip
 
 
-def _tilt_decision(found: CurvedFit, limit: float | None) -> TestOutcome:
+def _tilt_decision(solution: CurvedFit, limit: float | None) -> TestOutcome:
     name, nan = "face parallel to the elevation shaft: |tilt|, arcsec", float("nan")
-    if not np.isinf(found.parameters[found.index("face tilt")].u):
+    if not np.isinf(solution.parameters[solution.index("face tilt")].u):
         return TestOutcome(name, nan, nan, None, "the readings were not asked for the tilt; it has a prior")
-    tilt, u = found.value("face tilt") / ARCSECOND, found.u("face tilt") / ARCSECOND
+    tilt, u = solution.value("face tilt") / ARCSECOND, solution.u("face tilt") / ARCSECOND
     text = f'the face leans {tilt:+.2f}" (u {u:.2g}"); the record corrects for it'
     return TestOutcome(name, abs(tilt), limit or nan, None if limit is None else abs(tilt) <= limit, text)
 
 
-def _notes(found: CurvedFit, flat: bool) -> tuple[str, ...]:
-    fit = found.fit
-    told = [
+def _notes(solution: CurvedFit, flat: bool) -> tuple[str, ...]:
+    fit = solution.fit
+    notes = [
         "beta cannot be better than the autocollimator's alignment, which no reading shows: "
-        f'u {found.u("lean y") / ARCSECOND:.2g}" about x, {found.u("lean x") / ARCSECOND:.2g}" about y',
-        f'N_e0 is {found.value("N_e0"):.2f}; a count of the shaft moves the beam by 25.92"',
+        f'u {solution.u("lean y") / ARCSECOND:.2g}" about x, {solution.u("lean x") / ARCSECOND:.2g}" about y',
+        f'N_e0 is {solution.value("N_e0"):.2f}; a count of the shaft moves the beam by 25.92"',
     ]
     if flat:
-        plain = found.value("N_a0") + (found.value("beta1")) * 1e5 / (2 * np.pi)
-        told.append(
+        plain = solution.value("N_a0") + (solution.value("beta1")) * 1e5 / (2 * np.pi)
+        notes.append(
             f"the notes' step 6 taken literally (y zeroed with the autocollimator still along z) would give N_a0 = "
             f"{plain:.1f}: beta1 off, as the light does not come in along the azimuth axis"
         )
     else:
-        told.append("no reading into a flat: N_a0 is that of the sheet")
-    if found.u("axis tilt") > 0.0:
-        told.append(
-            f"the elevation shaft's own tilt came out as {found.value('axis tilt') / ARCSECOND:+.1f}\" "
-            f'(u {found.u("axis tilt") / ARCSECOND:.1f}"); near Phi = 0 only face tilt less shaft tilt shows'
+        notes.append("no reading into a flat: N_a0 is that of the sheet")
+    if solution.u("axis tilt") > 0.0:
+        notes.append(
+            f"the elevation shaft's own tilt came out as {solution.value('axis tilt') / ARCSECOND:+.1f}\" "
+            f'(u {solution.u("axis tilt") / ARCSECOND:.1f}"); near Phi = 0 only face tilt less shaft tilt shows'
         )
-    return (*told, *scatter_notes(fit, "arcsec", ARCSECOND))
+    return (*notes, *scatter_notes(fit, "arcsec", ARCSECOND))
 
 
 def _circles(
-    readings: SheetReadings, found: CurvedFit, flat: np.ndarray, shown: float
+    readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, shown: float
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Readings into the mirror, and the circle that each elevation setting gives, arcsec of mirror angles."""
     sheet, scale = readings.sheet, 0.5 / shown
     x = readings.get("x_arcsec") * sheet.x_sign * scale
     y = readings.get("y_arcsec") * sheet.y_sign * scale
-    on = found.fit.active.reshape(-1, 2).all(axis=1)
+    on = solution.fit.active.reshape(-1, 2).all(axis=1)
     theta = np.linspace(0.0, 2.0 * np.pi, 181)
     curves = [np.full((1, 2), np.nan)]
     for ne in np.unique(readings.get("elevation_counts")[~flat]):
-        shaft = 0.5 * elevation_angle(ne, found.value("N_e0"))
-        normal = face_normal(theta, shaft, found.value("face tilt"), found.value("axis tilt"))
-        alignment = [found.value(name) for name in ("lean x", "lean y", "roll")]
-        seen = mirror_reading(normal, [found.value("beta1"), found.value("beta2")], alignment)
-        curves += [0.5 * seen / ARCSECOND, np.full((1, 2), np.nan)]
+        shaft = 0.5 * elevation_angle(ne, solution.value("N_e0"))
+        normal = face_normal(theta, shaft, solution.value("face tilt"), solution.value("axis tilt"))
+        alignment = [solution.value(name) for name in ("lean x", "lean y", "roll")]
+        reading = mirror_reading(normal, [solution.value("beta1"), solution.value("beta2")], alignment)
+        curves += [0.5 * reading / ARCSECOND, np.full((1, 2), np.nan)]
     line = np.concatenate(curves)
     return {
         "readings": (x[on & ~flat], y[on & ~flat]),

@@ -10,7 +10,7 @@ both pointings turn the same face to the same side (the notes, section 2.4, say 
 of `geometry.mirror.mirror_path`); it takes known distances.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from catseye.geometry.mirror.mirror_path import path_change
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 
 KIND = "both-faces"
@@ -89,10 +89,14 @@ def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calib
     scatter = ObservedScatter(np.zeros_like(eye), {"scatter of one distance": eye}, size=float(measured.max()))
     if readings.sheet.u_distance_mm is not None:
         scatter = ObservedScatter((readings.sheet.u_distance_mm * MILLIMETRE) ** 2 * eye)
-    found = fit_curved(
-        measured, predict, parameters, scatter, active=readings.active, reject=reject, level=readings.sheet.level
+    solution = fit_curved(
+        measured,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=readings.sheet.level),
     )
-    return _told(readings, found, words, known)
+    return _calibration(readings, solution, words, known)
 
 
 def _checked(readings: SheetReadings) -> dict[str, tuple[str, ...]]:
@@ -128,43 +132,45 @@ def _parameters(
 ) -> list[ModelParameter]:
     sheet = readings.sheet
     known = "known_distance_m" in readings.numbers
-    seen = readings.get("known_distance_m" if known else "distance_m")
+    distance = readings.get("known_distance_m" if known else "distance_m")
     u = sheet.u_known_distance_mm * MILLIMETRE if known else np.inf
     return [
         ModelParameter("axis offset", 0.0, 1e-2),
         ModelParameter("mirror offset", 0.0, 1e-2, np.inf if known and (to[FACE] | to[TARGET]).any() else 0.0),
         ModelParameter("back retroreflector", 0.0, 1e-2, np.inf if known and to[BACK].any() else 0.0),
         ModelParameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if known and to[TARGET].any() else 0.0),
-        *(ModelParameter(f"line {key}", float(seen[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
+        *(ModelParameter(f"line {key}", float(distance[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
     ]
 
 
-def _told(readings: SheetReadings, found: CurvedFit, words: dict[str, tuple[str, ...]], known: bool) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
+def _calibration(
+    readings: SheetReadings, solution: CurvedFit, words: dict[str, tuple[str, ...]], known: bool
+) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
     wanted = [
         ("axis offset", "axis_offset_mm", "mm", "elevation axis off the azimuth axis, along the beam's azimuth", 1.0)
     ]
     notes = []
-    if np.isinf(found.parameters[1].u):
+    if np.isinf(solution.parameters[1].u):
         wanted.append(("mirror offset", "mirror_offset_mm", "mm", "face off the elevation axis, along its normal", 1.0))
     else:
         notes.append(
             "the mirror offset moves both pointings alike: no distance is known here from the scan point, so it cannot "
             "be told; it and u of the record come from elsewhere"
         )
-    if np.isinf(found.parameters[2].u):
+    if np.isinf(solution.parameters[2].u):
         notes.append(
-            f"the back retroreflector stands {found.value('back retroreflector'):.4f} mm before the scan point"
+            f"the back retroreflector stands {solution.value('back retroreflector'):.4f} mm before the scan point"
         )
-    given, covariance = found.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in given}
-    record["u_axis_mm"] = max(q.u for q in given)
+    calibrated, covariance = solution.quantities(wanted)
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
+    record["u_axis_mm"] = max(q.u for q in calibrated)
     notes.append(
-        f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in given)}: keep "
-        "the larger of it and the record's"
+        f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in calibrated)}: "
+        "keep the larger of it and the record's"
     )
     if known and np.any([word == TARGET for word in words["to"]]):
-        notes.append(f"the ranger's zero came out as {found.value('zero'):+.4f} mm (u {found.u('zero'):.4f} mm)")
+        notes.append(f"the ranger's zero came out as {solution.value('zero'):+.4f} mm (u {solution.u('zero'):.4f} mm)")
     rows = tuple(
         (words["line"][k], words["to"][k], words["pointing"][k], float(readings.get("phi_deg")[k]),
          float(readings.get("distance_m")[k]), float(1e6 * fit.residual[k]), float(fit.statistic[k]), state)
@@ -174,7 +180,7 @@ def _told(readings: SheetReadings, found: CurvedFit, words: dict[str, tuple[str,
         kind=KIND,
         title=f"Axis and mirror offset of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("line", "to", "pointing", "phi_deg", "distance_m", "residual_um", fit.test, "state"),
         rows=rows,

@@ -11,7 +11,7 @@ moves its azimuth by t, a turn of the whole mirror (beta) by t cos Phi, and both
 axis tell them apart. Exact rays: `geometry.mirror.imperfect`.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -24,9 +24,9 @@ from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 
@@ -109,11 +109,11 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
         points = distance[:, None] * (u @ from_vector(np.array([frame_x, frame_y, 0.0])).T)
         offsets = np.array([e, s, beam_x, beam_y]) * MILLIMETRE
         station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([na0, ne0]))
-        seen = imperfect_counts(
+        counts = imperfect_counts(
             station, Imperfections(offsets, np.array([face, tilt_x, tilt_y]), NONE, NONE), points @ AXES, prime=prime
         )
-        shaft = 0.5 * elevation_angle(seen[:, 1], ne0)
-        return (seen + back + np.column_stack([COUNTS_PER_RADIAN * kappa / np.tan(shaft), np.zeros(m)])).ravel()
+        shaft = 0.5 * elevation_angle(counts[:, 1], ne0)
+        return (counts + back + np.column_stack([COUNTS_PER_RADIAN * kappa / np.tan(shaft), np.zeros(m)])).ravel()
 
     # Counts may stand any whole turns off: the nearest turn of what is predicted.
     start = predict(np.array([p.start for p in parameters])).reshape(m, 2)
@@ -122,17 +122,19 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
     scatter = ObservedScatter(np.zeros_like(eye), {"scatter of a count": eye}, size=float(np.abs(observed).max()))
     if readings.sheet.u_counts is not None:
         scatter = ObservedScatter(readings.sheet.u_counts**2 * eye)
-    found = fit_curved(
+    solution = fit_curved(
         observed.ravel(),
         predict,
         parameters,
         scatter,
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=readings.sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2),
+            together=np.repeat(np.arange(m), 2),
+            reject=reject,
+            level=readings.sheet.level,
+        ),
     )
-    return _told(readings, found)
+    return _calibration(readings, solution)
 
 
 def _parameters(
@@ -212,13 +214,13 @@ WANTED = (
 )
 
 
-def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
-    fit, sought = found.fit, {p.name for p in found.parameters if np.isinf(p.u)}
+def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
+    fit, sought = solution.fit, {p.name for p in solution.parameters if np.isinf(p.u)}
     wanted = [w for w in WANTED if w[0] in sought]
-    given, covariance = found.quantities(wanted)
-    record: dict[str, Any] = {q.key: q.value for q in given}
-    record["u_tilt_rad"] = max(q.u for q in given if "tilt" in q.key)
-    record["u_zero_counts"] = max(q.u for q in given if q.key in ("na0", "ne0"))
+    calibrated, covariance = solution.quantities(wanted)
+    record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
+    record["u_tilt_rad"] = max(q.u for q in calibrated if "tilt" in q.key)
+    record["u_zero_counts"] = max(q.u for q in calibrated if q.key in ("na0", "ne0"))
     residual = fit.residual.reshape(-1, 2)
     rows = tuple(
         (readings.words["target"][k], readings.words["pointing"][k], float(readings.get("azimuth_counts")[k]),
@@ -226,19 +228,19 @@ def _told(readings: SheetReadings, found: CurvedFit) -> Calibration:
          statistic, state)
         for k, (statistic, state) in enumerate(row_ends(fit, readings.left_out, 2))
     )  # fmt: skip
-    notes = [f"u of the axis offset, {found.u('axis_offset_mm'):.2g} mm, is in N_e0: near targets lend it weight"]
+    notes = [f"u of the axis offset, {solution.u('axis_offset_mm'):.2g} mm, is in N_e0: near targets lend it weight"]
     if "beam tilt x" not in sought:
         notes.append(
             "the targets' directions are not known: beam tilt and N_a0 move both pointings alike and cannot be told"
         )
-    if found.u("axis tilt") > 0.0:
-        tilt, u = found.value("axis tilt") / ARCSECOND, found.u("axis tilt") / ARCSECOND
+    if solution.u("axis tilt") > 0.0:
+        tilt, u = solution.value("axis tilt") / ARCSECOND, solution.u("axis tilt") / ARCSECOND
         notes.append(f'the elevation shaft\'s own tilt came out as {tilt:+.2f}" (u {u:.2g}")')
     return Calibration(
         kind=KIND,
         title=f"Face tilt and encoder zeros of {readings.sheet.instrument} in both pointings",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("target", "pointing", "azimuth_counts", "elevation_counts", "residual_azimuth_counts",
                  "residual_elevation_counts", fit.test, "state"),

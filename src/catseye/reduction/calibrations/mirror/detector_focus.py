@@ -13,7 +13,7 @@ factor e above the reference's amplitude, so a weaker return with a coupling abo
 """
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -21,9 +21,9 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
 
 KIND = "detector-focus"
@@ -83,12 +83,12 @@ def calibrate_detector_focus(readings: SheetReadings, reject: bool = False) -> C
         )
     observed = np.log(readings.get("amplitude_volt"))
     model = _model(sheet, place)
-    found = _fitted(readings, observed, model, _parameters(sheet, place, observed), reject)
+    solution = _fitted(readings, observed, model, _parameters(sheet, place, observed), reject)
     longer = None
-    if sheet.model == BEAM and found.fit.active.sum() > LEAST:
-        parameters = [*found.parameters, ModelParameter("skew", 0.0, 1e-3)]
-        longer = _fitted(readings, observed, model, parameters, False, found.fit.active)
-    return _told(readings, found, model, longer)
+    if sheet.model == BEAM and solution.fit.active.sum() > LEAST:
+        parameters = [*solution.parameters, ModelParameter("skew", 0.0, 1e-3)]
+        longer = _fitted(readings, observed, model, parameters, False, solution.fit.active)
+    return _calibration(readings, solution, model, longer)
 
 
 def _model(sheet: FocusSheet, place: np.ndarray) -> Model:
@@ -151,7 +151,9 @@ def _fitted(
         else ObservedScatter(u**2 * eye)
     )
     on = readings.active if active is None else active
-    return fit_curved(observed, model, parameters, scatter, active=on, reject=reject, level=readings.sheet.level)
+    return fit_curved(
+        observed, model, parameters, scatter, options=FitOptions(active=on, reject=reject, level=readings.sheet.level)
+    )
 
 
 def _derived(values: np.ndarray, model: Model) -> np.ndarray:
@@ -161,7 +163,7 @@ def _derived(values: np.ndarray, model: Model) -> np.ndarray:
     return np.array([middle, depth, installed - middle, np.exp(left), -1e3 * half / TWO_PI * coupling * left])
 
 
-def _results(found: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Quantity, ...], np.ndarray]:
+def _results(solution: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Quantity, ...], np.ndarray]:
     keys = [
         ("best_focus_mm", "mm", "place of the detector where the return is strongest"),
         ("depth_mm", "mm", "near it the amplitude falls by the square of the way off over this"),
@@ -174,24 +176,26 @@ def _results(found: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Quant
         ),
     ][: 5 if coupled else 4]
     slopes = []
-    for k, p in enumerate(found.parameters):
-        aside = np.zeros(len(found.values))
+    for k, p in enumerate(solution.parameters):
+        aside = np.zeros(len(solution.values))
         aside[k] = p.step
-        slopes.append((_derived(found.values + aside, model) - _derived(found.values - aside, model)) / (2.0 * p.step))
+        slopes.append(
+            (_derived(solution.values + aside, model) - _derived(solution.values - aside, model)) / (2.0 * p.step)
+        )
     turn = np.column_stack(slopes)[: len(keys)]
-    covariance = turn @ found.covariance @ turn.T
-    sought = [k for k, p in enumerate(found.parameters) if np.isinf(p.u)]
-    values = _derived(found.values, model)[: len(keys)]
-    return quantities(keys, values, covariance, fit=found.fit, turn=turn[:, sought]), covariance
+    covariance = turn @ solution.covariance @ turn.T
+    sought = [k for k, p in enumerate(solution.parameters) if np.isinf(p.u)]
+    values = _derived(solution.values, model)[: len(keys)]
+    return quantities(keys, values, covariance, fit=solution.fit, turn=turn[:, sought]), covariance
 
 
-def _told(readings: SheetReadings, found: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
+def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
     place = readings.get("position_mm")
-    given, covariance = _results(found, model, sheet.amplitude_to_phase_rad is not None)
-    by_key = {q.key: q for q in given}
+    calibrated, covariance = _results(solution, model, sheet.amplitude_to_phase_rad is not None)
+    by_key = {q.key: q for q in calibrated}
     defocus, share = by_key["detector_defocus_mm"], by_key["amplitude_share"]
-    record: dict[str, Any] = {"detector_defocus_mm": defocus.value, "u_detector_defocus_mm": defocus.u}
+    record: dict[str, RecordValue] = {"detector_defocus_mm": defocus.value, "u_detector_defocus_mm": defocus.u}
     on, grid = fit.active, np.linspace(place.min(), place.max(), 200)
     rows = tuple(
         (float(place[k]), float(readings.get("amplitude_volt")[k]), float(100.0 * fit.residual[k]),
@@ -205,11 +209,11 @@ def _told(readings: SheetReadings, found: CurvedFit, model: Model, longer: Curve
         kind=KIND,
         title=f"Detector focus of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("position_mm", "amplitude_volt", "residual_percent", fit.test, "state"),
         rows=rows,
-        decisions=(_within_the_run(found, place), *_symmetry(longer), *fit.decisions()),
+        decisions=(_within_the_run(solution, place), *_symmetry(longer), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -220,7 +224,7 @@ def _told(readings: SheetReadings, found: CurvedFit, model: Model, longer: Curve
         curve={
             "readings": (place[on], amplitude[on]),
             "left out": (place[~on], amplitude[~on]),
-            "fit": (grid, np.exp(model(found.values, grid))),
+            "fit": (grid, np.exp(model(solution.values, grid))),
             "residuals": (place[on], 100.0 * fit.residual[on]),
         },
         axes=("position of the detector (mm)", "amplitude (V)"),
@@ -230,10 +234,10 @@ def _told(readings: SheetReadings, found: CurvedFit, model: Model, longer: Curve
     )  # fmt: skip
 
 
-def _within_the_run(found: CurvedFit, place: np.ndarray) -> TestOutcome:
+def _within_the_run(solution: CurvedFit, place: np.ndarray) -> TestOutcome:
     """Best focus must lie among the readings: beyond them it is a guess of the model."""
-    on = place[found.fit.active]
-    middle, low, high = found.value("best focus"), float(on.min()), float(on.max())
+    on = place[solution.fit.active]
+    middle, low, high = solution.value("best focus"), float(on.min()), float(on.max())
     nearer = min(middle - low, high - middle)
     text = (
         "amplitudes fall on both sides" if nearer > 0.0 else "the top lies outside of the readings: go on with the run"

@@ -11,7 +11,7 @@ runs begin at different faces the better they are told from the encoder's. A pol
 does not tell the order k from n - k: that gives a refusal or a large u, not a wrong number.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -20,9 +20,9 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 
 KIND = "encoder"
@@ -113,8 +113,14 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
     if sheet.u_reading_arcsec is not None:
         u = sheet.u_reading_arcsec * ARCSECOND * COUNTS_PER_RADIAN
         scatter = ObservedScatter((sheet.u_counts**2 + u**2) * eye)
-    found = fit_curved(counts, predict, parameters, scatter, active=readings.active, reject=reject, level=sheet.level)
-    return _told(readings, found, turn + found.values[waves : waves + n][which])
+    solution = fit_curved(
+        counts,
+        predict,
+        parameters,
+        scatter,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
+    )
+    return _calibration(readings, solution, turn + solution.values[waves : waves + n][which])
 
 
 def _labels(readings: SheetReadings, name: str) -> tuple[list[str], np.ndarray]:
@@ -151,22 +157,22 @@ def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np
     ]
 
 
-def _told(readings: SheetReadings, found: CurvedFit, psi: np.ndarray) -> Calibration:
-    sheet, fit, n = readings.sheet, found.fit, readings.sheet.orders
+def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) -> Calibration:
+    sheet, fit, n = readings.sheet, solution.fit, readings.sheet.orders
     wanted = [
         (f"{part} {k}", f"{sheet.axis}_encoder_{part}_{k}_counts", "counts", "term of what it reads too high", 1.0)
         for part in ("cosine", "sine") for k in range(1, n + 1)
     ]  # fmt: skip
-    given, covariance = found.quantities(wanted)
-    values = [q.value for q in given]
-    record: dict[str, Any] = {
+    calibrated, covariance = solution.quantities(wanted)
+    values = [q.value for q in calibrated]
+    record: dict[str, RecordValue] = {
         f"{sheet.axis}_encoder_cosine_counts": values[:n],
         f"{sheet.axis}_encoder_sine_counts": values[n:],
-        "u_encoder_counts": max(q.u for q in given),
+        "u_encoder_counts": max(q.u for q in calibrated),
     }
     order, terms = np.arange(1, n + 1), np.array(values)
     grid = np.linspace(psi.min(), psi.max(), 361)
-    seen = _wave(psi, terms, order) + fit.residual
+    observed = _wave(psi, terms, order) + fit.residual
     on = fit.active
     rows = tuple(
         (readings.words["run"][k] if "run" in readings.words else "", float(psi[k] / DEGREE),
@@ -177,11 +183,11 @@ def _told(readings: SheetReadings, found: CurvedFit, psi: np.ndarray) -> Calibra
         kind=KIND,
         title=f"{sheet.axis.capitalize()} encoder of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("run", "psi_deg", "counts", "residual_counts", fit.test, "state"),
         rows=rows,
-        decisions=(*_order_decisions(found, n, sheet.level), *fit.decisions()),
+        decisions=(*_order_decisions(solution, n, sheet.level), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -190,8 +196,8 @@ def _told(readings: SheetReadings, found: CurvedFit, psi: np.ndarray) -> Calibra
             *scatter_notes(fit, "counts", 1.0, 2 * n),
         ),
         curve={
-            "readings": (psi[on] / DEGREE, seen[on]),
-            "left out": (psi[~on] / DEGREE, seen[~on]),
+            "readings": (psi[on] / DEGREE, observed[on]),
+            "left out": (psi[~on] / DEGREE, observed[~on]),
             "fit": (grid / DEGREE, _wave(grid, terms, order)),
             "residuals": (psi[on] / DEGREE, fit.residual[on]),
         },
@@ -202,7 +208,7 @@ def _told(readings: SheetReadings, found: CurvedFit, psi: np.ndarray) -> Calibra
     )
 
 
-def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[TestOutcome, ...]:
+def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[TestOutcome, ...]:
     """Whether each order is there at all: its squared Mahalanobis distance from zero.
 
     Chi-square of two degrees where the scatter is claimed, else twice Fisher's F with the scatter's own degrees.
@@ -211,19 +217,19 @@ def _order_decisions(found: CurvedFit, n: int, level: float) -> tuple[TestOutcom
     """
     from scipy.special import fdtri
 
-    told = []
-    sought = [p.name for p in found.parameters if np.isinf(p.u)]
+    outcomes = []
+    sought = [p.name for p in solution.parameters if np.isinf(p.u)]
     for k in range(1, n + 1):
-        at = [found.index(f"cosine {k}"), found.index(f"sine {k}")]
-        pair = found.values[at]
-        statistic = float(pair @ np.linalg.solve(found.covariance[np.ix_(at, at)], pair))
-        degrees = min(found.fit.effective[sought.index(f"{part} {k}")] for part in ("cosine", "sine"))
+        at = [solution.index(f"cosine {k}"), solution.index(f"sine {k}")]
+        pair = solution.values[at]
+        statistic = float(pair @ np.linalg.solve(solution.covariance[np.ix_(at, at)], pair))
+        degrees = min(solution.fit.effective[sought.index(f"{part} {k}")] for part in ("cosine", "sine"))
         # chi-square of two degrees is exponential
         limit = 2.0 * fdtri(2.0, degrees, 1.0 - level / n) if degrees < MANY else -2.0 * np.log(level / n)
         size = float(np.hypot(*pair))
         text = f"{size:.3g} counts, {'more than chance makes' if statistic > limit else 'which chance makes as well'}"
-        told.append(TestOutcome(f"order {k}: squared distance from none", statistic, float(limit), None, text))
-    return tuple(told)
+        outcomes.append(TestOutcome(f"order {k}: squared distance from none", statistic, float(limit), None, text))
+    return tuple(outcomes)
 
 
 RECIPE = CalibrationKind("an encoder's waves, once and twice a turn, from true angles", LAYOUT, calibrate_encoder)

@@ -15,7 +15,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes, student
 
 KIND = "limits"
@@ -66,7 +66,7 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
         if claimed is None
         else ObservedScatter(claimed**2 * eye)
     )
-    found = fit_curved(
+    solution = fit_curved(
         counts,
         lambda values: np.where(high, values[1], values[0]),
         [
@@ -74,30 +74,28 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
             for name, there in (("low", ~high), ("high", high))
         ],
         scatter,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
-    single = claimed if claimed is not None else found.fit.components["scatter of a touch"]
-    return _told(readings, found, single)
+    single = claimed if claimed is not None else solution.fit.components["scatter of a touch"]
+    return _calibration(readings, solution, single)
 
 
-def _told(readings: SheetReadings, found: CurvedFit, single: float) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
+def _calibration(readings: SheetReadings, solution: CurvedFit, single: float) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
     wide = [float(times) for times in student(fit.effective, WIDE)]
     inwards = [
-        sheet.margin_counts + times * float(np.hypot(single, found.u(f"{name} stop")))
+        sheet.margin_counts + times * float(np.hypot(single, solution.u(f"{name} stop")))
         for name, times in zip(STOPS, wide, strict=True)
     ]
-    low_limit = int(np.ceil(found.value("low stop") + inwards[0]))
-    high_limit = int(np.floor(found.value("high stop") - inwards[1]))
+    low_limit = int(np.ceil(solution.value("low stop") + inwards[0]))
+    high_limit = int(np.floor(solution.value("high stop") - inwards[1]))
     if low_limit >= high_limit:
         raise refusal(
             readings.file,
-            f"the stops lie at {found.value('low stop'):.1f} and {found.value('high stop'):.1f}: with the margin of "
-            f"{sheet.margin_counts:g} nothing is left between (expected low below high; are the words swapped?)",
+            f"the stops lie at {solution.value('low stop'):.1f} and {solution.value('high stop'):.1f}: with the margin "
+            f"of {sheet.margin_counts:g} nothing is left between (expected low below high; are the words swapped?)",
         )
-    given, covariance = found.quantities(
+    calibrated, covariance = solution.quantities(
         [
             (f"{name} stop", f"az_{name}_stop_counts", "counts", f"where the azimuth meets its {name} stop", 1.0)
             for name in STOPS
@@ -113,7 +111,7 @@ def _told(readings: SheetReadings, found: CurvedFit, single: float) -> Calibrati
         kind=KIND,
         title=f"Azimuth limits of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("stop", "azimuth_counts", "residual_counts", fit.test, "state"),
         rows=rows,

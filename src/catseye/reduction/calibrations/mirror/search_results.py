@@ -10,6 +10,7 @@ counts decided: 1 all, 0 nothing. The change from the laboratory's values is nor
 both are right; that is tested as a whole (chi-square) and for each parameter.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,9 +27,9 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
-from catseye.reduction.calibrations.fit import ObservedScatter
+from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 from catseye.reduction.site.stations import imperfections_of, station_covariance, station_of
@@ -46,7 +47,7 @@ IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
     **{k: (k, "counts", 1.0, "mirror") for k in ("na0", "ne0")},
 }
 NEEDED = ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad", "u_beta_rad", "u_zero_counts")
-TOLD = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
+DECIDED = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
 NOTHING = 1e-6  # of the largest singular value: a combination that no count depends on
 INFORMED = 1e-3  # share below which a change is rounding
 SHOWN = 0.3  # of a unit combination: parameters named in it
@@ -136,17 +137,16 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
         )
     turns[:, 0] = COUNTS_PER_TURN * np.round((observed[:, 0] - first[:, 0]) / COUNTS_PER_TURN)
     _refuse_far(readings, observed - first - turns)
-    found = fit_curved(
+    solution = fit_curved(
         observed.ravel(),
         predict,
         parameters,
         ObservedScatter(np.diag(_u_counts(readings).ravel() ** 2)),
-        active=np.repeat(readings.active, 2),
-        together=np.repeat(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
-    return _told(readings, found, predict)
+    return _calibration(readings, solution, predict)
 
 
 def _u_counts(readings: SheetReadings) -> np.ndarray:
@@ -185,22 +185,22 @@ def _refuse_far(readings: SheetReadings, off: np.ndarray) -> None:
 class _Compared:
     """What the counts decided, in units of the priors of the parameters that are not held."""
 
-    def __init__(self, found: CurvedFit) -> None:
-        prior = np.array([p.u for p in found.parameters[:P]])
+    def __init__(self, solution: CurvedFit) -> None:
+        prior = np.array([p.u for p in solution.parameters[:P]])
         self.free = np.flatnonzero(prior > 0.0)
         u = prior[self.free]
-        start = np.array([p.start for p in found.parameters])[self.free]
-        self.change = (found.values[self.free] - start) / u
-        self.left = found.covariance[np.ix_(self.free, self.free)] / np.outer(u, u)
+        start = np.array([p.start for p in solution.parameters])[self.free]
+        self.change = (solution.values[self.free] - start) / u
+        self.left = solution.covariance[np.ix_(self.free, self.free)] / np.outer(u, u)
         values, vectors = np.linalg.eigh(np.eye(len(u)) - self.left)
         self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
-        self.decided = int(np.count_nonzero(self.share > TOLD))
+        self.decided = int(np.count_nonzero(self.share > DECIDED))
 
     def whole(self, level: float) -> TestOutcome:
         """Whether laboratory and field agree in all that the counts say something of."""
-        told = self.share > INFORMED
-        along = self.vectors[:, told].T @ self.change
-        statistic, degrees = float(np.sum(along**2 / self.share[told])), int(told.sum())
+        informed = self.share > INFORMED
+        along = self.vectors[:, informed].T @ self.change
+        statistic, degrees = float(np.sum(along**2 / self.share[informed])), int(informed.sum())
         test = global_test(statistic, degrees, 2.0 * level)  # one side: agreeing too well is no fault
         passed = bool(statistic <= test.upper * degrees)
         text = (
@@ -219,11 +219,11 @@ class _Compared:
     def single(self, level: float) -> list[TestOutcome]:
         """Each parameter's change over its own standard uncertainty."""
         limit = w_critical(single_level(level, len(self.free)))
-        told = []
+        outcomes = []
         for k, j in enumerate(self.free):
             share, name = 1.0 - self.left[k, k], PARAMETERS[j]
             if share <= INFORMED:
-                told.append(
+                outcomes.append(
                     TestOutcome(
                         f"{name}: change over its u", float("nan"), float("nan"), None, "the counts say nothing of it"
                     )
@@ -232,8 +232,8 @@ class _Compared:
             ratio = float(self.change[k] / np.sqrt(share))
             left = np.sqrt(self.left[k, k])
             text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {left:.2f} is left"
-            told.append(TestOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
-        return told
+            outcomes.append(TestOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
+        return outcomes
 
     def combination(self, k: int) -> str:
         """A combination by its leading parameters, in units of their priors."""
@@ -242,14 +242,14 @@ class _Compared:
         return " ".join(f"{vector[i]:+.2f} {PARAMETERS[self.free[i]]}" for i in order)
 
 
-def _inseparable(found: CurvedFit, predict: Any) -> tuple[int, list[str]]:
+def _inseparable(solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray]) -> tuple[int, list[str]]:
     """Rank of the counts in the free parameters, and the parameters that no number of counts would tell."""
-    free = [k for k, p in enumerate(found.parameters[:P]) if p.u > 0.0]
+    free = [k for k, p in enumerate(solution.parameters[:P]) if p.u > 0.0]
     columns = []
     for k in free:
-        aside = np.zeros(len(found.values))
-        aside[k] = found.parameters[k].step
-        columns.append((predict(found.values + aside) - predict(found.values - aside))[found.fit.active])
+        aside = np.zeros(len(solution.values))
+        aside[k] = solution.parameters[k].step
+        columns.append((predict(solution.values + aside) - predict(solution.values - aside))[solution.fit.active])
     scaled = np.column_stack(columns)
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
     _, size, turned = np.linalg.svd(scaled)
@@ -258,17 +258,21 @@ def _inseparable(found: CurvedFit, predict: Any) -> tuple[int, list[str]]:
     return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > NOTHING]
 
 
-def _told(readings: SheetReadings, found: CurvedFit, predict: Any) -> Calibration:
-    sheet, fit = readings.sheet, found.fit
-    compared = _Compared(found)
+def _calibration(
+    readings: SheetReadings, solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray]
+) -> Calibration:
+    sheet, fit = readings.sheet, solution.fit
+    compared = _Compared(solution)
     if not len(compared.free) or compared.share[0] <= INFORMED:
         raise EstimationError(
             "the counts decide nothing of the station: u_counts is far above what its records leave open"
         )
     free = [PARAMETERS[k] for k in compared.free]
     meaning = "lab and field together"
-    given, covariance = found.quantities([(name, *IN_FILES[name][:2], meaning, IN_FILES[name][2]) for name in free])
-    rank, loose = _inseparable(found, predict)
+    calibrated, covariance = solution.quantities(
+        [(name, *IN_FILES[name][:2], meaning, IN_FILES[name][2]) for name in free]
+    )
+    rank, loose = _inseparable(solution, predict)
     notes = [
         f"the counts decide {compared.decided} of {len(free)} combinations; strongest: "
         + "; ".join(compared.combination(k) for k in range(min(compared.decided, 5))),
@@ -290,7 +294,7 @@ def _told(readings: SheetReadings, found: CurvedFit, predict: Any) -> Calibratio
         kind=KIND,
         title=f"{sheet.instrument} on {sheet.monument.monument}: laboratory against field",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("target", "pointing", "azimuth_counts", "elevation_counts", "residual_azimuth_counts",
                  "residual_elevation_counts", fit.test, "state"),
@@ -304,29 +308,29 @@ def _told(readings: SheetReadings, found: CurvedFit, predict: Any) -> Calibratio
         method="The station's 13 parameters, with the records' standard uncertainties as priors, and the targets' "
         "coordinates with theirs, are adjusted to the counts at which the targets were found. Tilts, offsets and "
         "encoder waves of the mirror's record are counted exactly.",
-        record=_records(found, free),
+        record=_records(solution, free),
     )  # fmt: skip
 
 
-def _records(found: CurvedFit, free: list[str]) -> dict[str, Any]:
+def _records(solution: CurvedFit, free: list[str]) -> dict[str, RecordValue]:
     """Keys of the monument's and of the mirror's record."""
-    told: dict[str, dict[str, Any]] = {"monument": {}, "mirror": {}}
+    records: dict[str, dict[str, float]] = {"monument": {}, "mirror": {}}
     for name in free:
         key, _, size, record = IN_FILES[name]
-        told[record][key] = found.value(name) / size
+        records[record][key] = solution.value(name) / size
         if record == "monument":
-            told[record][f"u_{key}"] = found.u(name) / size
+            records[record][f"u_{key}"] = solution.u(name) / size
     if "alpha1" in free:
-        told["monument"]["azimuth_deg"] = float(np.mod(180.0 - found.value("alpha1") / DEGREE, 360.0))
+        records["monument"]["azimuth_deg"] = float(np.mod(180.0 - solution.value("alpha1") / DEGREE, 360.0))
     for key, members, size in (
         ("u_offset_mm", ("dx", "dy", "dz"), MILLIMETRE),
         ("u_beta_rad", ("beta1", "beta2"), 1.0),
         ("u_zero_counts", ("na0", "ne0"), 1.0),
     ):
-        u = max(found.u(name) for name in members) / size
+        u = max(solution.u(name) for name in members) / size
         if u > 0.0:  # none where the record has none
-            told["mirror"][key] = u
-    return told
+            records["mirror"][key] = u
+    return {**records}
 
 
 RECIPE = CalibrationKind(

@@ -5,15 +5,22 @@ The circle is tied to the mount in one of three ways: a Kelvin plate whose circl
 unlocked, or a reference on the mount itself, such as a target over the v-block. Model and signs: directions.py.
 """
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.azimuth_sheet import KIND, LAYOUT, AzimuthSheet
 from catseye.reduction.calibrations.monument.directions import (
@@ -31,6 +38,20 @@ from catseye.reduction.calibrations.monument.directions import (
 ROUNDS, ENOUGH = 12, 1e-11  # rad; the offset of the instrument over the length of a sight is the rate, 1e-2 at worst
 CLOSURE_FACTOR = 3.0  # of its standard uncertainty, beyond which a closure is named
 STEPS = {"angle": ARCSECOND, "length": 1e-4, "time": 1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisedDirections:
+    """Circle readings about an azimuth and zeros: observed = design x + effects, rad.
+
+    observed   (m,)
+    design     (m, p) by the azimuth of z^ and, where the plate does not tell it, the zero of each set
+    effects    systematic, with priors
+    """
+
+    observed: np.ndarray
+    design: np.ndarray
+    effects: list[Effect]
 
 
 def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibration:
@@ -59,7 +80,7 @@ def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibrat
     else:
         raise refusal(readings.file, f"the azimuth does not settle ({moved:.1e} rad in the last round): is a point at "
                                      "the instrument itself?")  # fmt: skip
-    return _told(sights, fit, linear)
+    return _calibration(sights, fit, linear)
 
 
 def _tied(sights: DirectionSights) -> bool:
@@ -98,16 +119,16 @@ def _start(sights: DirectionSights, tied: bool) -> np.ndarray:
     return np.array([azimuth, *([] if tied else zeros)])
 
 
-def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> dict[str, Any]:
-    """Observed values, design and effects about (azimuth, zeros): observed = design x + effects.
+def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDirections:
+    """The readings about the latest (azimuth, zeros).
 
     The parameters themselves, not their changes, are sought, so that the priors of the effects stay about zero.
     """
     sheet = sights.readings.sheet
     m = len(sights.observed)
 
-    def predicted(azimuth: float, given: SightConditions) -> np.ndarray:
-        turned, zenith = geometry_of(sights, azimuth, given)
+    def predicted(azimuth: float, changed: SightConditions) -> np.ndarray:
+        turned, zenith = geometry_of(sights, azimuth, changed)
         lean = leaning(sights, turned, zenith, sheet.lean_x_arcsec * ARCSECOND, sheet.lean_z_arcsec * ARCSECOND)
         return turned + lean
 
@@ -125,9 +146,9 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> dict[str, An
     effects = _instrument_effects(sights, turned, zenith)
     if tied:
         effects.append(Effect("circle's zero of the plate, arcsec", np.full(m, ARCSECOND), sheet.u_plate_zero_arcsec))
-    for name, u, step, given in _changes(sights):
-        effects.append(Effect(name, slope(step, (at[0], given(step)), (at[0], given(-step))), u))
-    return {"observed": off + design @ at, "design": design, "effects": effects, "off": off}
+    for name, u, step, change in _changes(sights):
+        effects.append(Effect(name, slope(step, (at[0], change(step)), (at[0], change(-step))), u))
+    return LinearisedDirections(off + design @ at, design, effects)
 
 
 def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray) -> list[Effect]:
@@ -157,39 +178,37 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
     return effects
 
 
-def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Any]]:
-    """(name, u, step, change of a step -> Conditions) of what the geometry hangs on; u in the unit of the step."""
+def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[[float], SightConditions]]]:
+    """(name, u, step, change of a step -> conditions) of what the geometry hangs on; u in the unit of the step."""
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
-    told: list[tuple[str, float, float, Any]] = [
+
+    def offset_along(axis: np.ndarray) -> Callable[[float], SightConditions]:
+        return lambda s: SightConditions(offset=s * axis)
+
+    def points_along(shape: np.ndarray) -> Callable[[float], SightConditions]:
+        return lambda s: SightConditions(points=s * shape)
+
+    changes: list[tuple[str, float, float, Callable[[float], SightConditions]]] = [
         ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
         ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
     ]
     if sights.are("star").any():
         late = float(np.hypot(sheet.u_ut1_utc_s, sheet.u_clock_s))
         u_pole = sheet.u_pole_arcsec * ARCSECOND
-        told += [
+        changes += [
             ("time and UT1, s", late, STEPS["time"], lambda s: SightConditions(time=s)),
             ("pole x, rad", u_pole, angle, lambda s: SightConditions(pole=(s, 0.0))),
             ("pole y, rad", u_pole, angle, lambda s: SightConditions(pole=(0.0, s))),
         ]
     u_offset = sheet.u_instrument_mm * MILLIMETRE
     for k, axis in enumerate(("x", "y", "z")):
-        told.append(
-            (f"instrument d{axis}, m", u_offset, length, lambda s, k=k: SightConditions(offset=s * np.eye(3)[k]))
-        )
+        changes.append((f"instrument d{axis}, m", u_offset, length, offset_along(np.eye(3)[k])))
     for number, column in enumerate(_coordinate_columns(sheet)):
         size = float(np.abs(column).max())
         shape = column.reshape(-1, 3) / size
-        told.append(
-            (
-                f"coordinates, component {number + 1}",
-                size,
-                length,
-                lambda s, shape=shape: SightConditions(points=s * shape),
-            )
-        )
-    return told
+        changes.append((f"coordinates, component {number + 1}", size, length, points_along(shape)))
+    return changes
 
 
 def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
@@ -203,27 +222,27 @@ def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
     return [column * MILLIMETRE for column in root.T if np.abs(column).max() > 1e-9]
 
 
-def _fitted(sights: DirectionSights, linear: dict[str, Any], active: np.ndarray, *, reject: bool) -> CalibrationFit:
+def _fitted(
+    sights: DirectionSights, linear: LinearisedDirections, active: np.ndarray, *, reject: bool
+) -> CalibrationFit:
     sheet, m = sights.readings.sheet, len(sights.observed)
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one direction": np.eye(m)}, size=TWO_PI)
     if sheet.u_direction_arcsec is not None:
         scatter = ObservedScatter((sheet.u_direction_arcsec * ARCSECOND) ** 2 * np.eye(m))
     names = ["azimuth of z^", *(f"circle's zero, set {name}" for name in sights.sets)]
     return fit_readings(
-        linear["observed"],
-        linear["design"],
+        linear.observed,
+        linear.design,
         scatter,
-        names=names[: linear["design"].shape[1]],
-        effects=linear["effects"],
-        active=active,
-        reject=reject,
-        level=sheet.level,
+        names=names[: linear.design.shape[1]],
+        effects=linear.effects,
+        options=FitOptions(active=active, reject=reject, level=sheet.level),
     )
 
 
 def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[tuple[str, float, float]]:
     """Set, lab after less before (rad), its u: scatter of readings, transport, what both visits do not share."""
-    told = []
+    closures = []
     plain = sights.observed - geometry_of(sights, float(fit.x[0]), SightConditions())[0]
     for k, name in enumerate(sights.sets):
         rows = [fit.active & (sights.of_set == k) & (sights.place == end) for end in (BEFORE, AFTER)]
@@ -237,37 +256,20 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
                 weight[there] = sign / (len(faces) * np.count_nonzero(there))
         closure = float(weight @ wrapped(plain - plain[np.argmax(rows[0])]))
         shared = sum((float(weight @ e.column) * e.u) ** 2 for e in effects)
-        told.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
-    return told
+        closures.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
+    return closures
 
 
-def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) -> Calibration:
-    readings, sheet = sights.readings, sights.readings.sheet
-    azimuth = float(np.mod(fit.x[0], TWO_PI))
-    alpha1 = float(wrapped(np.array(np.pi - azimuth)))
-    turn = np.zeros((2, len(fit.x)))
-    turn[:, 0] = [1.0 / DEGREE, -1.0]
-    covariance = turn @ fit.covariance @ turn.T
-    keys = [
-        ("azimuth_deg", "degrees", "azimuth of the line fixed point to v-block (z^), clockwise from the frame's north"),
-        ("alpha1_rad", "rad", "pi - azimuth, turn of the mount about y^"),
-    ]
-    decisions = [
-        TestOutcome(
-            f"closure of set {name}, arcsec",
-            closure / ARCSECOND,
-            CLOSURE_FACTOR * u / ARCSECOND,
-            bool(abs(closure) <= CLOSURE_FACTOR * u),
-            "circle against the mount, lab after less before; limit three standard uncertainties",
-        )
-        for name, closure, u in _closures(sights, fit, linear["effects"])
-    ]
-    residual = fit.residual / ARCSECOND
+def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple[tuple[Cell, ...], ...]:
+    """Each sight with the azimuth and the zenith angle (degrees) of its target about the plumb line, and how it fits.
+
+    azimuth   rad, of z^
+    """
+    readings = sights.readings
     turned, zenith = geometry_of(sights, float(fit.x[0]), SightConditions())
     bearing = np.degrees(np.mod(turned + azimuth, TWO_PI))
-    number = np.arange(1, len(readings) + 1)
-    on = fit.active
-    rows = tuple(
+    residual = fit.residual / ARCSECOND
+    return tuple(
         (
             str(sights.sets[sights.of_set[k]]),
             str(sights.place[k]),
@@ -282,6 +284,36 @@ def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) 
         )
         for k, state in enumerate(fit.state(readings.left_out))
     )
+
+
+def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[TestOutcome]:
+    """The closure of each set that visited the lab twice, against three of its u."""
+    return [
+        TestOutcome(
+            f"closure of set {name}, arcsec",
+            closure / ARCSECOND,
+            CLOSURE_FACTOR * u / ARCSECOND,
+            bool(abs(closure) <= CLOSURE_FACTOR * u),
+            "circle against the mount, lab after less before; limit three standard uncertainties",
+        )
+        for name, closure, u in _closures(sights, fit, effects)
+    ]
+
+
+def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: LinearisedDirections) -> Calibration:
+    readings, sheet = sights.readings, sights.readings.sheet
+    azimuth = float(np.mod(fit.x[0], TWO_PI))
+    alpha1 = float(wrapped(np.array(np.pi - azimuth)))
+    turn = np.zeros((2, len(fit.x)))
+    turn[:, 0] = [1.0 / DEGREE, -1.0]
+    covariance = turn @ fit.covariance @ turn.T
+    keys = [
+        ("azimuth_deg", "degrees", "azimuth of the line fixed point to v-block (z^), clockwise from the frame's north"),
+        ("alpha1_rad", "rad", "pi - azimuth, turn of the mount about y^"),
+    ]
+    residual = fit.residual / ARCSECOND
+    number = np.arange(1, len(readings) + 1)
+    on = fit.active
     return Calibration(
         kind=KIND,
         title=f"Azimuth of monument {sheet.instrument}",
@@ -290,8 +322,8 @@ def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) 
         covariance=covariance,
         columns=("set", "place", "target", "face", "direction_deg", "azimuth_deg", "zenith_deg", "residual_arcsec",
                  fit.test, "state"),
-        rows=rows,
-        decisions=(*decisions, *fit.decisions()),
+        rows=_rows(sights, fit, azimuth),
+        decisions=(*_closure_decisions(sights, fit, linear.effects), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -322,11 +354,11 @@ def _told(sights: DirectionSights, fit: CalibrationFit, linear: dict[str, Any]) 
     )  # fmt: skip
 
 
-def _largest(fit: CalibrationFit, linear: dict[str, Any]) -> str:
+def _largest(fit: CalibrationFit, linear: LinearisedDirections) -> str:
     """The three effects that the azimuth owes most of its u to, in arcseconds: gain times column times u."""
-    on, acting = fit.active, [e for e in linear["effects"] if e.u > 0.0]
+    on, acting = fit.active, [e for e in linear.effects if e.u > 0.0]
     columns = np.column_stack([np.zeros(int(on.sum())), *(e.column[on] * e.u for e in acting)])
-    design = linear["design"][on]
+    design = linear.design[on]
     weight = np.linalg.inv(np.diag(fit.sigma[on] ** 2) + columns @ columns.T)
     gain = np.linalg.solve(design.T @ weight @ design, design.T @ weight)[0]
     parts = np.abs(gain @ columns[:, 1:]) / ARCSECOND

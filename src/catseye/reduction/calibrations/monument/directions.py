@@ -11,7 +11,6 @@ from their place in the sky; both are turned into the plumb line's axes at the i
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from catseye.geometry.mirror.mount import gamma
 from catseye.geometry.sky.star import POLARIS, Star, star_place
 from catseye.records.files.readings import TIME, SheetReadings
 from catseye.records.files.refusal import refusal, shown
+from catseye.reduction.calibrations.monument.azimuth_sheet import CataloguedStar
 from catseye.reduction.calibrations.monument.frame_sheet import frame_of
 
 BEFORE, FIELD, AFTER = "before", "field", "after"
@@ -147,21 +147,21 @@ def _share(readings: SheetReadings, place: np.ndarray, sets: tuple[str, ...]) ->
     return share
 
 
-def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightConditions) -> tuple[np.ndarray, np.ndarray]:
+def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditions) -> tuple[np.ndarray, np.ndarray]:
     """Direction from z^ about the plumb line, and zenith angle, of each sight: (m,), (m,).
 
     sights       the table
     azimuth_z    rad, of z^ in the ground frame
-    given        changes of what is known
+    changed        changes of what is known
     """
     sheet, readings = sights.readings.sheet, sights.readings
-    frame = frame_of(sheet, xi=given.xi, eta=given.eta)
+    frame = frame_of(sheet, xi=changed.xi, eta=changed.eta)
     points = np.array([[sheet.x_mm, sheet.y_mm, sheet.z_mm], *([p.x_mm, p.y_mm, p.z_mm] for p in sheet.point)])
-    points = points * MILLIMETRE + (0.0 if given.points is None else given.points)
+    points = points * MILLIMETRE + (0.0 if changed.points is None else changed.points)
     plumb = plumb_from_ground(frame, points[0])
     mount = gamma(np.pi - azimuth_z, sheet.alpha2_rad, sheet.alpha3_rad)
     offset = np.array([sheet.instrument_dx_mm, sheet.instrument_dy_mm, sheet.instrument_dz_mm]) * MILLIMETRE
-    instrument = points[0] + mount.T @ (offset + given.offset)
+    instrument = points[0] + mount.T @ (offset + changed.offset)
     zero = azimuth(plumb @ np.array([np.sin(azimuth_z), np.cos(azimuth_z), 0.0]))
     turned = np.zeros(len(readings))
     zenith = readings.numbers.get("zenith_deg", np.full(len(readings), 90.0)) * DEGREE
@@ -182,15 +182,18 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, given: SightCondition
                 latitude,
                 longitude,
                 height=float(points[0, 2]) + frame.height,
-                ut1_utc=sheet.ut1_utc_s + given.time,
-                pole=(sheet.pole_x_arcsec * ARCSECOND + given.pole[0], sheet.pole_y_arcsec * ARCSECOND + given.pole[1]),
+                ut1_utc=sheet.ut1_utc_s + changed.time,
+                pole=(
+                    sheet.pole_x_arcsec * ARCSECOND + changed.pole[0],
+                    sheet.pole_y_arcsec * ARCSECOND + changed.pole[1],
+                ),
             )
             turned[rows], zenith[rows] = at - zero, high
     return turned, zenith
 
 
-def star_of(entry: Any) -> Star:
-    """The star that a sheet names."""
+def star_of(entry: CataloguedStar) -> Star:
+    """The star of an entry of a sheet, in radians and arcseconds."""
     return Star(
         entry.name,
         entry.ra_deg * DEGREE,

@@ -1,6 +1,6 @@
 """What a sheet says about the ground frame and the plumb line: where the origin is, how a level's zenith leans."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
@@ -44,10 +44,10 @@ class MonumentSheet(FrameSheet):
     z_mm: Coordinate
 
 
-def frame_of(sheet: Any, *, xi: float = 0.0, eta: float = 0.0) -> LocalFrame:
+def frame_of(sheet: FrameSheet, *, xi: float = 0.0, eta: float = 0.0) -> LocalFrame:
     """The ground frame of a sheet.
 
-    sheet    a FrameSheet
+    sheet    what it says of origin, geoid and plumb line
     xi, eta  rad, added to the deflection that it states
 
     The frame's axes stay where the stated deflection puts them only where z is the ellipsoid's normal; where z is the

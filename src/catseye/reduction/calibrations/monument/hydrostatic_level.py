@@ -21,8 +21,14 @@ from catseye.errors import ValidityError
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue, TestOutcome
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 
 KIND = "hydrostatic-level"
@@ -110,13 +116,13 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
     for row, (first, last) in enumerate(zip(*ends, strict=True)):
         climb[row, marks.index(first)] -= 1.0
         climb[row, marks.index(last)] += 1.0
-    density, by_warmth = _density(readings)
+    density, by_temperature = _density(readings)
     shown = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE
     observed = shown + density - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
     # observed = climb of the others - side C
     design, names = climb[:, 1:], [f"height of {mark}" for mark in marks[1:]]
     effects = [
-        Effect("thermometers, °C", side * by_warmth, sheet.u_temperature_c),
+        Effect("thermometers, °C", side * by_temperature, sheet.u_temperature_c),
         Effect("micrometers, ppm", PPM * shown, sheet.u_scale_ppm),
         Effect("height of the held mark, mm", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm),
     ]
@@ -127,7 +133,7 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         effects.append(Effect("constant of the instrument, mm", -side * MILLIMETRE, sheet.u_constant_mm))
     else:
         design, names = np.column_stack([design, -side]), [*names, "constant (exchange the vessels)"]
-    claimed = np.diag((sheet.u_tube_c * by_warmth) ** 2)
+    claimed = np.diag((sheet.u_tube_c * by_temperature) ** 2)
     scatter = ObservedScatter(claimed, {"scatter of one difference": np.eye(m)}, size=float(np.max(np.abs(observed))))
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(claimed + (sheet.u_reading_mm * MILLIMETRE) ** 2 * np.eye(m))
@@ -137,12 +143,10 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         scatter,
         names=names,
         effects=effects,
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     loops = _loops(fit, design, effects, climb)
-    return _told(readings, fit, marks, density, loops)
+    return _calibration(readings, fit, marks, density, loops)
 
 
 def _refuse(readings: SheetReadings, ends: list[tuple[str, ...]], marks: tuple[str, ...]) -> None:
@@ -200,7 +204,7 @@ def _loops(
     off = (fit.residual + _acted(fit, effects))[on]
     least = design[on]
     left = total - least @ np.linalg.solve(least.T @ np.linalg.solve(total, least), least.T)
-    told: list[tuple[str, float, float]] = []
+    loops: list[tuple[str, float, float]] = []
     tree: list[int] = []
     for k, row in enumerate(on):
         if not tree or np.linalg.matrix_rank(climb[on[[*tree, k]]]) > len(tree):
@@ -211,8 +215,8 @@ def _loops(
         loop[k], loop[tree] = 1.0, -way
         u = float(np.sqrt(max(loop @ left @ loop, 0.0)))
         members = ", ".join(str(on[j] + 1) for j in np.flatnonzero(loop))
-        told.append((members, float(loop @ off), u))
-    return told
+        loops.append((members, float(loop @ off), u))
+    return loops
 
 
 def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
@@ -221,7 +225,50 @@ def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
     return sum(parts, np.zeros(len(fit.residual)))
 
 
-def _told(
+def _constant_note(readings: SheetReadings, fit: CalibrationFit) -> str:
+    """Where the instrument's constant comes from, and how far the readings move one that the sheet states."""
+    sheet = readings.sheet
+    if sheet.constant_mm is None:
+        return "the constant was found by exchanging the vessels"
+    value, u = fit.effects.get("constant of the instrument, mm", (0.0, 0.0))
+    return (
+        f"the constant is the sheet's, {sheet.constant_mm:g} mm; these readings move it by {value:+.4f} mm, "
+        f"u {u:.4f} mm"
+    )
+
+
+def _loops_decision(loops: list[tuple[str, float, float]]) -> TestOutcome:
+    """The loop whose misclosure is largest beside its u, against three of that."""
+    worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
+    if worst is None:
+        return TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
+    return TestOutcome(
+        f"loops: misclosure of {len(loops)}, the worst, mm",
+        worst[1] / MILLIMETRE,
+        CLOSURE_FACTOR * worst[2] / MILLIMETRE,
+        bool(abs(worst[1]) <= CLOSURE_FACTOR * worst[2]),
+        f"set-ups {worst[0]}; limit three standard uncertainties",
+    )
+
+
+def _rows(readings: SheetReadings, fit: CalibrationFit, density: np.ndarray) -> tuple[tuple[Cell, ...], ...]:
+    """Each set-up as read, its correction for the density (m) in micrometres, and how it fits."""
+    micro = 1e-3 * MILLIMETRE
+    return tuple(
+        (
+            *(readings.words[end][k] for end in ("from", "to")),
+            int(readings.get("vessel_from")[k]),
+            *(float(readings.get(name)[k]) for name in ("reading_from_mm", "reading_to_mm")),
+            float(density[k] / micro),
+            float(fit.residual[k] / micro),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
+def _calibration(
     readings: SheetReadings,
     fit: CalibrationFit,
     marks: tuple[str, ...],
@@ -234,61 +281,30 @@ def _told(
     constant = sheet.constant_mm is None
     if constant:
         keys.append(("constant_mm", "mm", "zero of vessel 1 less that of vessel 2, added with vessel 1 on `from`"))
-        prior_note = "the constant was found by exchanging the vessels"
-    else:
-        value, u = fit.effects.get("constant of the instrument, mm", (0.0, 0.0))
-        prior_note = (
-            f"the constant is the sheet's, {sheet.constant_mm:g} mm; these readings move it by {value:+.4f} mm, "
-            f"u {u:.4f} mm"
-        )
-    found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
-    worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
-    decisions = [
-        TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
-        if worst is None
-        else TestOutcome(
-            f"loops: misclosure of {len(loops)}, the worst, mm",
-            worst[1] / MILLIMETRE,
-            CLOSURE_FACTOR * worst[2] / MILLIMETRE,
-            bool(abs(worst[1]) <= CLOSURE_FACTOR * worst[2]),
-            f"set-ups {worst[0]}; limit three standard uncertainties",
-        )
-    ]
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(values)) / MILLIMETRE)
     micro = 1e-3 * MILLIMETRE
-    rows = tuple(
-        (
-            *(readings.words[end][k] for end in ("from", "to")),
-            int(readings.get("vessel_from")[k]),
-            *(float(readings.get(name)[k]) for name in ("reading_from_mm", "reading_to_mm")),
-            float(density[k] / micro),
-            float(fit.residual[k] / micro),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     on, number = fit.active, np.arange(1, len(readings) + 1)
-    record: dict[str, object] = {
+    record: dict[str, RecordValue] = {
         "marks": list(marks),
-        "heights_mm": [sheet.held_height_mm, *(q.value for q in found[: len(marks) - 1])],
-        "u_heights_mm": [sheet.u_held_height_mm, *(q.u for q in found[: len(marks) - 1])],
+        "heights_mm": [sheet.held_height_mm, *(q.value for q in calibrated[: len(marks) - 1])],
+        "u_heights_mm": [sheet.u_held_height_mm, *(q.u for q in calibrated[: len(marks) - 1])],
     }
     if constant:
-        record |= {"constant_mm": found[-1].value, "u_constant_mm": found[-1].u}
+        record |= {"constant_mm": calibrated[-1].value, "u_constant_mm": calibrated[-1].u}
     return Calibration(
         kind=KIND,
         title=f"Run with hydrostatic level {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("from", "to", "vessel_from", "reading_from_mm", "reading_to_mm", "density_um", "residual_um",
                  fit.test, "state"),
-        rows=rows,
-        decisions=(*decisions, *fit.decisions()),
+        rows=_rows(readings, fit, density),
+        decisions=(_loops_decision(loops), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
-            prior_note,
+            _constant_note(readings, fit),
             "heights are along the plumb line (NAVD88 where the held mark is); z of the ground frame falls below them "
             "by the curvature of the earth, 1.1 mm at 120 m, and the deflection: "
             "geometry/frames/local_frame.py turns them",

@@ -23,13 +23,19 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import UAngle
 
 KIND = "inclinometer"
-WARMTH = 20.0  # °C to which the zeros belong
+REFERENCE_C = 20.0  # °C to which the zeros belong
 ROUNDS, ENOUGH = 20, 1e-10  # relative change of the parameters at which the search ends
 SQUARE = 0.5 * np.pi
 Scale = Annotated[float, Within(-1e5, 1e5)]
@@ -82,16 +88,16 @@ class Inclinometer:
     scale         V/rad
     misaligned    rad, clockwise seen from above, of the axis from where the case has it
     cubic         1/rad²
-    warmth        V/°C
+    per_degree    V/°C, of the zeros
     """
 
     zero: np.ndarray
     scale: np.ndarray
     misaligned: np.ndarray
     cubic: np.ndarray
-    warmth: np.ndarray
+    per_degree: np.ndarray
 
-    def volts(self, tilts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = WARMTH) -> np.ndarray:
+    def volts(self, tilts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = REFERENCE_C) -> np.ndarray:
         """Readings (..., 2), V.
 
         tilts           (..., 2), rad, of the table's x and y above the horizon
@@ -101,10 +107,10 @@ class Inclinometer:
         p, q = np.moveaxis(np.asarray(tilts, dtype=float), -1, 0)[..., None]
         angle = np.asarray(azimuth, dtype=float)[..., None] + np.array([0.0, -SQUARE]) + self.misaligned
         along = p * np.cos(angle) - q * np.sin(angle)
-        warm = (np.asarray(temperature_c, dtype=float) - WARMTH)[..., None]
-        return self.zero + self.warmth * warm + self.scale * (along + self.cubic * along**3)
+        warm = (np.asarray(temperature_c, dtype=float) - REFERENCE_C)[..., None]
+        return self.zero + self.per_degree * warm + self.scale * (along + self.cubic * along**3)
 
-    def tilts(self, volts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = WARMTH) -> np.ndarray:
+    def tilts(self, volts: ArrayLike, azimuth: ArrayLike = 0.0, temperature_c: ArrayLike = REFERENCE_C) -> np.ndarray:
         """Tilts (..., 2), rad, of the table's x and y above the horizon: the inverse of `volts`.
 
         volts           (..., 2), V
@@ -113,8 +119,8 @@ class Inclinometer:
 
         Raises ValidityError where the cubic term turns the curve round before the reading is reached.
         """
-        warm = (np.asarray(temperature_c, dtype=float) - WARMTH)[..., None]
-        sought = (np.asarray(volts, dtype=float) - self.zero - self.warmth * warm) / self.scale
+        warm = (np.asarray(temperature_c, dtype=float) - REFERENCE_C)[..., None]
+        sought = (np.asarray(volts, dtype=float) - self.zero - self.per_degree * warm) / self.scale
         along = sought.copy()
         for _ in range(50):
             step = (along + self.cubic * along**3 - sought) / (1.0 + 3.0 * self.cubic * along**2)
@@ -138,36 +144,38 @@ def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Cal
 
     Source: [PARKER04] chapter 7 names the model (its reference 145); least squares, [FOERSTNER16] chapter 4.
     """
-    table = _Table(readings)
-    at, active = table.start(), readings.active
+    axes = _AxisReadings(readings)
+    at, active = axes.start(), readings.active
     for turn in range(ROUNDS):
-        design, effects, predicted = table.linear(at)
+        design, effects, predicted = axes.linear(at)
         fit = fit_readings(
-            table.observed - predicted + design @ at,
+            axes.observed - predicted + design @ at,
             design,
-            table.scatter(at),
-            names=table.names,
+            axes.scatter(at),
+            names=axes.names,
             effects=effects,
-            active=np.tile(active, 2),
-            together=np.tile(np.arange(len(readings)), 2),
-            reject=reject and turn > 2,
-            level=readings.sheet.level,
+            options=FitOptions(
+                active=np.tile(active, 2),
+                together=np.tile(np.arange(len(readings)), 2),
+                reject=reject and turn > 2,
+                level=readings.sheet.level,
+            ),
         )
-        moved = np.abs(fit.x - at) / np.maximum(np.abs(fit.x), table.sizes)
+        moved = np.abs(fit.x - at) / np.maximum(np.abs(fit.x), axes.sizes)
         at, active = fit.x, fit.active[: len(readings)]
         if turn > 2 and moved.max() < ENOUGH:
-            return _told(table, fit)
+            return _calibration(axes, fit)
     raise EstimationError(
         f"the inclinometer's model did not settle in {ROUNDS} rounds; is the pier level, or the scale's sign wrong?"
     )
 
 
-class _Table:
+class _AxisReadings:
     """Readings of both axes, x above y, and the parameters that they are to tell.
 
-    Parameters in order: zero, scale, misalignment of x, y; then cubic x, y; warmth x, y; tilt of the table x, y, as
-    asked for. On a pier scales and the turn of the case have priors: they are parameters with an observation of
-    themselves, below the readings' own rows through effects on x.
+    Parameters in order: zero, scale, misalignment of x, y; then cubic x, y; temperature coefficient x, y; tilt of the
+    table x, y, as asked for. On a pier scales and the turn of the case have priors: they are parameters with an
+    observation of themselves, below the readings' own rows through effects on x.
     """
 
     def __init__(self, readings: SheetReadings) -> None:
@@ -192,7 +200,9 @@ class _Table:
         self.applied = np.column_stack(tilts)
         turned = "azimuth_deg" in readings.numbers
         self.azimuth = readings.get("azimuth_deg") * DEGREE if turned else np.zeros(self.m)
-        self.warm = readings.get("temperature_c") if sheet.temperature_coefficient else np.full(self.m, WARMTH)
+        self.temperature_c = (
+            readings.get("temperature_c") if sheet.temperature_coefficient else np.full(self.m, REFERENCE_C)
+        )
         self.observed = np.concatenate([readings.get("x_volt"), readings.get("y_volt")])
         self.names, sizes = [], []
         parts = [("zero", "V", 1e-3, True), ("scale", "V/rad", 1e-3, not self.pier)]
@@ -221,7 +231,7 @@ class _Table:
     def predicted(self, whole: np.ndarray, scale: float = 0.0) -> np.ndarray:
         """(2 m,) V; applied tilts larger by the share `scale`."""
         model = _model(whole)
-        return model.volts(self.applied * (1.0 + scale) + whole[10:], self.azimuth, self.warm).T.ravel()
+        return model.volts(self.applied * (1.0 + scale) + whole[10:], self.azimuth, self.temperature_c).T.ravel()
 
     def start(self) -> np.ndarray:
         """Zeros from the means, scales and misalignments from a plane through the readings: the model but for bends."""
@@ -308,22 +318,22 @@ MEANINGS = (
 )
 
 
-def _told(table: _Table, fit: CalibrationFit) -> Calibration:
-    readings, sheet, m = table.readings, table.sheet, table.m
+def _calibration(axes: _AxisReadings, fit: CalibrationFit) -> Calibration:
+    readings, sheet, m = axes.readings, axes.sheet, axes.m
     all_keys = [
         (key.format(axis), unit, meaning.format(axis), size) for key, unit, meaning, size in MEANINGS for axis in "xy"
     ]
-    chosen = [all_keys[k] for k in np.flatnonzero(table.free)]
+    chosen = [all_keys[k] for k in np.flatnonzero(axes.free)]
     turn = np.diag([1.0 / size for *_, size in chosen])
     values, covariance = turn @ fit.x, turn @ fit.covariance @ turn.T
-    found = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
+    calibrated = quantities([one[:3] for one in chosen], values, covariance, fit=fit, turn=turn)
     states = fit.state(readings.left_out * 2)
-    seen = [name for name in LAYOUT.optional if name in readings.numbers]
-    rows = tuple(
+    optional = [name for name in LAYOUT.optional if name in readings.numbers]
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
-            *(float(readings.numbers[name][k]) for name in seen),
-            float(table.observed[k]),
-            float(table.observed[m + k]),
+            *(float(readings.numbers[name][k]) for name in optional),
+            float(axes.observed[k]),
+            float(axes.observed[m + k]),
             float(fit.residual[k] * 1e3),
             float(fit.residual[m + k] * 1e3),
             float(fit.statistic[k]),
@@ -336,17 +346,17 @@ def _told(table: _Table, fit: CalibrationFit) -> Calibration:
     number = np.tile(np.arange(1, m + 1), 2)
     return Calibration(
         kind=KIND,
-        title=f"Inclinometer {sheet.instrument} on a {'pier' if table.pier else 'tilt table'}",
+        title=f"Inclinometer {sheet.instrument} on a {'pier' if axes.pier else 'tilt table'}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
-        columns=(*seen, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
+        columns=(*optional, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
                  "state"),
         rows=rows,
         decisions=fit.decisions(),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=(*_notes(table), *scatter_notes(fit, "mV", 1e-3)),
+        notes=(*_notes(axes), *scatter_notes(fit, "mV", 1e-3)),
         curve={
             "readings": (number[on], fit.residual[on] * 1e3),
             "left out": (number[~on], fit.residual[~on] * 1e3),
@@ -356,17 +366,17 @@ def _told(table: _Table, fit: CalibrationFit) -> Calibration:
         method="Readings of both axes are adjusted to the tilts: zero and scale of each axis, their misalignments and, "
         "where asked, cubic terms, temperature coefficients and the table's own tilt. Tilts and scale of the table, "
         "and on a pier the scales and the turn of the case, are parameters with priors.",
-        record={q.key: q.value for q in found} | {f"u_{q.key}": q.u for q in found},
+        record={**{q.key: q.value for q in calibrated}, **{f"u_{q.key}": q.u for q in calibrated}},
     )  # fmt: skip
 
 
-def _notes(table: _Table) -> tuple[str, ...]:
-    if not table.pier:
-        return () if table.sheet.table_tilt else (
+def _notes(axes: _AxisReadings) -> tuple[str, ...]:
+    if not axes.pier:
+        return () if axes.sheet.table_tilt else (
             "the table's own tilt was not sought: it is part of the zeros",
         )  # fmt: skip
     return (
-        f"scales are those of the sheet, u {table.sheet.u_scale_percent:g} %: one tilt of the pier tells none",
+        f"scales are those of the sheet, u {axes.sheet.u_scale_percent:g} %: one tilt of the pier tells none",
         "misalignment_y is that against axis x: turning on a pier shows how square the axes are, no more",
     )
 

@@ -6,7 +6,7 @@ frame with full covariance, latitude, longitude, elevation, and easting, northin
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,7 @@ from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, gr
 from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
@@ -87,14 +87,14 @@ def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
         state = f"is there {len(rows)} times" if rows else "is not there"
         raise refusal(readings.file, f"point {shown(sheet.point)} of {readings.sheet_file} {state} (expected once)")
     row = rows[0]
-    given = np.array([readings.get(f"{k}_m")[row] for k in NAMES])
+    coordinates = np.array([readings.get(f"{k}_m")[row] for k in NAMES])
     frame = frame_of(sheet)
     try:
-        values, covariance = monument_place(frame, given, _covariance(readings, row), system=sheet.system)
-        covariance = covariance + _by_deflection(sheet, given)
+        values, covariance = monument_place(frame, coordinates, _covariance(readings, row), system=sheet.system)
+        covariance = covariance + _by_deflection(sheet, coordinates)
     except ValueError as problem:
         raise refusal(readings.file, f"{readings.where[row]}, {problem}") from problem
-    return _told(readings, row, frame, values, covariance)
+    return _calibration(readings, row, frame, values, covariance)
 
 
 def monument_place(
@@ -111,7 +111,7 @@ def monument_place(
     """
     if system not in ("ground", "state-plane"):
         raise InputError(f"system {system!r} is unknown (expected 'ground' or 'state-plane')")
-    to_ground: Callable[[Any], Any] = frame.from_state_plane if system == "state-plane" else np.asarray
+    to_ground: Callable[[np.ndarray], np.ndarray] = frame.from_state_plane if system == "state-plane" else np.asarray
 
     def every(at: np.ndarray) -> np.ndarray:
         points = to_ground(at)
@@ -126,10 +126,10 @@ def monument_place(
             axis=-1,
         )
 
-    given = np.asarray(coordinates, dtype=float)
-    slope = (every(given + STEP * np.eye(3)) - every(given - STEP * np.eye(3))).T / (2.0 * STEP)
+    at_point = np.asarray(coordinates, dtype=float)
+    slope = (every(at_point + STEP * np.eye(3)) - every(at_point - STEP * np.eye(3))).T / (2.0 * STEP)
     full = slope @ np.asarray(covariance, dtype=float) @ slope.T
-    return every(given), 0.5 * (full + full.T)
+    return every(at_point), 0.5 * (full + full.T)
 
 
 def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
@@ -143,12 +143,14 @@ def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
     return matrix * MILLIMETRE**2
 
 
-def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
+def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> np.ndarray:
     """What the deflection's u adds to the covariance: heights above the geoid tilt with it, 1 mm at 2" and 100 m."""
     total = np.zeros((len(KEYS), len(KEYS)))
     for name in ("xi", "eta"):
         ends = [
-            monument_place(frame_of(sheet, **{name: sign * TILT}), given, np.zeros((3, 3)), system=sheet.system)[0]
+            monument_place(frame_of(sheet, **{name: sign * TILT}), coordinates, np.zeros((3, 3)), system=sheet.system)[
+                0
+            ]
             for sign in (1.0, -1.0)
         ]
         slope = (ends[0] - ends[1]) / (2.0 * TILT)
@@ -156,19 +158,19 @@ def _by_deflection(sheet: PlaceSheet, given: np.ndarray) -> np.ndarray:
     return total
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray
 ) -> Calibration:
     sheet = readings.sheet
-    found = quantities(KEYS, values, covariance)
+    calibrated = quantities(KEYS, values, covariance)
     latitude, longitude = values[3] * DEGREE, values[4] * DEGREE
     scale, convergence = grid(latitude, longitude)
     height = frame.geodetic(values[:3] * MILLIMETRE)[2]
     factor = float(elevation_factor(latitude, height))
     held = readings.words.get("fixed", ("",) * len(readings))[row]
-    value = {q.key: q.value for q in found}
-    record = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
-    record |= {f"u_{q.key}": q.u for q in found[:3]}
+    value = {q.key: q.value for q in calibrated}
+    record: dict[str, RecordValue] = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
+    record |= {f"u_{q.key}": q.u for q in calibrated[:3]}
     record |= {key: value[key] for key in ("latitude_deg", "longitude_deg", "elevation_m", "wv_x_m", "wv_y_m")}
     record["wv_z_m"] = value["elevation_m"]
     back = frame.from_state_plane(frame.state_plane(values[:3] * MILLIMETRE)) / MILLIMETRE - values[:3]
@@ -179,7 +181,7 @@ def _told(
         kind=KIND,
         title=f"Place of monument {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("point", "x_m", "y_m", "z_m"),
         rows=tuple(

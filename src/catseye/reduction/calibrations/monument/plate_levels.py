@@ -11,7 +11,7 @@ the orientation) takes out its wedge. Unequal balls tilt the plate in the mount'
 shows it. The level knows the plumb line here; alpha2 and alpha3 stand against the ground frame's z, 3.9" away at 120 m.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -20,8 +20,14 @@ from catseye.geometry.frames.plumb import lean, mount_angles, plumb_from_ground
 from catseye.geometry.mirror.mount import gamma
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle, frame_of
 
@@ -79,13 +85,18 @@ def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibratio
     def fitted(acting: list[Effect], active: np.ndarray, leave: bool) -> CalibrationFit:
         names = ["tilt of x^", "tilt of z^", "level's zero"]
         return fit_readings(
-            observed, design, scatter, names=names, effects=acting, active=active, reject=leave, level=sheet.level
+            observed,
+            design,
+            scatter,
+            names=names,
+            effects=acting,
+            options=FitOptions(active=active, reject=leave, level=sheet.level),
         )
 
     first = fitted(effects, readings.active, reject)
     tilted = design[:, :2] @ first.x[:2]  # the scale acts on the tilts, which the first fit knows well enough
     scale = Effect("scale of the level, %", 0.01 * tilted, sheet.u_scale_percent)
-    return _told(readings, fitted([*effects, scale], first.active, False))
+    return _calibration(readings, fitted([*effects, scale], first.active, False))
 
 
 def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
@@ -101,7 +112,7 @@ def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
     ]  # fmt: skip
 
 
-def _in_ground(sheet: Any, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0.0) -> np.ndarray:
+def _in_ground(sheet: PlateSheet, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0.0) -> np.ndarray:
     """alpha2, alpha3 (rad) against the ground frame, from the tilts of x^ and z^ above the level's horizon."""
     place = np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE
     plumb = plumb_from_ground(frame_of(sheet, xi=xi, eta=eta), place)
@@ -112,10 +123,9 @@ def _in_ground(sheet: Any, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0
     return mount_angles(local @ plumb)[1:]
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
-    sheet = readings.sheet
+def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values (3,) of alpha2, alpha3 (rad) and the level's zero (arcsec), covariance, derivatives by what was fitted."""
     tilts = np.sin(fit.x[:2])
-    found = _in_ground(sheet, tilts)
     turn = np.zeros((3, 3))
     turn[0, 0], turn[1, 1], turn[2, 2] = 1.0, -1.0, 1.0 / ARCSECOND  # tilts below 0.1 rad add as vectors to 1 %
     by_deflection = np.zeros((3, 2))
@@ -124,40 +134,49 @@ def _told(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
         by_deflection[:2, column] = (moved[0] - moved[1]) / (2.0 * STEP)
     u_deflection = sheet.u_deflection_arcsec * ARCSECOND
     covariance = turn @ fit.covariance @ turn.T + u_deflection**2 * by_deflection @ by_deflection.T
+    return np.array([*_in_ground(sheet, tilts), fit.x[2] / ARCSECOND]), covariance, turn
+
+
+def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
+    """Where the level and the plate lay, what was read, and how it fits."""
+    orientation, observed = readings.get("orientation_deg"), readings.get("reading_arcsec")
+    return tuple(
+        (
+            float(orientation[k]),
+            *((float(readings.get("plate_deg")[k]),) if "plate_deg" in readings.numbers else ()),
+            float(observed[k]),
+            float(fit.residual[k] / ARCSECOND),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
+def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
+    sheet = readings.sheet
+    values, covariance, turn = _derived(sheet, fit)
     keys = [
         ("alpha2_rad", "rad", "turn of the mount about z^, against the ground frame's z"),
         ("alpha3_rad", "rad", "turn of the mount about x^, against the ground frame's z"),
         ("level_zero_arcsec", "arcsec", "what the level reads on a level plate"),
     ]
-    values = np.array([*found, fit.x[2] / ARCSECOND])
-    given = quantities(keys, values, covariance, fit=fit, turn=turn)
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=turn)
     leans = lean(frame_of(sheet), np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE) / ARCSECOND
     local = np.array([fit.x[0], -fit.x[1]]) / ARCSECOND
-    orientation = readings.get("orientation_deg")
     around = np.linspace(0.0, 360.0, 361)
     wave = np.column_stack([np.cos(around * DEGREE), np.sin(around * DEGREE), np.ones(361)]) @ fit.x
-    on, where = fit.active, np.mod(orientation, 360.0)
-    observed = readings.get("reading_arcsec")
+    on, where = fit.active, np.mod(readings.get("orientation_deg"), 360.0)
     cleared = (fit.predicted + fit.residual) / ARCSECOND  # wedge, balls and scale as adjusted are taken out
     return Calibration(
         kind=KIND,
         title=f"Plate levels of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=given,
+        quantities=calibrated,
         covariance=covariance,
         columns=("orientation_deg", *(("plate_deg",) if "plate_deg" in readings.numbers else ()), "reading_arcsec",
                  "residual_arcsec", fit.test, "state"),
-        rows=tuple(
-            (
-                float(orientation[k]),
-                *((float(readings.get("plate_deg")[k]),) if "plate_deg" in readings.numbers else ()),
-                float(observed[k]),
-                float(fit.residual[k] / ARCSECOND),
-                float(fit.statistic[k]),
-                state,
-            )
-            for k, state in enumerate(fit.state(readings.left_out))
-        ),
+        rows=_rows(readings, fit),
         decisions=fit.decisions(),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),

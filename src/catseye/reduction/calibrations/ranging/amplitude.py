@@ -12,7 +12,7 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient
@@ -84,14 +84,14 @@ def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibr
         scatter,
         names=names[:wanted],
         effects=effects,
-        active=on,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=on, reject=reject, level=sheet.level),
     )
     longer = None
     if wanted == 2 and fit.active.sum() > 4 and len(set(amplitude[fit.active])) > 2:
-        longer = fit_readings(observed, design, scatter, names=names, effects=effects, active=fit.active)
-    return _told(readings, fit, observed, levels[:, 0], longer)
+        longer = fit_readings(
+            observed, design, scatter, names=names, effects=effects, options=FitOptions(active=fit.active)
+        )
+    return _calibration(readings, fit, observed, levels[:, 0], longer)
 
 
 def _scatter(readings: SheetReadings) -> ObservedScatter:
@@ -129,7 +129,7 @@ def _line_decision(longer: CalibrationFit | None) -> TestOutcome:
     return TestOutcome(name, statistic, limit, passed, text)
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, fit: CalibrationFit, observed: np.ndarray, level: np.ndarray, longer: CalibrationFit | None
 ) -> Calibration:
     sheet, on = readings.sheet, fit.active
@@ -139,7 +139,7 @@ def _told(
         ("amplitude_to_phase_quadratic_rad", "rad", "the same for its square"),
     ][: len(keep)]
     covariance = fit.covariance[np.ix_(keep, keep)]
-    found = quantities(keys, fit.x[keep], covariance, fit=fit, turn=np.eye(len(fit.x))[keep])
+    calibrated = quantities(keys, fit.x[keep], covariance, fit=fit, turn=np.eye(len(fit.x))[keep])
     amplitude = readings.get("amplitude_target_volt")
     weakest = float(np.min(np.log(amplitude[on] / sheet.reference_amplitude_volt)))
     effect = float(fit.x[0] * weakest + (fit.x[2] * weakest**2 if sheet.quadratic else 0.0))
@@ -161,7 +161,7 @@ def _told(
         kind=KIND,
         title=f"Amplitude-to-phase coupling of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("reading", "amplitude_volt", "ln_amplitude", "phase_mrad", "residual_mrad", fit.test, "state"),
         rows=rows,
@@ -185,7 +185,7 @@ def _told(
         method="One target that does not move is seen through several attenuations. A line of its phase, leakage taken "
         "out, against the logarithm of amplitude is adjusted; noise goes with one over the amplitude, and what is left "
         "of the leakage is a systematic effect with a prior.",
-        record={"amplitude_to_phase_rad": found[0].value, "u_amplitude_to_phase_rad": found[0].u}
+        record={"amplitude_to_phase_rad": calibrated[0].value, "u_amplitude_to_phase_rad": calibrated[0].u}
         if not sheet.quadratic
         else {},
     )

@@ -5,6 +5,7 @@
 n is the group index of the glass over that of the air. Dimensions are those at 20 °C.
 """
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -14,8 +15,14 @@ from catseye.geometry.catenary import expanded
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     provenance,
@@ -68,7 +75,7 @@ def calibrate_prism(readings: SheetReadings, reject: bool = False) -> Calibratio
 
     Source: [GOLDMAN00] eqs. 3.9 and 3.10.
     """
-    fit, _ = _dimensions(readings, readings.get("height_mm"), np.ones((len(readings), 1)), ["height"], reject)
+    fit = _dimensions(readings, readings.get("height_mm"), np.ones((len(readings), 1)), ["height"], reject)
     n, h = readings.sheet.index_ratio, fit.x[0]
     values = np.array([h, float(prism.reference_depth(h, n)), float(prism.range_constant(h, n))])
     by_size = np.array([1.0, 1.0 / n, -(n - 1.0 / n)])
@@ -78,8 +85,8 @@ def calibrate_prism(readings: SheetReadings, reject: bool = False) -> Calibratio
         ("hrp_mm", "mm", "reference point below the entry face"),
         ("pc_mm", "mm", "range constant at normal incidence, added to the measured length"),
     ]
-    return _told(
-        readings, fit, PRISM, "Prism", keys, values=values, by_size=by_size[:, None], by_index=by_index,
+    return _calibration(
+        readings, fit, GlassConstants(keys, values, by_size[:, None], by_index), kind=PRISM, what="Prism",
         record={"height_mm": values[0], "u_height_mm": float(np.sqrt(fit.covariance[0, 0])), "hrp_mm": values[1],
                 "pc_mm": values[2]},
     )  # fmt: skip
@@ -98,7 +105,7 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
         if part not in PARTS:
             raise readings.refuse(row, f"part = {part!r} is not known (expected 'r1', small ball, or 'r2', shell)")
         design[row, PARTS.index(part)] = 1.0
-    fit, _ = _dimensions(readings, readings.get("radius_mm"), design, ["radius r1", "radius r2"], reject)
+    fit = _dimensions(readings, readings.get("radius_mm"), design, ["radius r1", "radius r2"], reject)
     n, (r1, r2) = readings.sheet.index_ratio, fit.x
     values = np.array([r1, r2, float(cats_eye.range_constant(r1, r2, n))])
     by_size = np.array([[1.0, 0.0], [0.0, 1.0], [-(n - 1.0), -n]])
@@ -108,25 +115,25 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
         ("r2_mm", "mm", "radius of the silvered shell at 20 °C"),
         ("pc_b_mm", "mm", "range constant, added to the measured length"),
     ]
-    return _told(
-        readings, fit, BALL, "Ball", keys, values=values, by_size=by_size, by_index=by_index,
+    return _calibration(
+        readings, fit, GlassConstants(keys, values, by_size, by_index), kind=BALL, what="Ball",
         record={"r1_mm": r1, "r2_mm": r2, "u_r_mm": float(np.sqrt(fit.covariance.diagonal().max())),
                 "pc_b_mm": values[2]},
     )  # fmt: skip
 
 
 def _dimensions(
-    readings: SheetReadings, seen: np.ndarray, design: np.ndarray, names: list[str], reject: bool
-) -> tuple[CalibrationFit, np.ndarray]:
+    readings: SheetReadings, measured: np.ndarray, design: np.ndarray, names: list[str], reject: bool
+) -> CalibrationFit:
     """Sizes at 20 °C, mm, from readings at their temperature."""
     sheet, m = readings.sheet, len(readings)
     temperature = readings.get("temperature_c")
     expansion = sheet.expansion_ppm_per_c * PPM
-    observed = seen / expanded(1.0, temperature, expansion)
+    observed = measured / expanded(1.0, temperature, expansion)
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))
-    fit = fit_readings(
+    return fit_readings(
         observed,
         design,
         scatter,
@@ -136,29 +143,39 @@ def _dimensions(
             Effect("offset of the thermometer, °C", observed * expansion, sheet.u_temperature_c),
             Effect("expansion, ppm/°C", observed * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
         ],
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
-    return fit, observed
 
 
-def _told(
+@dataclass(frozen=True, eq=False)
+class GlassConstants:
+    """Constants that follow from p sizes of the glass and the ratio of its group index over the air's.
+
+    keys       (q,) key, unit and meaning of each
+    values     (q,) in their units
+    by_size    (q, p) derivatives by the sizes, mm
+    by_index   (q,) derivatives by the ratio
+    """
+
+    keys: list[tuple[str, str, str]]
+    values: np.ndarray
+    by_size: np.ndarray
+    by_index: np.ndarray
+
+
+def _calibration(
     readings: SheetReadings,
     fit: CalibrationFit,
+    constants: GlassConstants,
+    *,
     kind: str,
     what: str,
-    keys: list[tuple[str, str, str]],
-    *,
-    values: np.ndarray,
-    by_size: np.ndarray,
-    by_index: np.ndarray,
     record: dict[str, float],
 ) -> Calibration:
-    sheet = readings.sheet
+    sheet, by_size, by_index = readings.sheet, constants.by_size, constants.by_index
     covariance = by_size @ fit.covariance @ by_size.T + sheet.u_index_ratio**2 * np.outer(by_index, by_index)
     covariance = 0.5 * (covariance + covariance.T)
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (*(words[k] for words in readings.words.values()), float(fit.predicted[k] + fit.residual[k]),
          float(1e3 * fit.residual[k]), float(fit.statistic[k]), state)
         for k, state in enumerate(fit.state(readings.left_out))
@@ -167,7 +184,7 @@ def _told(
         kind=kind,
         title=f"{what} constants of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=quantities(keys, values, covariance, fit=fit, turn=by_size),
+        quantities=quantities(constants.keys, constants.values, covariance, fit=fit, turn=by_size),
         covariance=covariance,
         columns=(*readings.words, "size_at_20_c_mm", "residual_um", fit.test, "state"),
         rows=rows,

@@ -11,8 +11,8 @@ import numpy as np
 
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 
@@ -54,12 +54,9 @@ def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibrat
         np.kron(np.eye(2), np.ones((m, 1))),
         _scatter(readings, names, len(sessions)),
         names=["real part", "imaginary part"],
-        active=np.tile(on, 2),
-        together=np.tile(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=np.tile(on, 2), together=np.tile(np.arange(m), 2), reject=reject, level=sheet.level),
     )
-    return _told(readings, fit, z, names, len(sessions))
+    return _calibration(readings, fit, z, names, len(sessions))
 
 
 def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> ObservedScatter:
@@ -93,20 +90,16 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
     return TestOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
 
 
-def _told(
-    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
-) -> Calibration:
-    sheet, m = readings.sheet, len(z)
-    leakage = complex(*fit.x)
-    found, polar = polar_quantities(leakage, fit.covariance, fit)
-    between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
-    u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
-    to_come = float(np.hypot(u_mean, between))
-    residual = z - leakage
+def _rows(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...]
+) -> tuple[tuple[Cell, ...], ...]:
+    """Each buffer's phasor and residual in mV; statistic and state are those of its worse quadrature."""
+    m = len(z)
+    residual = z - complex(*fit.x)
     statistic = np.abs(fit.statistic).reshape(2, m).max(axis=0)
     states = fit.state((*readings.left_out, *readings.left_out))
     worst = [b if b == "suspect" else a for a, b in zip(states[:m], states[m:], strict=True)]
-    rows = tuple(
+    return tuple(
         (
             readings.where[k],
             names[k],
@@ -119,22 +112,33 @@ def _told(
         )
         for k in range(m)
     )
-    on = fit.active[:m]
+
+
+def _calibration(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...], sessions: int
+) -> Calibration:
+    sheet = readings.sheet
+    leakage = complex(*fit.x)
+    calibrated, polar = polar_quantities(leakage, fit.covariance, fit)
+    between = sheet.u_session_volt if sheet.u_session_volt is not None else fit.components.get(SESSION, 0.0)
+    u_mean = float(np.sqrt(0.5 * np.trace(fit.covariance)))
+    to_come = float(np.hypot(u_mean, between))
+    on = fit.active[: len(z)]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     circle = leakage + 2.0 * to_come * np.exp(1j * turn)
-    told = [
+    notes = [
         f"{int(on.sum())} buffers of {sessions} {'session' if sessions == 1 else 'sessions'}; the mean is known to "
         f"{u_mean / MILLIVOLT:.3g} mV in each quadrature",
         f"u_leakage_volt of the record is {to_come / MILLIVOLT:.3g} mV: of the leakage of a session to come, that of "
         f"the mean and {between / MILLIVOLT:.3g} mV between sessions together",
     ]
     if sessions == 1 and sheet.u_session_volt is None:
-        told.append("one session says nothing of other days: measure others, or state u_session_volt")
+        notes.append("one session says nothing of other days: measure others, or state u_session_volt")
     return Calibration(
         kind=KIND,
         title=f"Leakage of {sheet.instrument}, beam blocked",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=polar,
         columns=(
             "reading",
@@ -146,11 +150,11 @@ def _told(
             f"largest |{fit.test}|",
             "state",
         ),
-        rows=rows,
+        rows=_rows(readings, fit, z, names),
         decisions=(_sessions_decision(sheet, sessions), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=(*told, *scatter_notes(fit, "mV", MILLIVOLT)),
+        notes=(*notes, *scatter_notes(fit, "mV", MILLIVOLT)),
         curve={
             "readings": (z[on].real / MILLIVOLT, z[on].imag / MILLIVOLT),
             "left out": (z[~on].real / MILLIVOLT, z[~on].imag / MILLIVOLT),
@@ -161,7 +165,7 @@ def _told(
         "adjusted, alike in both quadratures, with the scatter of buffers and between sessions as the sheet claims it "
         "or as the readings show it. The circle of the figure holds two standard uncertainties of the leakage of a "
         "session to come.",
-        record=leakage_record(found, to_come),
+        record=leakage_record(calibrated, to_come),
         equal_axes=True,
     )
 

@@ -14,8 +14,8 @@ from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 from catseye.signal.systematics.leakage import circle_leakage
@@ -57,9 +57,9 @@ def calibrate_lit_leakage(readings: SheetReadings, reject: bool = False) -> Cali
     z = phasors(readings)
     fit, m = (_along(readings, z, reject), len(z)) if "distance_m" in readings.numbers else (None, len(z))
     if fit is not None:
-        return _told(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
+        return _calibration(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
     fit = _circle(readings, z, reject)
-    return _told(readings, fit, z, fit.statistic, known=False)
+    return _calibration(readings, fit, z, fit.statistic, known=False)
 
 
 def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
@@ -85,18 +85,17 @@ def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationF
         np.concatenate(design),
         _scatter(readings, 2),
         names=[f"{part} part of the {name}" for name in names for part in ("real", "imaginary")],
-        active=np.tile(readings.active, 2),
-        together=np.tile(np.arange(m), 2),
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(
+            active=np.tile(readings.active, 2), together=np.tile(np.arange(m), 2), reject=reject, level=sheet.level
+        ),
     )
 
 
 def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
     """Unknown positions: distances from a circle, linearised where the fit settles."""
     on = readings.active
-    found = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
-    point = np.array([found.phasor.real, found.phasor.imag, float(np.mean(np.abs(z[on] - found.phasor)))])
+    circle = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
+    point = np.array([circle.phasor.real, circle.phasor.imag, float(np.mean(np.abs(z[on] - circle.phasor)))])
     scatter = _scatter(readings, 1)
     for _ in range(ROUNDS):
         arm = z - complex(point[0], point[1])
@@ -107,9 +106,7 @@ def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> Calibration
             design,
             scatter,
             names=["real part of the leakage", "imaginary part of the leakage", "amplitude of the light"],
-            active=on,
-            reject=reject,
-            level=readings.sheet.level,
+            options=FitOptions(active=on, reject=reject, level=readings.sheet.level),
         )
         point = point + fit.x
         on = fit.active
@@ -132,23 +129,15 @@ def _arc(arm: np.ndarray) -> float:
     return float(TWO_PI - gaps.max())
 
 
-def _told(
+def _rows(
     readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
-) -> Calibration:
-    sheet, m = readings.sheet, len(z)
-    leakage = complex(fit.x[0], fit.x[1])
-    centre = fit.covariance[:2, :2]
-    found, polar = polar_quantities(leakage, centre, fit)
-    u_centre = float(np.sqrt(0.5 * np.trace(centre)))
-    to_come = float(np.hypot(u_centre, sheet.u_session_volt))
+) -> tuple[tuple[Cell, ...], ...]:
+    """Each reading's phasor and residual in mV, statistic and state; with known positions of its worse quadrature."""
+    m = len(z)
     states = fit.state(readings.left_out * (2 if known else 1))
     states = tuple(b if b == "suspect" else a for a, b in zip(states[:m], states[-m:], strict=True))
     residual = np.hypot(fit.residual[:m], fit.residual[m:]) if known else fit.residual
-    on = fit.active[:m]
-    arc = _arc((z - leakage)[on])
-    radius = float(np.median(np.abs(z - leakage)[on]))
-    ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
-    rows = tuple(
+    return tuple(
         (
             readings.where[k],
             float(z[k].real / MILLIVOLT),
@@ -159,6 +148,21 @@ def _told(
         )
         for k in range(m)
     )
+
+
+def _calibration(
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
+) -> Calibration:
+    sheet = readings.sheet
+    leakage = complex(fit.x[0], fit.x[1])
+    centre = fit.covariance[:2, :2]
+    calibrated, polar = polar_quantities(leakage, centre, fit)
+    u_centre = float(np.sqrt(0.5 * np.trace(centre)))
+    to_come = float(np.hypot(u_centre, sheet.u_session_volt))
+    on = fit.active[: len(z)]
+    arc = _arc((z - leakage)[on])
+    radius = float(np.median(np.abs(z - leakage)[on]))
+    ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
     covered = TestOutcome(
         "arc of the circle, rad",
         arc,
@@ -171,10 +175,10 @@ def _told(
         kind=KIND,
         title=f"Leakage of {sheet.instrument}, from a moving retroreflector",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=polar,
         columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
-        rows=rows,
+        rows=_rows(readings, fit, z, statistic, known=known),
         decisions=(covered, *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
@@ -197,7 +201,7 @@ def _told(
             if known
             else "the centre of the circle that fits them best."
         ),
-        record=leakage_record(found, to_come),
+        record=leakage_record(calibrated, to_come),
         equal_axes=True,
     )
 

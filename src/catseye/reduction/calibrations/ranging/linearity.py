@@ -13,8 +13,8 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.rail import KIND, LAYOUT, LinearitySheet, Rail, rail_of
@@ -48,7 +48,7 @@ def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibr
         active = _fit(rail, kept, effects, active, sheet.level, reject=True).active
     chosen, decisions = _chosen(rail, kept, effects, active, sheet)
     fit = _fit(rail, chosen, effects, active, sheet.level)
-    return _told(readings, rail, fit, chosen, (*decisions, *fit.decisions()), reason)
+    return _calibration(readings, rail, fit, chosen, (*decisions, *fit.decisions()), reason)
 
 
 def _design(rail: Rail, orders: tuple[int, ...]) -> np.ndarray:
@@ -72,9 +72,7 @@ def _fit(
         rail.scatter,
         names=names,
         effects=effects,
-        active=active,
-        reject=reject,
-        level=level,
+        options=FitOptions(active=active, reject=reject, level=level),
     )
 
 
@@ -98,8 +96,8 @@ def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], st
     room = (int(on.sum()) - 4) // 2  # readings that are left over must tell the scatter
     tried = min(wanted, max(room, 0))
     others = np.column_stack([np.ones(len(length)), length - length.mean()])
-    found = separable_orders(phase, tried, others=others).orders if tried else ()
-    orders = tuple(k for k, got in zip(range(1, tried + 1), found, strict=False) if k == got)
+    separate = separable_orders(phase, tried, others=others).orders if tried else ()
+    orders = tuple(k for k, got in zip(range(1, tried + 1), separate, strict=False) if k == got)
     if len(orders) < wanted:
         text = (
             f"cyclic orders above {len(orders)} {left}, because {int(on.sum())} positions over {span:.4g} m do not "
@@ -131,7 +129,7 @@ def _chosen(
     longest = _fit(rail, kept, effects, active, sheet.level)
     single = single_level(ORDER_LEVEL, len(kept))
     limit = float(fisher.isf(single, 2.0, degrees))
-    highest, told = 0, []
+    highest, outcomes = 0, []
     weight = np.linalg.inv(_covariance(rail, longest)[np.ix_(active, active)])
     squares = [_squares(rail, kept[:k], active, weight) for k in range(len(kept) + 1)]
     scale = max(squares[-1] / degrees, np.finfo(float).tiny)  # readings without any scatter are no division by zero
@@ -140,8 +138,8 @@ def _chosen(
         significant = bool(statistic > limit)
         highest = k if significant else highest
         text = f"F test of its two terms at the level {single:.2g}: {'' if significant else 'not '}significant"
-        told.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
-    return kept[:highest], tuple(told)
+        outcomes.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
+    return kept[:highest], tuple(outcomes)
 
 
 def _covariance(rail: Rail, fit: CalibrationFit) -> np.ndarray:
@@ -180,39 +178,11 @@ def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[li
     return keys, turn
 
 
-def _told(
-    readings: SheetReadings,
-    rail: Rail,
-    fit: CalibrationFit,
-    orders: tuple[int, ...],
-    decisions: tuple[TestOutcome, ...],
-    reason: str,
-) -> Calibration:
-    sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
-    keys, turn = _quantities(rail, orders, sheet.start_m is not None)
-    covariance = turn @ fit.covariance @ turn.T
-    found = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
-    count = len(orders)
-    record = {}
-    if count:
-        cyclic = found[2:]
-        record = {
-            "cyclic_cosine_mm": [q.value for q in cyclic[:count]],
-            "cyclic_sine_mm": [q.value for q in cyclic[count:]],
-            "u_cyclic_mm": max(q.u for q in cyclic),
-        }
-    on, residual = fit.active, fit.residual / micrometre
-    noise = _covariance(rail, fit)[np.ix_(on, on)]
-    period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, rail.half)
-    top = int(np.argmin(chance))
-    line = TestOutcome(
-        "spectrum of residuals: chance of the highest line",
-        float(chance[top]),
-        0.05,
-        bool(chance[top] >= 0.05),
-        f"{height[top] / micrometre:.2g} µm at a period of {period[top] * 1e3:.4g} mm, where the line is least likely",
-    )
-    rows = tuple(
+def _rows(readings: SheetReadings, rail: Rail, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
+    """Each position of the carriage, what was read there, and how it fits."""
+    micrometre = 1e-3 * MILLIMETRE
+    residual = fit.residual / micrometre
+    return tuple(
         (
             float(rail.length[k]),
             float(readings.numbers["range_m"][k]),
@@ -224,24 +194,76 @@ def _told(
         )
         for k, state in enumerate(fit.state(readings.left_out))
     )
-    smooth = rail.observed - fit.predicted
-    dense = np.linspace(rail.length[on].min(), rail.length[on].max(), 2000)
+
+
+def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -> TestOutcome:
+    """Whether a line stands out of the residuals' spectrum; periods and heights in m, and each line's probability."""
+    top = int(np.argmin(chance))
+    return TestOutcome(
+        "spectrum of residuals: chance of the highest line",
+        float(chance[top]),
+        0.05,
+        bool(chance[top] >= 0.05),
+        f"{height[top] / (1e-3 * MILLIMETRE):.2g} µm at a period of {period[top] * 1e3:.4g} mm, where the line is "
+        "least likely",
+    )
+
+
+def _notes(
+    fit: CalibrationFit, calibrated: tuple[Quantity, ...], count: int, reason: str, *, chosen: bool
+) -> tuple[str, ...]:
+    """What was modelled, and what its u holds.
+
+    count    of the cyclic orders modelled
+    reason   for these
+    chosen   the tests chose them, not the sheet
+    """
+    micrometre = 1e-3 * MILLIMETRE
     notes = [
         reason,
         f"{count} cyclic {'order is' if count == 1 else 'orders are'} modelled"
-        + ("; " + ", ".join(_amplitude(found, fit, k, count) for k in range(count)) if count else ""),
+        + ("; " + ", ".join(_amplitude(calibrated, fit, k, count) for k in range(count)) if count else ""),
         f"u of the offset from the scatter alone {np.sqrt(fit.scattered[0, 0]) / micrometre:.2g} µm; the rest are "
         "interferometer, air and start as the sheet states them",
         "the orders were chosen by the tests from these readings; their u takes the choice as given"
-        if sheet.orders is None and count
+        if chosen and count
         else "",
         *scatter_notes(fit, "µm", micrometre),
     ]
+    return tuple(note for note in notes if note)
+
+
+def _calibration(
+    readings: SheetReadings,
+    rail: Rail,
+    fit: CalibrationFit,
+    orders: tuple[int, ...],
+    decisions: tuple[TestOutcome, ...],
+    reason: str,
+) -> Calibration:
+    sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE
+    keys, turn = _quantities(rail, orders, sheet.start_m is not None)
+    covariance = turn @ fit.covariance @ turn.T
+    calibrated = quantities(keys, turn @ fit.x, covariance, fit=fit, turn=turn)
+    count = len(orders)
+    record: dict[str, RecordValue] = {}
+    if count:
+        cyclic = calibrated[2:]
+        record = {
+            "cyclic_cosine_mm": [q.value for q in cyclic[:count]],
+            "cyclic_sine_mm": [q.value for q in cyclic[count:]],
+            "u_cyclic_mm": max(q.u for q in cyclic),
+        }
+    on, residual = fit.active, fit.residual / micrometre
+    noise = _covariance(rail, fit)[np.ix_(on, on)]
+    period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, rail.half)
+    smooth = rail.observed - fit.predicted
+    dense = np.linspace(rail.length[on].min(), rail.length[on].max(), 2000)
     return Calibration(
         kind=KIND,
         title=f"Zero and linearity of {sheet.instrument} against an interferometer",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=(
             "distance_m",
@@ -252,11 +274,11 @@ def _told(
             fit.test,
             "state",
         ),
-        rows=rows,
-        decisions=(*decisions, line),
+        rows=_rows(readings, rail, fit),
+        decisions=(*decisions, _line_decision(period, height, chance)),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
-        notes=tuple(note for note in notes if note),
+        notes=_notes(fit, calibrated, count, reason, chosen=sheet.orders is None),
         curve={
             "readings": (rail.length[on], rail.observed[on] / micrometre),
             "left out": (rail.length[~on], rail.observed[~on] / micrometre),
@@ -273,9 +295,9 @@ def _told(
     )
 
 
-def _amplitude(found: tuple, fit: CalibrationFit, k: int, count: int) -> str:
+def _amplitude(calibrated: tuple[Quantity, ...], fit: CalibrationFit, k: int, count: int) -> str:
     """Amplitude of one order with its u, in micrometres."""
-    cosine, sine = found[2 + k].value, found[2 + count + k].value
+    cosine, sine = calibrated[2 + k].value, calibrated[2 + count + k].value
     size = float(np.hypot(cosine, sine))
     at = [2 + k, 2 + count + k]
     gradient = np.array([cosine, sine]) / size

@@ -55,9 +55,9 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
     if m < FEWEST:
         raise readings.refuse(m - 1, f"is the last of {m} readings (expected at least {FEWEST})")
     phase = np.unwrap(readings.get("phase_rad"))
-    found = noise_spectrum(phase, sheet.interval_s, false_alarm=sheet.false_alarm)
+    spectrum = noise_spectrum(phase, sheet.interval_s, false_alarm=sheet.false_alarm)
     allan = allan_deviation(phase)
-    quantity, covariance = _quantities(found, sheet)
+    quantity, covariance = _quantities(spectrum, sheet)
     interval = allan.interval()
     rows = tuple(
         (int(size), float(size * sheet.interval_s), float(d), float(low), float(high), kind,
@@ -65,8 +65,8 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         for size, d, (low, high), kind in zip(allan.size, allan.deviation, interval, allan.kind, strict=True)
     )  # fmt: skip
     time = allan.size * sheet.interval_s
-    white = found.white / np.sqrt(allan.size)
-    shown, line = allan.deviation > 0.0, np.full(len(time), found.white > 0.0)  # what has a logarithm
+    white = spectrum.white / np.sqrt(allan.size)
+    shown, line = allan.deviation > 0.0, np.full(len(time), spectrum.white > 0.0)  # what has a logarithm
     return Calibration(
         kind=KIND,
         title=f"Oscillator test of {sheet.instrument}",
@@ -78,10 +78,10 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         decisions=(
             TestOutcome(
                 "spurs: lines in the spectrum",
-                float(len(found.spurs)),
+                float(len(spectrum.spurs)),
                 0.0,
-                not found.spurs,
-                "no line stands out of the noise" if not found.spurs else _lines(found),
+                not spectrum.spurs,
+                "no line stands out of the noise" if not spectrum.spurs else _lines(spectrum),
             ),
         ),
         degrees_of_freedom=m - 1,
@@ -89,10 +89,10 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
             *(
                 f"spur at {s.frequency_hz:.4g} Hz (u {s.u_frequency_hz:.2g}): amplitude {s.amplitude:.3g} rad "
                 f"(u {s.u_amplitude:.2g}), false alarm {s.false_alarm:.1g}"
-                for s in found.spurs[:SHOWN]
+                for s in spectrum.spurs[:SHOWN]
             ),
             "spurs above half the sampling rate show folded below it",
-            f"a drift of {found.drift:+.3g} rad/s was taken out before the spectrum; the Allan deviation has it",
+            f"a drift of {spectrum.drift:+.3g} rad/s was taken out before the spectrum; the Allan deviation has it",
         ),
         curve={
             "readings": (np.log10(time[shown]), np.log10(allan.deviation[shown])),
@@ -106,29 +106,29 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
     )
 
 
-def _quantities(found: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[Quantity, ...], np.ndarray]:
+def _quantities(spectrum: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[Quantity, ...], np.ndarray]:
     """Coefficients (mrad^2) and the white part of a range's noise, with covariance."""
     per_range = (sheet.half_wavelength_mm * 1e3 / TWO_PI) / np.sqrt(sheet.cycles_per_range)
     slope = np.zeros((4, 3))
     slope[:3] = MRAD2 * np.eye(3)
-    slope[3, 0] = 0.5 * per_range / found.white if found.white > 0.0 else 0.0
-    covariance = slope @ found.covariance @ slope.T
-    values = (*(MRAD2 * found.squares), found.white * per_range)
+    slope[3, 0] = 0.5 * per_range / spectrum.white if spectrum.white > 0.0 else 0.0
+    covariance = slope @ spectrum.covariance @ slope.T
+    values = (*(MRAD2 * spectrum.squares), spectrum.white * per_range)
     keys = (
         ("white_mrad2", "mrad²", "variance of a reading, white"),
         ("flicker_mrad2", "mrad²", "h of the density h/f"),
         ("walk_mrad2", "mrad²", "variance of a step of the walk, reading to reading"),
         ("white_range_um", "µm", f"white noise of a range of {sheet.cycles_per_range} readings"),
     )
-    told = tuple(
+    calibrated = tuple(
         Quantity(key, float(v), float(np.sqrt(max(c, 0.0))), unit, meaning)
         for (key, unit, meaning), v, c in zip(keys, values, np.diag(covariance), strict=True)
     )
-    return told, covariance
+    return calibrated, covariance
 
 
-def _lines(found: NoiseSpectrum) -> str:
-    return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in found.spurs[:SHOWN])
+def _lines(spectrum: NoiseSpectrum) -> str:
+    return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in spectrum.spurs[:SHOWN])
 
 
 RECIPE = CalibrationKind("phase noise of the oscillator against averaging, with spurs", LAYOUT, measure_oscillator)

@@ -1,14 +1,12 @@
 """Tables of phasors: as real and imaginary part, or as amplitude and phase."""
 
-from typing import Any
-
 import numpy as np
 
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Quantity
+from catseye.reduction.calibrations.calibration import Quantity, RecordValue
 from catseye.reduction.calibrations.fit import CalibrationFit
 from catseye.reduction.calibrations.kind import quantities
 from catseye.signal.cycles.whole import fraction
@@ -56,10 +54,10 @@ def polar_quantities(
     return quantities(keys, values, polar, fit=fit, turn=turn), polar
 
 
-def leakage_record(found: tuple[Quantity, ...], u_volt: float) -> dict[str, Any]:
+def leakage_record(leakage: tuple[Quantity, ...], u_volt: float) -> dict[str, RecordValue]:
     """What goes into the ranger's record: one uncertainty of each quadrature."""
     return {
-        "leakage_amplitude_volt": found[0].value,
-        "leakage_phase_rad": found[1].value,
+        "leakage_amplitude_volt": leakage[0].value,
+        "leakage_phase_rad": leakage[1].value,
         "u_leakage_volt": u_volt,
     }

@@ -14,7 +14,13 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.fit import (
+    CalibrationFit,
+    Effect,
+    FitOptions,
+    ObservedScatter,
+    fit_readings,
+)
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.air import WEATHER, AirSheet, group_air, half_wavelength, ranger_effects
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -94,11 +100,9 @@ def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) 
         _scatter(readings, half),
         names=["D0", "scale"][: 1 + sheet.estimate_scale],
         effects=_effects(readings, length, phase, half, ranger_effects(readings, air, length)),
-        active=readings.active,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
-    return _told(readings, fit, observed=observed, cycles=cycles, margin=margin)
+    return _calibration(readings, fit, observed=observed, cycles=cycles, margin=margin)
 
 
 def _design(scale: bool, length: np.ndarray) -> np.ndarray:
@@ -140,7 +144,7 @@ def _effects(
     return effects
 
 
-def _told(
+def _calibration(
     readings: SheetReadings, fit: CalibrationFit, *, observed: np.ndarray, cycles: np.ndarray, margin: np.ndarray
 ) -> Calibration:
     sheet, distance = readings.sheet, readings.get("distance_m")
@@ -150,7 +154,7 @@ def _told(
         ("scale_ppm", "ppm", "by which ranges are too long"),
     ][: len(fit.x)]
     covariance = fit.covariance * np.outer(scale, scale)
-    found = quantities(keys, fit.x * scale, covariance, fit=fit, turn=np.diag(scale))
+    calibrated = quantities(keys, fit.x * scale, covariance, fit=fit, turn=np.diag(scale))
     micrometre = 1e-3 * MILLIMETRE
     rows = tuple(
         (
@@ -169,7 +173,7 @@ def _told(
         kind=KIND,
         title=f"Reference distance D0 of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("distance_m", "cycles", "margin_mm", "d0_mm", "residual_um", fit.test, "state"),
         rows=rows,
@@ -192,7 +196,7 @@ def _told(
         "length; the known distance less the target's constant less that length is the reference distance. The whole "
         "cycles are the nearest integers. The readings are adjusted together with all systematic effects as "
         "parameters with priors.",
-        record={"d0_mm": found[0].value, "u_d0_mm": found[0].u},
+        record={"d0_mm": calibrated[0].value, "u_d0_mm": calibrated[0].u},
     )
 
 

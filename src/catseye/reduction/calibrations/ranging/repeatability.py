@@ -46,11 +46,11 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
     for row, name in enumerate(sets):
         if not name:
             raise readings.refuse(row, "set is empty (expected a word for it)")
-    found = analysed(value[on], [sets[k] for k in on], level=readings.sheet.test_level)
+    analysis = analysed(value[on], [sets[k] for k in on], level=readings.sheet.test_level)
     means = dict.fromkeys(sets, float("nan"))  # of a set that is left out as a whole nothing is known
     means |= {name: float(np.mean([value[k] for k in on if sets[k] == name])) for name in {sets[k] for k in on}}
     rows = tuple(
-        (sets[k], float(value[k] * MICROMETRE), float(value[k] - means[sets[k]]), float(means[sets[k]] - found.mean),
+        (sets[k], float(value[k] * MICROMETRE), float(value[k] - means[sets[k]]), float(means[sets[k]] - analysis.mean),
          f"left out: {readings.left_out[k]}" if readings.left_out[k] else "used")
         for k in range(len(readings))
     )  # fmt: skip
@@ -59,7 +59,7 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
         ("between_um", "µm", "standard deviation from set to set beyond that"),
         ("intermediate_um", "µm", "standard deviation of a range at another time"),
     ]
-    values, covariance = _deviations(found)
+    values, covariance = _deviations(analysis)
     number = np.arange(1, len(readings) + 1)
     return Calibration(
         kind=KIND,
@@ -72,20 +72,22 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
         decisions=(
             TestOutcome(
                 "sets agree: F",
-                found.f,
-                found.f_limit,
-                not found.sets_differ,
-                "the sets differ by more than their readings scatter" if found.sets_differ else "no set stands apart",
+                analysis.f,
+                analysis.f_limit,
+                not analysis.sets_differ,
+                "the sets differ by more than their readings scatter"
+                if analysis.sets_differ
+                else "no set stands apart",
             ),
         ),
-        degrees_of_freedom=found.degrees_within,
+        degrees_of_freedom=analysis.degrees_within,
         notes=(
-            f"mean {found.mean * MICROMETRE:.6f} m, u {found.u_mean:.2g} µm by the scatter alone, of "
-            f"{found.degrees_between} degrees of freedom: {stdtrit(found.degrees_between, 0.975):.2f} u for 95 %",
+            f"mean {analysis.mean * MICROMETRE:.6f} m, u {analysis.u_mean:.2g} µm by the scatter alone, of "
+            f"{analysis.degrees_between} degrees of freedom: {stdtrit(analysis.degrees_between, 0.975):.2f} u for 95 %",
         ),
         curve={
-            "readings": (number[on], value[on] - found.mean),
-            "fit": (number, np.array([means[name] for name in sets]) - found.mean),
+            "readings": (number[on], value[on] - analysis.mean),
+            "fit": (number, np.array([means[name] for name in sets]) - analysis.mean),
         },
         axes=("reading", "range less the mean (µm); line: its set"),
         method="One-way analysis of variance: the scatter of readings about the mean of their set, and of the sets' "
@@ -94,17 +96,17 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
     )
 
 
-def _deviations(found: Repeatability) -> tuple[np.ndarray, np.ndarray]:
+def _deviations(analysis: Repeatability) -> tuple[np.ndarray, np.ndarray]:
     """Within, between and intermediate standard deviation, and their covariance to first order.
 
     The mean squares are independent, each of variance 2 s^4 / v; between^2 is their difference over the size of a set.
     """
-    within, between = found.within**2, found.between**2
-    size = found.usual  # readings a set that count
-    squares = np.array([within, found.f * within])
-    variance = np.diag(2.0 * squares**2 / [found.degrees_within, found.degrees_between])
+    within, between = analysis.within**2, analysis.between**2
+    size = analysis.usual  # readings a set that count
+    squares = np.array([within, analysis.f * within])
+    variance = np.diag(2.0 * squares**2 / [analysis.degrees_within, analysis.degrees_between])
     by_square = np.array([[1.0, 0.0], [-1.0 / size, 1.0 / size], [1.0 - 1.0 / size, 1.0 / size]])
-    values = np.array([found.within, found.between, found.intermediate])
+    values = np.array([analysis.within, analysis.between, analysis.intermediate])
     covariance = by_square @ variance @ by_square.T
     size_of = values.copy()
     if between == 0.0:  # its square is uncertain all the same, its root as the root of that

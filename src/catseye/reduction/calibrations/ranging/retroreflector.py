@@ -13,8 +13,8 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 
@@ -64,15 +64,16 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
     """
     sheet = readings.sheet
     names, on = readings.words["retroreflector"], readings.active
-    seen = sorted({name for name, a in zip(names, on, strict=True) if a})
-    if sheet.reference not in seen:
+    measured = sorted({name for name, a in zip(names, on, strict=True) if a})
+    if sheet.reference not in measured:
         raise refusal(
             readings.file, f"no reading of {shown(sheet.reference)}, the reference that {readings.sheet_file} names"
         )
-    unknown = [name for name in seen if name != sheet.reference]
+    unknown = [name for name in measured if name != sheet.reference]
     if not unknown or "" in names:
         raise refusal(
-            readings.file, f"column retroreflector holds {', '.join(map(shown, seen))} (expected an unknown one too)"
+            readings.file,
+            f"column retroreflector holds {', '.join(map(shown, measured))} (expected an unknown one too)",
         )
     range_ = readings.get("range_m")
     phase = np.mod(-2.0 * TWO_PI * sheet.modulation_hz / SPEED_OF_LIGHT * range_, TWO_PI)
@@ -82,11 +83,9 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
         _scatter(readings),
         names=_parameters(readings, unknown),
         effects=cyclic_effects(phase, sheet.u_cyclic_mm),
-        active=on,
-        reject=reject,
-        level=sheet.level,
+        options=FitOptions(active=on, reject=reject, level=sheet.level),
     )
-    return _told(readings, fit, unknown)
+    return _calibration(readings, fit, unknown)
 
 
 def _positions(readings: SheetReadings) -> tuple[np.ndarray, list[str]]:
@@ -143,7 +142,37 @@ def _scatter(readings: SheetReadings) -> ObservedScatter:
     return ObservedScatter(claimed, unknown)
 
 
-def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
+def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
+    """When and where each retroreflector was read, its range, and how it fits."""
+    hours, range_ = readings.hours(), readings.get("range_m")
+    positions = readings.words.get("position", ("",) * len(readings))
+    return tuple(
+        (
+            float(hours[k]),
+            positions[k] or "-",
+            readings.words["retroreflector"][k],
+            float(range_[k]),
+            float(fit.residual[k] / (1e-3 * MILLIMETRE)),
+            float(fit.statistic[k]),
+            state,
+        )
+        for k, state in enumerate(fit.state(readings.left_out))
+    )
+
+
+def _seatings_decision(readings: SheetReadings, count: int) -> TestOutcome:
+    """Whether each of the retroreflectors, `count` unknown ones and the reference, was seated more than once."""
+    alternations = int(np.max(_seatings(readings))) + 1
+    return TestOutcome(
+        "seatings",
+        float(alternations),
+        float(2 * (count + 1)),
+        alternations >= 2 * (count + 1),
+        "each retroreflector should be seated twice or more: a single one cannot show a bad seat",
+    )
+
+
+def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> Calibration:
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
     values = sheet.pc_mm - difference
@@ -152,49 +181,25 @@ def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> C
         ("pc_mm" if count == 1 else f"pc_{name}_mm", "mm", f"range constant of {name}, added to the measured length")
         for name in unknown
     ]
-    found = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
-    hours, range_, on = readings.hours(), readings.get("range_m"), fit.active
-    names = readings.words["retroreflector"]
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
+    hours, on = readings.hours(), fit.active
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
     held = fit.x.copy()
     held[count + 1 :: 2] *= 0.0 if sheet.drift else 1.0
     line = (fit.predicted - _design(readings, unknown) @ held) / micrometre
     drawn = line + fit.residual / micrometre
-    given = readings.words.get("position", ("",) * len(readings))
-    rows = tuple(
-        (
-            float(hours[k]),
-            given[k] or "-",
-            names[k],
-            float(range_[k]),
-            float(fit.residual[k] / micrometre),
-            float(fit.statistic[k]),
-            state,
-        )
-        for k, state in enumerate(fit.state(readings.left_out))
-    )
     order = np.argsort(hours)
     drifts = fit.x[count + 1 :: 2] / micrometre if sheet.drift else np.zeros(0)
     scatter = np.sqrt(np.diag(fit.scattered)[:count]) / micrometre
-    alternations = int(np.max(_seatings(readings))) + 1
     return Calibration(
         kind=KIND,
         title=f"Range constant of {', '.join(unknown)} against {sheet.reference}",
         provenance=provenance(readings),
-        quantities=found,
+        quantities=calibrated,
         covariance=covariance,
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
-        rows=rows,
-        decisions=(
-            TestOutcome(
-                "seatings",
-                float(alternations),
-                float(2 * (count + 1)),
-                alternations >= 2 * (count + 1),
-                "each retroreflector should be seated twice or more: a single one cannot show a bad seat",
-            ),
-            *fit.decisions(),
-        ),
+        rows=_rows(readings, fit),
+        decisions=(_seatings_decision(readings, count), *fit.decisions()),
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -215,9 +220,9 @@ def _told(readings: SheetReadings, fit: CalibrationFit, unknown: list[str]) -> C
         method="The retroreflectors take turns in the same seat. Their differences, the level and a line in time of "
         "each position are adjusted together, seatings and readings scattering as the sheet claims it or as the "
         "readings show it; the cyclic terms that the two lengths do not share are systematic effects with priors.",
-        record={"pc_mm": found[0].value, "u_pc_mm": found[0].u}
+        record={"pc_mm": calibrated[0].value, "u_pc_mm": calibrated[0].u}
         if count == 1
-        else {name: {"pc_mm": q.value, "u_pc_mm": q.u} for name, q in zip(unknown, found, strict=True)},
+        else {name: {"pc_mm": q.value, "u_pc_mm": q.u} for name, q in zip(unknown, calibrated, strict=True)},
     )
 
 
