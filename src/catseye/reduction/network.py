@@ -90,17 +90,17 @@ def adjusted(
         return adjust_network(network, inflation=inflation, alone=True, diagnose=False, engine=engine).fits
 
     if robust is not None:
-        found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
-        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
+        estimate = estimate_robustly(solve, sizes, method=robust, places=_places(network))
+        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
         solution = _final(network, inflation, placed, alone=True)
-        notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
+        notes = () if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",)
         result = replace(
             result,
             solution=solution,
             treatment=robust,
-            weights=found.weights,
-            rejected=found.rejected,
-            undecided=found.undecided,
+            weights=estimate.weights,
+            rejected=estimate.rejected,
+            undecided=estimate.undecided,
             notes=notes,
         )
     elif reject:
@@ -175,13 +175,15 @@ def _with_components(
         model: GroupFactors | RowModel = GroupFactors(tuple(g.name for g in network.groups), sizes)
     else:
         model = _ranger_model(network, result.solution)
-    found = variance_components(scaled, model)
-    inflation = model.scales(found.values)
+    components = variance_components(scaled, model)
+    inflation = model.scales(components.values)
     if out is not None:
         inflation = [s * o for s, o in zip(inflation, out, strict=True)]
     solution = _final(network, inflation, placed, alone=False)
-    notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
-    return replace(result, solution=solution, components=found, notes=notes)
+    notes = result.notes
+    if components.status != CONVERGED:
+        notes = (*notes, f"variance components {components.status}")
+    return replace(result, solution=solution, components=components, notes=notes)
 
 
 def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:

@@ -107,10 +107,10 @@ def path_temperatures(
     Source: [PARKER04] eqs. 4.6 and 4.7 with the erratum of `atmosphere.sound.parker2004`; [JCGM100] eq. 13.
     Raises ValidityError for weather, lengths and uncertainties outside their limits; a bad time is a status.
 
-    >>> found = path_temperatures(
+    >>> path = path_temperatures(
     ...     0.28735632, 0.29585799, 10e-6, length=100.0, u_length=1e-3, pressure_hpa=933.0, u_pressure_hpa=0.3,
     ...     humidity_percent=50.0, u_humidity_percent=3.0, u_crosswind=0.0)
-    >>> [round(float(v), 2) for v in (found.temperature_c[0], found.u_temperature_c[0], found.wind[0])]
+    >>> [round(float(v), 2) for v in (path.temperature_c[0], path.u_temperature_c[0], path.wind[0])]
     [18.4, 0.08, 5.0]
     """
     forth = np.atleast_1d(np.asarray(time_ab, float)) - delay
@@ -137,16 +137,18 @@ def path_temperatures(
     good = np.isfinite(forth) & (forth > 0.0) & np.isfinite(length)
     if back is not None:
         good &= np.isfinite(back) & (back > 0.0)
-    seen = _Seen.of(np.where(good, forth, np.nan), None if back is None else np.where(good, back, np.nan), length)
+    speeds = _SpeedAlong.of(
+        np.where(good, forth, np.nan), None if back is None else np.where(good, back, np.nan), length
+    )
     if back is None:
-        seen = seen.less_wind(np.broadcast_to(np.asarray(wind, float), (count,)), u_wind)
+        speeds = speeds.less_wind(np.broadcast_to(np.asarray(wind, float), (count,)), u_wind)
 
     bend_rms = np.hypot(speed_gradient, u_speed_gradient)
     early = bent_ray_excess(length, 343.0, bend_rms)
     spread = np.sqrt(4.0 * (speed_gradient * u_speed_gradient) ** 2 + 2.0 * u_speed_gradient**4)
-    speed, u_speed_crosswind = straight_line_speed(seen.speed * (1.0 - early), across, u_across)
+    speed, u_speed_crosswind = straight_line_speed(speeds.speed * (1.0 - early), across, u_across)
     t = np.atleast_1d(temperatures_c(speed, p, h, None, model, co2_ppm, frequency_hz))
-    calm = ~(np.abs(seen.wind) > WIND.upper)
+    calm = ~(np.abs(speeds.wind) > WIND.upper)
     status = np.where(~good, NO_TIME, np.where(~calm, NO_WIND, np.where(np.isfinite(t), USED, OUTSIDE)))
     t = np.where(calm, t, np.nan)
     good = np.isfinite(t)
@@ -156,14 +158,14 @@ def path_temperatures(
     e = humidity.vapour_pressure_hpa(at, p, h, MODELS[model].vapour_formula)
     lag = dispersion(at, p, e, frequency_hz).of_a_pulse()[1]
     per_speed = np.where(np.isfinite(t), 1.0 / slope.temperature_c, np.nan)
-    noise = per_speed * np.sqrt((seen.per_forth * u_time[0]) ** 2 + (seen.per_back * u_time[1]) ** 2)
+    noise = per_speed * np.sqrt((speeds.per_forth * u_time[0]) ** 2 + (speeds.per_back * u_time[1]) ** 2)
     common = {
-        "length": per_speed * seen.along / length * u_length,
-        "delay": -per_speed * (seen.per_forth + seen.per_back) * u_delay,
+        "length": per_speed * speeds.along / length * u_length,
+        "delay": -per_speed * (speeds.per_forth + speeds.per_back) * u_delay,
         "pressure": -per_speed * slope.pressure_hpa * u_pressure_hpa,
         "humidity": -per_speed * slope.humidity_percent * u_humidity_percent,
         "carbon dioxide": -per_speed * slope.co2_ppm * u_co2_ppm,
-        "wind": per_speed * seen.u_prior,
+        "wind": per_speed * speeds.u_prior,
         "crosswind": per_speed * u_speed_crosswind,
         "bend": per_speed * speed * early * spread / np.where(bend_rms > 0.0, bend_rms**2, 1.0),
         "dispersion": per_speed * speed * lag,
@@ -176,8 +178,8 @@ def path_temperatures(
         temperature_c=t,
         u_temperature_c=np.sqrt(np.diag(covariance)),
         covariance_c2=covariance,
-        wind=np.where(good, seen.wind, np.nan),
-        u_wind=np.where(good, seen.u_wind(u_time, length, u_length, u_delay), np.nan),
+        wind=np.where(good, speeds.wind, np.nan),
+        u_wind=np.where(good, speeds.u_wind(u_time, length, u_length, u_delay), np.nan),
         group_refractivity=np.where(good, light.group_refractivity, np.nan),
         u_group_refractivity=np.sqrt(np.diag(group)),
         covariance_group=group,
@@ -187,18 +189,21 @@ def path_temperatures(
 
 
 def _group_covariance(
-    light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], u: dict[str, Any]
+    light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], u_weather: dict[str, Any]
 ) -> np.ndarray:
     """Of the group refractivity: through the temperature, and what weather does at a given temperature as well."""
     slopes = light.sensitivity
-    direct = {"pressure": slopes.pressure_hpa * u["pressure"], "humidity": slopes.humidity_percent * u["humidity"]}
+    direct = {
+        "pressure": slopes.pressure_hpa * u_weather["pressure"],
+        "humidity": slopes.humidity_percent * u_weather["humidity"],
+    }
     parts = [slopes.temperature_c * part + direct.get(name, 0.0) for name, part in common.items()]
     parts.append(np.where(good, light.standard_uncertainty, np.nan))
     return np.diag((slopes.temperature_c * noise) ** 2) + sum(np.outer(part, part) for part in parts)
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _SpeedAlong:
     """What the times say: speed along the path without the wind along it, its slopes by the times, and the wind.
 
     along      length over time, what the length scales, m/s
@@ -214,7 +219,7 @@ class _Seen:
     both: bool = True
 
     @classmethod
-    def of(cls, forth: np.ndarray, back: np.ndarray | None, length: np.ndarray) -> "_Seen":
+    def of(cls, forth: np.ndarray, back: np.ndarray | None, length: np.ndarray) -> "_SpeedAlong":
         zero = np.zeros_like(forth)
         if back is None:
             speed = length / forth
@@ -229,9 +234,9 @@ class _Seen:
             zero,
         )
 
-    def less_wind(self, wind: np.ndarray, u_wind: Any) -> "_Seen":
+    def less_wind(self, wind: np.ndarray, u_wind: Any) -> "_SpeedAlong":
         u = np.broadcast_to(np.asarray(u_wind, float), wind.shape)
-        return _Seen(self.speed - wind, wind, self.along, self.per_forth, self.per_back, u, both=False)
+        return _SpeedAlong(self.speed - wind, wind, self.along, self.per_forth, self.per_back, u, both=False)
 
     def u_wind(self, u_time: np.ndarray, length: np.ndarray, u_length: float, u_delay: float) -> np.ndarray:
         if not self.both:

@@ -130,8 +130,8 @@ class SoundField:
         if self.tomogram.vector is None:
             nothing = np.full((count, 3), np.nan)
             return nothing, nothing
-        found = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
-        return np.stack([m.value for m in found], axis=1), np.stack([m.u for m in found], axis=1)
+        means = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
+        return np.stack([m.value for m in means], axis=1), np.stack([m.u for m in means], axis=1)
 
 
 def sound_field(
@@ -215,12 +215,11 @@ def sound_field(
             raise EstimationError(NOTHING.format(len(time)))
         noise = np.diag((kept.per_second(along) * kept.u_time) ** 2)
         along = np.zeros_like(along) if wind is None else along
-        found = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
-        at[good] = found.scalar_along(kept.lines).value
+        estimate = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
+        at[good] = estimate.scalar_along(kept.lines).value
         if wind is not None:
-            blown[good] = np.stack(
-                [found.vector_along(kept.lines, np.tile(axis, (len(observed), 1))).value for axis in np.eye(3)], axis=1
-            )
+            axes = [np.tile(axis, (len(observed), 1)) for axis in np.eye(3)]
+            blown[good] = np.stack([estimate.vector_along(kept.lines, axis).value for axis in axes], axis=1)
         beyond = good & ~((at >= limit.lower) & (at <= limit.upper))
         status[beyond], good[beyond] = OUTSIDE, False
         if not np.any(beyond) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
@@ -228,7 +227,7 @@ def sound_field(
         before = at.copy()
     else:
         raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; leave out the wildest times")
-    return SoundField(found, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
+    return SoundField(estimate, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
 
 
 def _ends(stations: np.ndarray, source: Any, receiver: Any, time: np.ndarray, u_time: Any) -> tuple:

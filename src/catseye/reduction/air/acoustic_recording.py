@@ -142,10 +142,10 @@ def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> Ac
             beside.name, "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)"
         )
     try:
-        found = _temperatures(shots, sheet, model, air_model)
+        temperatures = _temperatures(shots, sheet, model, air_model)
     except ValidityError as problem:
         raise refusal(beside.name, str(problem)) from problem
-    return AcousticPath(sheet, beside.name, shots, found, model, air_model, hashes)
+    return AcousticPath(sheet, beside.name, shots, temperatures, model, air_model, hashes)
 
 
 def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
@@ -241,15 +241,16 @@ class _Listener:
         begin = np.clip(np.rint(expected * self.sampling_hz).astype(int) - before, 0, n - wide)
         rows = np.stack([samples[b : b + wide] for b in begin])
         at = begin / self.sampling_hz
-        found = plan(rows, expected - at)
-        good = found.status <= DelayStatus.ECHO
-        delay = np.where(good, found.delay + at, np.nan)
+        delays = plan(rows, expected - at)
+        good = delays.status <= DelayStatus.ECHO
+        delay = np.where(good, delays.delay + at, np.nan)
         lag, height = plan.correlation(np.nan_to_num(rows[0].astype(float)), float(expected[0] - at[0]))
         self.traces.append(
             ChannelTrace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
                   height, float(delay[0]))
         )  # fmt: skip
-        return _Arrivals(delay, np.where(good, found.u_delay, np.nan), found.snr, list(map(found.text, range(len(at)))))
+        texts = [delays.text(k) for k in range(len(at))]
+        return _Arrivals(delay, np.where(good, delays.u_delay, np.nan), delays.snr, texts)
 
     def _quiet(self, samples: np.ndarray, until: float) -> np.ndarray | None:
         """Noise for the whitened weights: after the near loudspeaker has ended, before the first arrival's window."""
@@ -353,24 +354,24 @@ def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model
             u_wind=sheet.u_wind_m_per_s if one_way else None,
         )
 
-    found = at(0.0)
-    return found if one_way or u_offset == 0.0 else _with_clock(found, at(u_offset))
+    temperatures = at(0.0)
+    return temperatures if one_way or u_offset == 0.0 else _with_clock(temperatures, at(u_offset))
 
 
-def _with_clock(found: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
+def _with_clock(temperatures: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
     """The clock offset's uncertainty added, common to all: it goes into the wind, hardly into the temperature.
 
     moved   the same with the clock offset larger by its standard uncertainty
     """
-    t, w = moved.temperature_c - found.temperature_c, moved.wind - found.wind
-    n = moved.group_refractivity - found.group_refractivity
-    covariance, group = found.covariance_c2 + np.outer(t, t), found.covariance_group + np.outer(n, n)
+    t, w = moved.temperature_c - temperatures.temperature_c, moved.wind - temperatures.wind
+    n = moved.group_refractivity - temperatures.group_refractivity
+    covariance, group = temperatures.covariance_c2 + np.outer(t, t), temperatures.covariance_group + np.outer(n, n)
     return replace(
-        found,
+        temperatures,
         covariance_c2=covariance,
         u_temperature_c=np.sqrt(np.diag(covariance)),
-        u_wind=np.hypot(found.u_wind, w),
+        u_wind=np.hypot(temperatures.u_wind, w),
         covariance_group=group,
         u_group_refractivity=np.sqrt(np.diag(group)),
-        parts_c={**found.parts_c, "clock": np.abs(t)},
+        parts_c={**temperatures.parts_c, "clock": np.abs(t)},
     )

@@ -135,21 +135,21 @@ def _block(readings: WeatherReadings) -> float:
 def _notes(profile: AirProfile, names: tuple[str, ...], start_mjd: float) -> tuple[str, ...]:
     notes = []
     for field, unit in FIELDS:
-        one = getattr(profile, field)
-        found = suspect_readings(one)
-        if len(found.readings):
-            row = int(found.readings[0])
-            who, when = names[one.readings.station[row]], start_mjd + one.readings.seconds[row] / SECONDS_PER_DAY
+        of_field = getattr(profile, field)
+        readings, suspects = of_field.readings, suspect_readings(of_field)
+        if len(suspects.readings):
+            row = int(suspects.readings[0])
+            who, when = names[readings.station[row]], start_mjd + readings.seconds[row] / SECONDS_PER_DAY
             notes.append(
-                f"{field}: {len(found.readings)} of {len(one.readings.value)} readings are wild, the worst "
-                f"{one.readings.value[row]:.2f} {unit} of {who} at MJD {when:.5f}, w = {found.w[row]:.1f}; check them"
+                f"{field}: {len(suspects.readings)} of {len(readings.value)} readings are wild, the worst "
+                f"{readings.value[row]:.2f} {unit} of {who} at MJD {when:.5f}, w = {suspects.w[row]:.1f}; check them"
             )
-        for station in found.stations:
+        for station in suspects.stations:
             notes.append(
-                f"{field}: {names[station]} reads {found.error[station]:+.2f} {unit} against the others, "
-                f"w = {found.w_station[station]:.1f}; leave it out or compare it"
+                f"{field}: {names[station]} reads {suspects.error[station]:+.2f} {unit} against the others, "
+                f"w = {suspects.w_station[station]:.1f}; leave it out or compare it"
             )
-        if len(found.undecided):
-            who = " and ".join(names[station] for station in found.undecided)
+        if len(suspects.undecided):
+            who = " and ".join(names[station] for station in suspects.undecided)
             notes.append(f"{field}: {who} contradict each other and nothing says which is wrong; compare them")
     return tuple(notes)

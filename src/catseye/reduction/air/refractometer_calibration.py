@@ -125,10 +125,10 @@ def calibrate_path(readings: PathReadings) -> PathCalibration:
     followed = follow_phase(readings, weather)
     fit = PathFit(readings, weather, followed)
     fit.run()
-    return _told(fit)
+    return _calibration(fit)
 
 
-def _told(fit: PathFit) -> PathCalibration:
+def _calibration(fit: PathFit) -> PathCalibration:
     """The answer in SI, from the fit in ppm."""
     readings, followed, sheet = fit.readings, fit.followed, fit.readings.sheet
     mean, w_reading, _ = fit.tests()
@@ -241,9 +241,9 @@ def _temperatures(fit: PathFit, refractivity: np.ndarray, gradient: np.ndarray) 
     noise = noise + (slopes[:, 1] / PPM * sheet.noise_pressure_hpa) ** 2
     noise = noise + (slopes[:, 2] / PPM * sheet.noise_humidity_percent) ** 2
     u = np.sqrt(np.einsum("mq,qr,mr->m", by, fit.covariance, by) + noise) * PPM / np.abs(slopes[:, 0])
-    found = np.full((2, len(r)), np.nan)
-    found[:, rows] = np.where(inside, [warm, u], np.nan)
-    return found[0], found[1]
+    temperature_and_u = np.full((2, len(r)), np.nan)
+    temperature_and_u[:, rows] = np.where(inside, [warm, u], np.nan)
+    return temperature_and_u[0], temperature_and_u[1]
 
 
 def _statuses(fit: PathFit) -> tuple[str, ...]:

@@ -111,8 +111,8 @@ def air_by(
     Raises ValidityError for what cannot be.
     Source: [JCGM100] eq. 10; the instruments' equations are in `atmosphere.index.hygrometer`.
 
-    >>> found, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), model="rueger1990")
-    >>> round(float(found.humidity_percent), 2), round(float(u) * 1e6, 4)
+    >>> state, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), model="rueger1990")
+    >>> round(float(state.humidity_percent), 2), round(float(u) * 1e6, 4)
     (50.0, 0.0791)
     """
     light = {"wavelength_um": wavelength_um, "model": model, "co2_ppm": co2_ppm}
@@ -121,19 +121,19 @@ def air_by(
         temperature_c, pressure_hpa, above_barometer, moisture, model, u_pressure_hpa
     )
     if moisture.kind == "humidity_percent":
-        found = air(temperature_c, at, moisture.value, modulation_hz=modulation_hz, **light)
-        slope = found.sensitivity
+        state = air(temperature_c, at, moisture.value, modulation_hz=modulation_hz, **light)
+        slope = state.sensitivity
         # a thermometer read too high also carries the pressure wrongly
         by_c = slope._replace(temperature_c=slope.temperature_c + slope.pressure_hpa * at_per_c)
-        whole = replace(found, sensitivity=by_c)
-        return found, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
+        whole = replace(state, sensitivity=by_c)
+        return state, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
     vapour = read(temperature_c, at, moisture, model)
-    found = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=modulation_hz, **light)
+    state = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=modulation_hz, **light)
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
     by_p = partials.pressure_hpa + partials.vapour_pressure_hpa * vapour.per_pressure_hpa
     partials = partials._replace(temperature_c=partials.temperature_c + by_p * at_per_c)
-    formula = np.hypot(found.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
-    return found, vapour.index_uncertainty(partials, moisture.u, **u, u_model=formula)
+    formula = np.hypot(state.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
+    return state, vapour.index_uncertainty(partials, moisture.u, **u, u_model=formula)
 
 
 def surface_of(
@@ -141,7 +141,7 @@ def surface_of(
 ) -> Condensation:
     """Whether a surface in this air will dew or frost over.
 
-    state             the air that `air_by` found
+    state             as `air_by` gives it
     moisture          what was read: its uncertainty is the dew point's, and the air's temperature counts only where the
                       instrument needs it (a mirror reads the dew point itself)
     surface_c         temperature of the surface, °C
@@ -150,8 +150,8 @@ def surface_of(
     u_pressure_hpa    that of the pressure, hPa
 
     >>> read_so = Moisture("humidity_percent", 75.0, 3.0)
-    >>> found, _ = air_by(10.0, 933.0, read_so)
-    >>> surface = surface_of(found, read_so, 5.0)
+    >>> state, _ = air_by(10.0, 933.0, read_so)
+    >>> surface = surface_of(state, read_so, 5.0)
     >>> str(surface.deposit), round(float(surface.u_margin_k), 2)
     ('dew', 0.58)
     """

@@ -230,14 +230,14 @@ def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], 
     Source: as `follow_electronics`; the weights are those of `drift_at`, which is linear in the phases.
     """
     shots = campaign.shots
-    mine = [
+    good = [
         k
         for k, (ranger, target) in enumerate(zip(shots.ranger, shots.target, strict=True))
         if ranger == shots.ranger[row] and target == REFERENCE and not phases.reason[k] and k not in wrong
     ]
-    if not mine:
+    if not good:
         raise InputError(f"shot {shots.shot[row]}: {shots.ranger[row]} has no usable shot on its internal cube")
-    rows = np.array(sorted(mine, key=lambda k: float(shots.mjd_utc[k])))
+    rows = np.array(sorted(good, key=lambda k: float(shots.mjd_utc[k])))
     seconds = np.array([_seconds(campaign, k) for k in rows])
     when = np.array([_seconds(campaign, row)])
     walk = walk_of(campaign)
@@ -287,7 +287,7 @@ def _head(
     reference_amplitude: float,
     index: float,
 ) -> float:
-    found = head_corrections(
+    corrections = head_corrections(
         campaign,
         ranger,
         head_columns(campaign, ranger),
@@ -297,4 +297,4 @@ def _head(
         reference_amplitude=np.array([reference_amplitude]),
         index=np.array([index]),
     )
-    return float(found.value[0])
+    return float(corrections.value[0])

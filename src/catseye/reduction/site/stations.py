@@ -91,8 +91,8 @@ def offset_of(mirror: MirrorGeometry) -> np.ndarray:
 
 def imperfections_of(mirror: MirrorGeometry) -> Imperfections | None:
     """What the record says of offsets, tilts and encoder errors; None where it knows of none."""
-    found = _imperfections(mirror)
-    return found if found.matter else None
+    imperfections = _imperfections(mirror)
+    return imperfections if imperfections.matter else None
 
 
 def _imperfections(mirror: MirrorGeometry) -> Imperfections:
@@ -189,13 +189,13 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
     for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
         raise InputError(f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m)")
-    found = aim(station, to)
+    aimed = aim(station, to)
     low, high = mirror.az_low_limit, mirror.az_high_limit
-    direct = np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+    direct = np.stack([aimed.azimuth_counts, aimed.elevation_counts], axis=-1)
     if imperfections is None:
         prime = np.stack(prime_counts(direct[:, 0], direct[:, 1], station.zeros[1]), axis=-1)
-        face = autocollimation_counts(found.phi, station.zeros[1])
-        back = back_retro_counts(found.phi, station.zeros[1])
+        face = autocollimation_counts(aimed.phi, station.zeros[1])
+        back = back_retro_counts(aimed.phi, station.zeros[1])
     else:
         prime = imperfect_counts(station, imperfections, to, prime=True)
         direct = imperfect_counts(station, imperfections, to)
@@ -203,8 +203,8 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
         face, back = both[:, 1], imperfect_back_counts(station, imperfections, both)
     for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
         raise InputError(
-            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {found.range[k]:.4g} m from the scan point of "
-            f"{mirror.zp} on {monument.monument}, {np.degrees(found.phi[k]):.4g} deg from its azimuth axis: no setting "
+            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {aimed.range[k]:.4g} m from the scan point of "
+            f"{mirror.zp} on {monument.monument}, {np.degrees(aimed.phi[k]):.4g} deg from its azimuth axis: no setting "
             "of the mirror looks there"
         )
     lower = prime[:, 0] - COUNTS_PER_TURN
@@ -217,7 +217,7 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
     return Pointings(
         to=to,
-        aim=found,
+        aim=aimed,
         counts=direct,
         prime=prime,
         autocollimation=face,

@@ -253,22 +253,21 @@ def predicted_points(
     predicted = np.zeros((n, 3))
     by_frame: dict[str, np.ndarray] = {}
     owners = [group_of(antenna, name) for name in measured.names]
-    told = measured.subreflector
+    commanded = measured.subreflector
     for group in dict.fromkeys(owners):
-        mine = [i for i, owner in enumerate(owners) if owner == group]
+        targets = [i for i, owner in enumerate(owners) if owner == group]
         points = antenna.groups[group]
-        rows = [points.names.index(measured.names[i]) for i in mine]
+        rows = [points.names.index(measured.names[i]) for i in targets]
         at = antenna.in_frame(group, measured.posture, added=added)[rows]
         if places is not None:
-            at = at + np.array([places[measured.names[i]] for i in mine])
-        predicted[mine] = ground_from_group(antenna, measured, group, added).points(at)
-        found = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=told)
+            at = at + np.array([places[measured.names[i]] for i in targets])
+        predicted[targets] = ground_from_group(antenna, measured, group, added).points(at)
+        slopes = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=commanded)
         if group in antenna.motions:
-            found[group] = antenna.group_derivatives(group, measured.posture, added=added, subreflector=told)[group][
-                rows
-            ]
-        for frame, slope in found.items():
-            by_frame.setdefault(frame, np.zeros((n, 3, 6)))[mine] = slope
+            by_name = antenna.group_derivatives(group, measured.posture, added=added, subreflector=commanded)
+            slopes[group] = by_name[group][rows]
+        for frame, slope in slopes.items():
+            by_frame.setdefault(frame, np.zeros((n, 3, 6)))[targets] = slope
     return predicted, {frame: slope.reshape(3 * n, 6) for frame, slope in by_frame.items()}
 
 

@@ -271,10 +271,10 @@ def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[
         for component in components:
             if component not in COMPONENTS:
                 raise InputError(f"{name}: {component!r} is no component (expected {', '.join(COMPONENTS)})")
-    found = tuple((name, c) for name, components in free.items() for c in COMPONENTS if c in components)
-    if not found:
+    layout = tuple((name, c) for name, components in free.items() for c in COMPONENTS if c in components)
+    if not layout:
         raise InputError("no coefficient is free: name a frame and its components")
-    return found
+    return layout
 
 
 def _indices(antenna: Antenna, layout: tuple[tuple[str, str], ...], name: str) -> np.ndarray:
@@ -309,15 +309,15 @@ def _priors(antenna: Antenna, layout: tuple[tuple[str, str], ...], size: int) ->
 
 def _spread_out(antenna: Antenna, layout: tuple[tuple[str, str], ...], theta: np.ndarray) -> dict[str, np.ndarray]:
     """All coefficients (6, k) of the frames that have free ones."""
-    found: dict[str, np.ndarray] = {}
+    coefficients: dict[str, np.ndarray] = {}
     first = 0
     for name in dict.fromkeys(name for name, _ in layout):
         at = _indices(antenna, layout, name)
         values = np.array(antenna.motions[name].coefficients)
         values.ravel()[at] = theta[first : first + len(at)]
-        found[name] = values
+        coefficients[name] = values
         first += len(at)
-    return found
+    return coefficients
 
 
 def _labels(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> list[str]:

@@ -254,9 +254,9 @@ def expansion_of(
 
 def _rounded(covariance: np.ndarray) -> np.ndarray:
     """A covariance whose variances are 0 where rounding left them below: of terms that the paraboloid stands for."""
-    made = covariance.copy()
-    made[np.diag_indices_from(made)] = np.maximum(np.diag(made), 0.0)
-    return made
+    rounded = covariance.copy()
+    rounded[np.diag_indices_from(rounded)] = np.maximum(np.diag(rounded), 0.0)
+    return rounded
 
 
 def _beside(
