@@ -70,7 +70,7 @@ def air(
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
     from catseye.gateways.air.objects import air_object
     from catseye.gateways.writers.objects import json_line
-    from catseye.reduction.air.routes import air_by, station_pressure, surface_of
+    from catseye.reduction.air.routes import IndexFormula, air_by, station_pressure, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -106,9 +106,7 @@ def air(
         u_temperature_c=u_temperature_c,
         u_pressure_hpa=u_pressure_hpa,
         u_co2_ppm=u_co2_ppm,
-        wavelength_um=wavelength_um,
-        model=model,
-        co2_ppm=co2_ppm,
+        formula=IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm),
     )
     found = air_object(state, wavelength_um, u)
     if surface_c is not None:

@@ -14,7 +14,7 @@ from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import InputError, ValidityError
 from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
-from catseye.reduction.air.acoustic import USED, PathTemperatures, path_temperatures
+from catseye.reduction.air.acoustic import USED, PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
 from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import sampled
 
@@ -328,30 +328,40 @@ def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model
     u_offset = sheet.u_clock_offset_us * MICROSECOND
     u_delay = sheet.u_delay_us * MICROSECOND
 
+    line = SoundLine(
+        length=sheet.length_m,
+        u_length=sheet.u_length_mm * 1e-3,
+        delay=sheet.delay_us * MICROSECOND,
+        u_delay=float(np.hypot(u_delay, u_offset)) if one_way else u_delay,
+        speed_gradient=sheet.speed_gradient_per_s,
+        u_speed_gradient=sheet.u_speed_gradient_per_s,
+        frequency_hz=frequency_hz(sheet),
+        model=model,
+    )
+    station = StationAir(
+        pressure_hpa=shots.weather[1],
+        u_pressure_hpa=sheet.u_pressure_hpa,
+        humidity_percent=shots.weather[2],
+        u_humidity_percent=sheet.u_humidity_percent,
+        co2_ppm=sheet.co2_ppm,
+    )
+    wind = PathWind(
+        crosswind=sheet.crosswind_m_per_s,
+        u_crosswind=sheet.u_crosswind_m_per_s,
+        wind=sheet.wind_m_per_s if one_way else None,
+        u_wind=sheet.u_wind_m_per_s if one_way else None,
+    )
+
     def at(shift: float) -> PathTemperatures:
         return path_temperatures(
             shots.time_ab - shift,
             None if shots.time_ba is None else shots.time_ba + shift,
             np.nan_to_num(shots.u_time),
-            length=sheet.length_m,
-            u_length=sheet.u_length_mm * 1e-3,
-            delay=sheet.delay_us * MICROSECOND,
-            u_delay=float(np.hypot(u_delay, u_offset)) if one_way else u_delay,
-            pressure_hpa=shots.weather[1],
-            u_pressure_hpa=sheet.u_pressure_hpa,
-            humidity_percent=shots.weather[2],
-            u_humidity_percent=sheet.u_humidity_percent,
-            crosswind=sheet.crosswind_m_per_s,
-            u_crosswind=sheet.u_crosswind_m_per_s,
-            speed_gradient=sheet.speed_gradient_per_s,
-            u_speed_gradient=sheet.u_speed_gradient_per_s,
-            co2_ppm=sheet.co2_ppm,
-            frequency_hz=frequency_hz(sheet),
-            model=model,
+            line=line,
+            station=station,
+            wind=wind,
             wavelength_um=sheet.wavelength_um,
             air_model=air_model,
-            wind=sheet.wind_m_per_s if one_way else None,
-            u_wind=sheet.u_wind_m_per_s if one_way else None,
         )
 
     temperatures = at(0.0)

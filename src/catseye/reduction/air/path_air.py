@@ -24,6 +24,15 @@ SCREEN = 2.0  # m, height of a station's sensors above the ground, as weather se
 FIELDS = (("temperature", "C"), ("pressure", "hPa"), ("humidity", "%"))
 
 
+@dataclass(frozen=True)
+class WeatherPriors:
+    """What is expected of each quantity's field before a reading."""
+
+    temperature: ProfilePrior = TEMPERATURE
+    pressure: ProfilePrior = PRESSURE
+    humidity: ProfilePrior = HUMIDITY
+
+
 @dataclass(frozen=True, eq=False)
 class SiteAir:
     """The air of a site over the time of its weather table.
@@ -66,9 +75,7 @@ def site_air(
     block: float | None = None,
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
-    temperature: ProfilePrior = TEMPERATURE,
-    pressure: ProfilePrior = PRESSURE,
-    humidity: ProfilePrior = HUMIDITY,
+    priors: WeatherPriors | None = None,
 ) -> SiteAir:
     """The air of a site from its record and its table of weather.
 
@@ -79,7 +86,7 @@ def site_air(
     block     s, average readings over it; None: none up to 2000 readings, beyond that just as much as is needed
     model     a name in `atmosphere.index.air.MODELS`
     co2_ppm   carbon dioxide, ppm
-    temperature, pressure, humidity   priors
+    priors    of the profiles; the usual where it is None
 
     Wild readings and lying stations are named in `notes`; nothing is left out that was not asked for.
     Source: recipe; the model is `atmosphere.path.profile`'s. Raises InputError for a name that is no station and where
@@ -94,7 +101,10 @@ def site_air(
         readings = readings.averaged(block)
     lowest = min(station.elevation_m for station in site.weather_station) - site.site.elevation_of_z0_m
     ground = lowest - SCREEN if ground is None else ground
-    profile = AirProfile.of(readings, ground=ground, temperature=temperature, pressure=pressure, humidity=humidity)
+    of = priors or WeatherPriors()
+    profile = AirProfile.of(
+        readings, ground=ground, temperature=of.temperature, pressure=of.pressure, humidity=of.humidity
+    )
     names = tuple(station.name for station in site.weather_station)
     notes = _notes(profile, names, start)
     return SiteAir(profile, names, start, block, site.ranging.wavelength_um, model, co2_ppm, notes)

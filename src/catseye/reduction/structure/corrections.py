@@ -9,7 +9,7 @@ Measured coordinates come with their full covariance, as `coordinates.json` has 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -91,8 +91,21 @@ class Corrections:
     degrees_of_freedom: int
 
 
+class CoordinatesDocument(TypedDict):
+    """What of a `coordinates.json` a comparison with the structural model needs.
+
+    points             name: x, y, z (m) among what else is said of each
+    covariance_order   "ZEG10001 x" and so on, of each row
+    covariance         m^2
+    """
+
+    points: Mapping[str, Mapping[str, object]]
+    covariance_order: Sequence[str]
+    covariance: Sequence[Sequence[float]]
+
+
 def measured_of(
-    document: Mapping[str, Any],
+    document: CoordinatesDocument,
     antenna: Antenna,
     posture: TelescopePosture,
     *,
