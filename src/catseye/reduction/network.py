@@ -104,26 +104,35 @@ def adjusted(
             notes=notes,
         )
     elif reject:
-        start = estimate_robustly(solve, sizes, places=_places(network))
-        chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
-        inflation = [
-            np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
-            for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
-        ]
-        solution = _final(network, inflation, placed, alone=True)
-        result = replace(
-            result,
-            solution=solution,
-            treatment="rejected",
-            weights=tuple(1.0 / np.square(i) for i in inflation),
-            rejected=chosen.rejected,
-            undecided=chosen.undecided,
-            rejections=chosen.rejections,
-            notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
-        )
+        result = _with_rejections(network, solve, sizes, placed, level)
     if components is not None:
         result = _with_components(network, result, components, progress)
     return result
+
+
+def _with_rejections(
+    network: ObservationNetwork,
+    solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]],
+    sizes: Sequence[int],
+    placed: Placed,
+    level: float,
+) -> AdjustedNetwork:
+    """The answer without the observations that the w test rejects, by data snooping from a robust start."""
+    start = estimate_robustly(solve, sizes, places=_places(network))
+    chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
+    inflation = [
+        np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
+        for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
+    ]
+    return AdjustedNetwork(
+        solution=_final(network, inflation, placed, alone=True),
+        treatment="rejected",
+        weights=tuple(1.0 / np.square(i) for i in inflation),
+        rejected=chosen.rejected,
+        undecided=chosen.undecided,
+        rejections=chosen.rejections,
+        notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
+    )
 
 
 def _places(network: ObservationNetwork) -> list[np.ndarray]:

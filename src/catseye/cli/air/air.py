@@ -91,10 +91,13 @@ def air(
         raise typer.BadParameter("belongs to --surface-c.", param_hint="'--u-surface-c'")
     _one_pressure(pressure_hpa, barometer_mmhg, mercury_c, gravity, latitude_deg, elevation_m)
     if pressure_hpa is None:
+        assert barometer_mmhg is not None  # else `_one_pressure` has refused
+        assert mercury_c is not None
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
-        where = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
         read = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
-        found_p, u_p = station_pressure(barometer_mmhg, mercury_c, **where, **read)
+        found_p, u_p = station_pressure(
+            barometer_mmhg, mercury_c, gravity=gravity, latitude=latitude, elevation=elevation_m, **read
+        )
         pressure_hpa, u_pressure_hpa = float(found_p), math.hypot(u_pressure_hpa, float(u_p))
     elif u_barometer_mmhg > 0.0 or u_mercury_c > 0.0:
         raise typer.BadParameter("belong to --barometer-mmhg.", param_hint="'--u-barometer-mmhg', '--u-mercury-c'")
@@ -136,7 +139,9 @@ def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple
         if u > 0.0 and kind not in kinds_of:
             raise typer.BadParameter(f"does not belong to --{kind.replace('_', '-')}.", param_hint=f"'--{option}'")
     u = next(u for u, kinds_of in u_of.values() if kind in kinds_of)
-    return Moisture(kind, given[kind], u)
+    value = given[kind]
+    assert value is not None  # it is the one that was given
+    return Moisture(kind, value, u)
 
 
 def _one_pressure(

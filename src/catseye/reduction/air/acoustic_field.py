@@ -57,7 +57,7 @@ class LineAir:
 
 @dataclass(frozen=True, eq=False)
 class SoundField:
-    """What an array of paths tells.
+    """Temperature and wind between the stations of an array, from its travel times.
 
     tomogram   the estimate, its observations those used
     status     a text for each time given: `used`, or why not

@@ -202,6 +202,13 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Sound
 
 @dataclass(frozen=True, eq=False)
 class _Arrivals:
+    """Arrivals of k shots in one channel.
+
+    delay, u_delay   (k,) s, from the file's first sample; nan where none was found
+    snr              (k,)
+    texts            what became of each
+    """
+
     delay: np.ndarray
     u_delay: np.ndarray
     snr: np.ndarray

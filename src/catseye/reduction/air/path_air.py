@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.atmosphere.path.air_profile import AirProfile, PathIndex, WeatherReadings
 from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, ProfilePrior
@@ -54,7 +55,7 @@ class SiteAir:
     co2_ppm: float
     notes: tuple[str, ...]
 
-    def along(self, mjd_utc, a, b) -> PathIndex:
+    def along(self, mjd_utc: ArrayLike, a: ArrayLike, b: ArrayLike) -> PathIndex:
         """Mean group refractivity of straight paths, with covariance, as `AirProfile.along`.
 
         mjd_utc   (m,) time of each

@@ -268,7 +268,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class FollowedPhase:
-    """The phase of a night without turns.
+    """The phase of a night, unwrapped, in sections within which its whole cycles are known.
 
     phase      (m,) rad, continuous within a section; of a stray the turn nearest to its neighbours
     section    (m,) number of the section

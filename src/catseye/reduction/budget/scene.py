@@ -74,7 +74,7 @@ class References:
 
 @dataclass(frozen=True, eq=False)
 class ShotScene:
-    """One shot's measurement.
+    """One shot with everything that its range follows from.
 
     row                  of the campaign's shots
     seconds              of the shot, after the campaign's first
@@ -169,8 +169,6 @@ def scene_of(
 
     Raises InputError where the target's face looks away from the ranger: it cannot have returned the light.
     """
-    from catseye.optics.retroreflector.prism import obliquity_correction
-
     shots = campaign.shots
     ranger, target = shots.ranger[row], shots.target[row]
     a, b = ends
@@ -179,15 +177,10 @@ def scene_of(
     field = AirField.of(campaign, settings).on_lines(shots.mjd_utc[[row]], [frozenset((ranger, target))])
     path = field.along(shots.mjd_utc[[row]], a[None], b[None], np.zeros(len(field.names)))
     distance = float(np.linalg.norm(a - b))
-    incidence, obliquity = 0.0, 0.0
-    if place.normal is not None:
-        cosine = float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
-        if cosine <= 0.0:
-            raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
-        ranging = campaign.site.ranging
-        ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
-        incidence = float(np.arccos(cosine))
-        obliquity = float(obliquity_correction(place.height, ratio, cosine, phase=bends))
+    cosine = 1.0 if place.normal is None else float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
+    if cosine <= 0.0:
+        raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
+    incidence, obliquity = (0.0, 0.0) if place.normal is None else _obliquity(campaign, place, cosine)
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
     phase = float(fraction(phases.phase[row], references.phase))
     index = 1.0 + float(path.refractivity[0])
@@ -220,6 +213,15 @@ def scene_of(
         incidence=incidence,
         head=head,
     )
+
+
+def _obliquity(campaign: Campaign, place: RangedPoint, cosine: float) -> tuple[float, float]:
+    """Incidence on a prism's face, rad, and what it changes of the glass's range constant, m."""
+    from catseye.optics.retroreflector.prism import obliquity_correction
+
+    ranging = campaign.site.ranging
+    ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
+    return float(np.arccos(cosine)), float(obliquity_correction(place.height, ratio, cosine, phase=bends))
 
 
 def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], row: int) -> References:

@@ -45,7 +45,7 @@ class WeakDirection:
 
 @dataclass(frozen=True, eq=False)
 class PointingFit:
-    """A fit of the series.
+    """A fit of the eight-term pointing series.
 
     series              terms, values and covariance, rad
     azimuth, elevation  (n,) rad, on the sky, of all observations
@@ -97,7 +97,7 @@ def fit_pointing(
     reject: bool = False,
     where: Sequence[str] | None = None,
 ) -> PointingFit:
-    """The series by least squares.
+    """The eight-term pointing series by least squares.
 
     azimuth, elevation   (n,) rad, on the sky
     observed             (n, 2) rad, azimuth times cos E and elevation: encoders less sky

@@ -130,7 +130,7 @@ def found_point(
     """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
 
     station       the ranger
-    spot          found
+    spot          that was found
     distance      m from the scan point, above 0; u_distance m
     of_station    (13, 13) covariance of the station's parameters; none if None
 
@@ -154,7 +154,7 @@ def found_point(
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """A target that was found: its name, the spot, and when."""
+    """What the search for one target came to: its name, the spot (which says whether it was found), and when."""
 
     target: str
     spot: Spot

@@ -62,7 +62,7 @@ class RestPoints:
 
 @dataclass(frozen=True, eq=False)
 class SubreflectorPosition:
-    """What the subreflector's drives were told: see geometry.subreflector.
+    """Commanded position of the subreflector's drives: see geometry.subreflector.
 
     shift    (..., 3) m
     angles   (..., 3) rad, about x, then y, then z
@@ -110,7 +110,7 @@ class Antenna:
     def nominal(
         self, frame: str, posture: TelescopePosture, subreflector: SubreflectorPosition | None = None
     ) -> Transforms:
-        """The frame's parent from the frame at rest: first order, and what the subreflector was told.
+        """The frame's parent from the frame at rest: first order, and the subreflector as commanded.
 
         frame, posture   which, and how the telescope stands
         subreflector     its position, for the frame of that name

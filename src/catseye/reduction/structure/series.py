@@ -31,7 +31,7 @@ UP = "up"
 
 @dataclass(frozen=True)
 class SeriesModel:
-    """Which functions, and who has them.
+    """Which functions of posture a flexible model has, and whether points have them alone or as one body.
 
     harmonics     of elevation, 1 or 2
     temperature   whether there is a coefficient of temperature
@@ -180,7 +180,7 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """A group's flexible model.
+    """A flexible model fitted to a group's epochs.
 
     series, model   what was fitted
     rest            (n, 3) m, the middle of each point's places, from which displacements count
@@ -266,7 +266,7 @@ class StructureFit:
 
 
 def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> StructureFit:
-    """A group's flexible model.
+    """A flexible model of a group, by least squares from its epochs.
 
     series   its epochs
     model    which functions; the usual where it is None

@@ -85,10 +85,10 @@ class FoundPeak:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """What some series say.
+    """Spectra, peaks and modes of vibration that some series of ranges show.
 
     series     as given
-    spectrum   of all, each by its own times; before the mean of the buffers is not undone
+    spectrum   of all, each by its own times; what the mean over a buffer takes off is not put back
     peaks      the highest first
     modes      by maximum likelihood, frequency with u; none where they did not settle, see the notes
     floor      (A,) m^2/Hz, of the lowest fifth of each density

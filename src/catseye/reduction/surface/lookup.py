@@ -24,7 +24,7 @@ CONSTANT, SIN, COS, THERMAL, HYSTERESIS = "constant", "gravity_sin", "gravity_co
 
 @dataclass(frozen=True, eq=False)
 class TermModel:
-    """One Zernike term's way with elevation.
+    """One Zernike term as a function of elevation, and of direction and temperature where the epochs tell them.
 
     value, covariance   (p,) m (thermal m/°C), (p, p), as measured by the epochs' covariances
     residual            (T,) m, observed minus predicted

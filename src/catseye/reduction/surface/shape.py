@@ -44,7 +44,7 @@ class LitAperture:
 
 @dataclass(frozen=True)
 class ShapeSettings:
-    """What is asked of a shape.
+    """What is fitted of a surface, and what is asked of its errors.
 
     free           of "vertex", "axis", "focal-length": what of the paraboloid is fitted
     taper_db       how much less power the feed sends to the edge than to the middle; 0: uniform
