@@ -113,7 +113,7 @@ def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: n
     Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
     """
     whole = _imperfections(mirror)
-    answer = np.zeros((len(to), 2))
+    variance = np.zeros((len(to), 2))
     for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
         if u == 0.0:
             continue
@@ -124,9 +124,9 @@ def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: n
             )
             apart = ahead - behind
             apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
-            answer += np.square(u * apart / (2.0 * step))
+            variance += np.square(u * apart / (2.0 * step))
     orders = np.array([whole.azimuth_waves.shape[1], whole.elevation_waves.shape[1]])
-    return answer + np.square(mirror.u_encoder_counts or 0.0) * orders
+    return variance + np.square(mirror.u_encoder_counts or 0.0) * orders
 
 
 def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tuple[np.ndarray, tuple[str, ...]]:

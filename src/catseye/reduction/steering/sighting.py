@@ -87,7 +87,7 @@ def sightings(
     boxed = replace(free, place=None) if keep_out.box else None
     imperfections = imperfections_of(mirror)
     sun = None if mjd is None or place is None else sun_at(mjd, place)
-    answer = []
+    sighted = []
     for n in counts:
         sighting = Sighting(keep_out=None if boxed is None else boxed.pointing(mjd or 0.0, n))
         if sun is not None and under_sun is not None and mjd is not None:
@@ -103,8 +103,8 @@ def sightings(
                 azimuth=float(azimuth),
                 earth_rotation=str(sun.status),
             )
-        answer.append(sighting)
-    return answer
+        sighted.append(sighting)
+    return sighted
 
 
 def seen_from(

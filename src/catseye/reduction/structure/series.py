@@ -294,14 +294,14 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
             raise EstimationError(_named(str(problem), series, what)) from problem
         return StructureFit(series, what, rest, reference_c, harmonics, scatter)
 
-    answer = fitted()
+    fit = fitted()
     if what.scatter:
         for _ in range(PASSES):
-            before, scatter = scatter, scatter_of(answer)
-            answer = fitted()
+            before, scatter = scatter, scatter_of(fit)
+            fit = fitted()
             if np.allclose(before.u_six, scatter.u_six, rtol=0.02) and before.u_point == scatter.u_point:
                 break
-    return answer
+    return fit
 
 
 def fitted_posture(series: GroupSeries, model: SeriesModel) -> TelescopePosture:
@@ -333,15 +333,15 @@ def widened(spread: Spread, arms: Array, scatter: EpochScatter) -> Spread:
     return Spread(points=points, shared=shared)
 
 
-def scatter_of(answer: StructureFit) -> EpochScatter:
+def scatter_of(fit: StructureFit) -> EpochScatter:
     """What is new in each epoch, by moments of the residuals' rigid parts and of what is left of them.
 
-    answer   a fit; its own scatter does not matter but for the weights
+    fit   whose own scatter does not matter but for the weights
     """
-    series, arms, e = answer.series, answer.arms, answer.fit.residual
+    series, arms, e = fit.series, fit.arms, fit.fit.residual
     known = variances_of(series)
-    count, m = len(series), answer.model.own_count
-    degrees, own_degrees = (count / max(count - k, 1) for k in (len(answer.model.functions), m))
+    count, m = len(series), fit.model.own_count
+    degrees, own_degrees = (count / max(count - k, 1) for k in (len(fit.model.functions), m))
     squares, noise, left, expected = [], [], 0.0, 0.0
     for t in range(len(series)):
         at = np.flatnonzero(np.isfinite(e[t]).all(axis=1))
