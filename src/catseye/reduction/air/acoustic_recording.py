@@ -73,7 +73,7 @@ class AcousticPath:
     sheet         of the path
     sheet_file    its name
     shots         the travel times
-    found         temperatures, wind and index
+    temperatures  of the air, with wind and index
     model         formula of the speed of sound
     air_model     formula of the index
     hashes        SHA-256 of each file read
@@ -82,7 +82,7 @@ class AcousticPath:
     sheet: AcousticSheet
     sheet_file: str
     shots: SoundShots
-    found: PathTemperatures
+    temperatures: PathTemperatures
     model: str
     air_model: str
     hashes: dict[str, str]
@@ -90,11 +90,11 @@ class AcousticPath:
     @property
     def used(self) -> np.ndarray:
         """(k,) bool: has a temperature."""
-        return np.array([status == USED for status in self.found.status])
+        return np.array([status == USED for status in self.temperatures.status])
 
     def status(self, shot: int) -> str:
         """What became of one shot, in words."""
-        text, formula = self.shots.texts[shot], self.found.status[shot]
+        text, formula = self.shots.texts[shot], self.temperatures.status[shot]
         return "; ".join(part for part in (text, "" if formula == USED else formula) if part) or USED
 
 
