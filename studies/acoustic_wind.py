@@ -14,19 +14,19 @@ from catseye.atmosphere.sound.path import bent_ray_excess, travel_time
 from catseye.atmosphere.sound.speed import sound
 from catseye.estimation.shapes.tomography import FieldPrior, Scale
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
-from catseye.reduction.air.acoustic import path_temperatures
-from catseye.reduction.air.acoustic_field import sound_field
+from catseye.reduction.air.acoustic import PathWind, SoundLine, StationAir, path_temperatures
+from catseye.reduction.air.acoustic_field import FieldTimes, sound_field
 
 LENGTH, T, P, H = 100.0, 15.0, 933.0, 60.0
-STATION = {"pressure_hpa": P, "u_pressure_hpa": 0.3, "humidity_percent": H, "u_humidity_percent": 3.0}
-PATH = {"length": LENGTH, "u_length": 1e-3, **STATION}
+STATION = StationAir(P, 0.3, humidity_percent=H, u_humidity_percent=3.0)
+PATH = SoundLine(LENGTH, 1e-3)
 C = float(sound(T, P, H, model="real_gas").speed)
 LASER = np.array([[5.0, 5.0, 3.0], [75.0, 55.0, 12.0]])
 NODES = (np.arange(400) + 0.5)[:, None] / 400
 
 
-def found(forth, back, **change):
-    return path_temperatures(forth, back, 5e-6, **{**PATH, "u_crosswind": 0.0, **change})
+def found(forth, back, u_crosswind=0.0, **wind):
+    return path_temperatures(forth, back, 5e-6, line=PATH, station=STATION, wind=PathWind(u_crosswind, **wind))
 
 
 def by_wind() -> dict[str, np.ndarray]:
@@ -65,12 +65,9 @@ def array(count: int, rng: np.random.Generator, wind=(4.0, -2.0, 0.0)):
     time = length * np.mean(1.0 / (front + along[:, None]), axis=1) + 1e-5 * rng.standard_normal(len(a))
     field = sound_field(
         places,
-        source,
-        receiver,
-        time,
-        1e-5,
+        FieldTimes(source, receiver, time, 1e-5),
         u_position=2e-3,
-        **STATION,
+        weather=STATION,
         temperature=FieldPrior(15.0, 8.0, (Scale(1.0, (25.0, 25.0, 8.0)), Scale(0.4, (8.0, 8.0, 4.0)))),
         wind=FieldPrior(0.0, 6.0, (Scale(0.5, (40.0, 40.0, 6.0)),)),
     )

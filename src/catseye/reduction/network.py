@@ -90,40 +90,49 @@ def adjusted(
         return adjust_network(network, inflation=inflation, alone=True, diagnose=False, engine=engine).fits
 
     if robust is not None:
-        found = estimate_robustly(solve, sizes, method=robust, places=_places(network))
-        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in found.weights]
+        estimate = estimate_robustly(solve, sizes, method=robust, places=_places(network))
+        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
         solution = _final(network, inflation, placed, alone=True)
-        notes = () if found.status == CONVERGED else (f"robust estimation {found.status}",)
+        notes = () if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",)
         result = replace(
             result,
             solution=solution,
             treatment=robust,
-            weights=found.weights,
-            rejected=found.rejected,
-            undecided=found.undecided,
+            weights=estimate.weights,
+            rejected=estimate.rejected,
+            undecided=estimate.undecided,
             notes=notes,
         )
     elif reject:
-        start = estimate_robustly(solve, sizes, places=_places(network))
-        chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
-        inflation = [
-            np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
-            for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
-        ]
-        solution = _final(network, inflation, placed, alone=True)
-        result = replace(
-            result,
-            solution=solution,
-            treatment="rejected",
-            weights=tuple(1.0 / np.square(i) for i in inflation),
-            rejected=chosen.rejected,
-            undecided=chosen.undecided,
-            rejections=chosen.rejections,
-            notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
-        )
+        result = _with_rejections(network, solve, sizes, placed, level)
     if components is not None:
         result = _with_components(network, result, components, progress)
     return result
+
+
+def _with_rejections(
+    network: ObservationNetwork,
+    solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]],
+    sizes: Sequence[int],
+    placed: Placed,
+    level: float,
+) -> AdjustedNetwork:
+    """The answer without the observations that the w test rejects, by data snooping from a robust start."""
+    start = estimate_robustly(solve, sizes, places=_places(network))
+    chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
+    inflation = [
+        np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
+        for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
+    ]
+    return AdjustedNetwork(
+        solution=_final(network, inflation, placed, alone=True),
+        treatment="rejected",
+        weights=tuple(1.0 / np.square(i) for i in inflation),
+        rejected=chosen.rejected,
+        undecided=chosen.undecided,
+        rejections=chosen.rejections,
+        notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
+    )
 
 
 def _places(network: ObservationNetwork) -> list[np.ndarray]:
@@ -175,13 +184,15 @@ def _with_components(
         model: GroupFactors | RowModel = GroupFactors(tuple(g.name for g in network.groups), sizes)
     else:
         model = _ranger_model(network, result.solution)
-    found = variance_components(scaled, model)
-    inflation = model.scales(found.values)
+    components = variance_components(scaled, model)
+    inflation = model.scales(components.values)
     if out is not None:
         inflation = [s * o for s, o in zip(inflation, out, strict=True)]
     solution = _final(network, inflation, placed, alone=False)
-    notes = result.notes if found.status == CONVERGED else (*result.notes, f"variance components {found.status}")
-    return replace(result, solution=solution, components=found, notes=notes)
+    notes = result.notes
+    if components.status != CONVERGED:
+        notes = (*notes, f"variance components {components.status}")
+    return replace(result, solution=solution, components=components, notes=notes)
 
 
 def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:

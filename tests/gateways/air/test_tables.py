@@ -31,8 +31,8 @@ def test_every_column_of_path_temperatures_has_the_unit_of_its_name(sounded):
         "mjd_utc": lambda r: r[0].shots.mjd[r[1]],
         "ranger": lambda r: r[0].sheet.ranger,
         "target": lambda r: r[0].sheet.target,
-        "temperature_c": lambda r: r[0].found.temperature_c[r[1]],
-        "u_temperature_c": lambda r: r[0].found.u_temperature_c[r[1]],
+        "temperature_c": lambda r: r[0].temperatures.temperature_c[r[1]],
+        "u_temperature_c": lambda r: r[0].temperatures.u_temperature_c[r[1]],
     }
     assert_columns(path_temperatures_csv(sounded), told, rows)
 
@@ -41,7 +41,7 @@ def test_every_column_of_the_soundings_has_the_unit_of_its_name(sounded):
     rows = [(path, k) for path in sounded for k in range(len(path.shots.mjd))]
 
     def found(name):
-        return lambda r: getattr(r[0].found, name)[r[1]]
+        return lambda r: getattr(r[0].temperatures, name)[r[1]]
 
     told = {
         "mjd_utc": lambda r: r[0].shots.mjd[r[1]],

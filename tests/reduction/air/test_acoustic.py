@@ -1,5 +1,7 @@
 """Temperature from travel times: two directions against the wind, claims against scatter, refusals."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,30 @@ from catseye.atmosphere.sound.path import bent_ray_excess, mean_temperature_exce
 from catseye.atmosphere.sound.real_gas import speed
 from catseye.atmosphere.sound.speed import sound
 from catseye.errors import ValidityError
-from catseye.reduction.air.acoustic import NO_TIME, NO_WIND, OUTSIDE, USED, path_temperatures
+from catseye.reduction.air.acoustic import (
+    NO_TIME,
+    NO_WIND,
+    OUTSIDE,
+    USED,
+    PathTemperatures,
+    PathWind,
+    SoundLine,
+    StationAir,
+    path_temperatures,
+)
 
 LENGTH, P, H = 100.0, 933.0, 50.0
 STATION = {"pressure_hpa": P, "u_pressure_hpa": 0.3, "humidity_percent": H, "u_humidity_percent": 3.0}
 PATH = {"length": LENGTH, "u_length": 1e-3, **STATION}
+
+
+def temperatures(time_ab, time_ba, u_time, **given) -> PathTemperatures:
+    """`path_temperatures` with the fields of its line, station and wind as one row of keywords."""
+    line, station, wind = (
+        kind(**{field.name: given.pop(field.name) for field in fields(kind) if field.name in given})
+        for kind in (SoundLine, StationAir, PathWind)
+    )
+    return path_temperatures(time_ab, time_ba, u_time, line=line, station=station, wind=wind, **given)
 
 
 def times(t, wind=0.0, crosswind=0.0, *, length=LENGTH, p=P, h=H):
@@ -23,7 +44,7 @@ def times(t, wind=0.0, crosswind=0.0, *, length=LENGTH, p=P, h=H):
 
 def test_a_pair_recovers_a_tenth_of_a_degree_in_five_metres_of_wind():
     t = np.array([-15.0, 0.0, 10.0, 20.0, 35.0])
-    found = path_temperatures(*times(t, 5.0), 5e-6, **PATH, u_crosswind=0.0)
+    found = temperatures(*times(t, 5.0), 5e-6, **PATH, u_crosswind=0.0)
     assert found.status == (USED,) * 5
     assert found.temperature_c == pytest.approx(t, abs=1e-6)
     assert found.wind == pytest.approx(5.0, abs=1e-6)
@@ -33,21 +54,21 @@ def test_a_pair_recovers_a_tenth_of_a_degree_in_five_metres_of_wind():
 def test_the_second_order_of_the_wind_is_as_large_as_what_is_sought():
     forth, back = times(20.0, 5.0)
     mean = 0.5 * (forth + back)  # the mean of times is not the time of the mean speed
-    naive = path_temperatures(mean, mean, 0.0, **PATH, u_crosswind=0.0).temperature_c[0]
+    naive = temperatures(mean, mean, 0.0, **PATH, u_crosswind=0.0).temperature_c[0]
     # (5/343)² of the speed is 0.073 m/s; 0.62 m/s a degree with relative humidity held
     assert naive == pytest.approx(20.0 - 0.073 / 0.624, abs=3e-3)
-    one_way = path_temperatures(forth, None, 0.0, **PATH, u_crosswind=0.0, wind=0.0, u_wind=0.0).temperature_c[0]
+    one_way = temperatures(forth, None, 0.0, **PATH, u_crosswind=0.0, wind=0.0, u_wind=0.0).temperature_c[0]
     assert one_way - 20.0 == pytest.approx(5.0 / 0.624, rel=0.02)
 
 
 def test_a_crosswind_that_an_anemometer_gives_is_taken_off():
     pairs = times(20.0, 3.0, 5.0)
-    without = path_temperatures(*pairs, 0.0, **PATH, u_crosswind=0.0)
+    without = temperatures(*pairs, 0.0, **PATH, u_crosswind=0.0)
     assert without.temperature_c[0] == pytest.approx(20.0 - 0.0364 / 0.624, abs=1e-3)
-    with_it = path_temperatures(*pairs, 0.0, **PATH, crosswind=5.0, u_crosswind=0.3)
+    with_it = temperatures(*pairs, 0.0, **PATH, crosswind=5.0, u_crosswind=0.3)
     assert with_it.temperature_c[0] == pytest.approx(20.0, abs=1e-3)
     assert with_it.parts_c["crosswind"][0] == pytest.approx(5.0 * 0.3 / 344.0 / 0.624, rel=0.02)
-    unknown = path_temperatures(*pairs, 0.0, **PATH, u_crosswind=5.0)
+    unknown = temperatures(*pairs, 0.0, **PATH, u_crosswind=5.0)
     assert unknown.temperature_c[0] == pytest.approx(20.0, abs=1e-3)  # 5 m/s is its rms
     assert unknown.parts_c["crosswind"][0] == pytest.approx(0.0515 / 0.624, rel=0.01)
 
@@ -58,7 +79,7 @@ def test_a_wind_that_changes_along_the_path_leaves_its_variance():
     e = float(sound(np.mean(t), P, H, model="real_gas").vapour_pressure_hpa)  # vapour mixes, relative humidity does not
     c = speed(t, P, e)
     forth, back = LENGTH * np.mean(1.0 / (c + wind)), LENGTH * np.mean(1.0 / (c - wind))
-    found = path_temperatures(forth, back, 0.0, **PATH, u_crosswind=0.0)
+    found = temperatures(forth, back, 0.0, **PATH, u_crosswind=0.0)
     low = np.mean(t) - found.temperature_c[0]
     expected = mean_temperature_excess(20.0, np.var(t), np.var(wind))
     assert expected > 0.003
@@ -71,24 +92,22 @@ def test_a_wind_that_changes_along_the_path_leaves_its_variance():
 def test_a_bent_ray_and_its_frequency_are_taken_off():
     forth, back = times(20.0, 2.0)
     early = 1.0 - bent_ray_excess(LENGTH, 343.0, 0.3)
-    bent = path_temperatures(forth * early, back * early, 0.0, **PATH, u_crosswind=0.0, speed_gradient=0.3)
+    bent = temperatures(forth * early, back * early, 0.0, **PATH, u_crosswind=0.0, speed_gradient=0.3)
     assert bent.temperature_c[0] == pytest.approx(20.0, abs=1e-4)
     e = sound(20.0, P, H, model="real_gas").vapour_pressure_hpa
     fast = 1.0 + dispersion(20.0, P, e, 4000.0).of_a_pulse()[0]
-    chirp = path_temperatures(*times(20.0), 0.0, **{**PATH, "length": LENGTH * fast}, u_crosswind=0.0, frequency_hz=4e3)
+    chirp = temperatures(*times(20.0), 0.0, **{**PATH, "length": LENGTH * fast}, u_crosswind=0.0, frequency_hz=4e3)
     assert chirp.temperature_c[0] == pytest.approx(20.0, abs=1e-6)
 
 
 def test_every_cause_moves_the_temperature_by_its_part():
     forth, back = times(20.0, 5.0)
     spreads = {"u_delay": 2e-5, "u_crosswind": 0.2, "crosswind": 2.0}
-    base = path_temperatures(forth, back, 1e-5, **PATH, **spreads)
+    base = temperatures(forth, back, 1e-5, **PATH, **spreads)
 
     def moved(change=None, **other):
         given = {**PATH, **spreads, **other}
-        return abs(
-            path_temperatures(forth + (change or 0.0), back + (change or 0.0), 1e-5, **given).temperature_c[0] - t0
-        )
+        return abs(temperatures(forth + (change or 0.0), back + (change or 0.0), 1e-5, **given).temperature_c[0] - t0)
 
     t0 = base.temperature_c[0]
     parts = {k: v[0] for k, v in base.parts_c.items()}
@@ -118,7 +137,7 @@ def scatter(runs, seed):
         noise = 8e-6 * rng.standard_normal((2, 6))
         forth = travel_time(length, c, wind, across) + late + 1e-3 + noise[0]
         back = travel_time(length, c, -wind, across) + late + 1e-3 + noise[1]
-        found = path_temperatures(
+        found = temperatures(
             forth,
             back,
             8e-6,
@@ -153,7 +172,7 @@ def test_claims_hold_against_much_scatter():
 
 
 def test_what_is_common_stays_common():
-    found = path_temperatures(*times(np.full(4, 20.0)), 5e-6, **PATH, u_crosswind=0.0)
+    found = temperatures(*times(np.full(4, 20.0)), 5e-6, **PATH, u_crosswind=0.0)
     u = found.u_temperature_c
     correlation = found.covariance_c2 / np.outer(u, u)
     assert correlation[0, 1] > 0.9  # length, station and formula are one for all
@@ -164,7 +183,7 @@ def test_what_is_common_stays_common():
 def test_a_humidity_read_high_raises_the_index_through_the_temperature():
     forth, back = times(20.0)
     low, high = (
-        path_temperatures(forth, back, 0.0, **{**PATH, "humidity_percent": h}, u_crosswind=0.0) for h in (50.0, 60.0)
+        temperatures(forth, back, 0.0, **{**PATH, "humidity_percent": h}, u_crosswind=0.0) for h in (50.0, 60.0)
     )
     assert high.temperature_c[0] < low.temperature_c[0]
     assert high.group_refractivity[0] > low.group_refractivity[0]
@@ -177,7 +196,7 @@ def test_weather_moves_the_index_through_the_temperature_and_directly(name, u):
 
     def found(shift, spread):
         given = {**PATH, name: PATH[name] + shift, f"u_{name}": spread}
-        return path_temperatures(forth, back, 0.0, **given, u_crosswind=0.0)
+        return temperatures(forth, back, 0.0, **given, u_crosswind=0.0)
 
     moved = found(0.5 * u, 0.0).group_refractivity[0] - found(-0.5 * u, 0.0).group_refractivity[0]
     part = found(0.0, u).covariance_group[0, 0] - found(0.0, 0.0).covariance_group[0, 0]
@@ -186,7 +205,7 @@ def test_weather_moves_the_index_through_the_temperature_and_directly(name, u):
 
 def test_one_direction_carries_the_winds_uncertainty():
     forth, _ = times(20.0, 3.0)
-    found = path_temperatures(forth, None, 5e-6, **PATH, u_crosswind=0.0, wind=3.0, u_wind=0.5)
+    found = temperatures(forth, None, 5e-6, **PATH, u_crosswind=0.0, wind=3.0, u_wind=0.5)
     assert found.temperature_c[0] == pytest.approx(20.0, abs=1e-6)
     assert found.parts_c["wind"][0] == pytest.approx(0.5 / 0.624, rel=0.01)
     assert found.wind[0] == 3.0
@@ -196,7 +215,7 @@ def test_one_direction_carries_the_winds_uncertainty():
 def test_a_bad_time_is_a_status_and_spoils_no_other():
     forth, back = (np.tile(x, 4) for x in times(20.0, 1.0))
     forth[1], back[2], forth[3], back[3] = np.nan, -1.0, 0.2, 0.2
-    found = path_temperatures(forth, back, 5e-6, **PATH, u_crosswind=0.0)
+    found = temperatures(forth, back, 5e-6, **PATH, u_crosswind=0.0)
     assert found.status == (USED, NO_TIME, NO_TIME, OUTSIDE)
     assert found.temperature_c[0] == pytest.approx(20.0, abs=1e-6)
     for values in (found.temperature_c, found.u_temperature_c, found.group_refractivity, found.u_group_refractivity):
@@ -204,7 +223,7 @@ def test_a_bad_time_is_a_status_and_spoils_no_other():
 
 
 def test_two_times_of_a_hurricane_are_a_status_and_leave_no_wind():
-    found = path_temperatures([LENGTH / 443.0, 0.2, 0.29], [LENGTH / 243.0, 0.2, 0.29], 5e-6, **PATH, u_crosswind=0.0)
+    found = temperatures([LENGTH / 443.0, 0.2, 0.29], [LENGTH / 243.0, 0.2, 0.29], 5e-6, **PATH, u_crosswind=0.0)
     assert found.status == (NO_WIND, OUTSIDE, USED)
     for values in (found.temperature_c, found.u_temperature_c, found.wind, found.u_wind, found.group_refractivity):
         assert np.isfinite(values).tolist() == [False, False, True]
@@ -226,10 +245,10 @@ def test_two_times_of_a_hurricane_are_a_status_and_leave_no_wind():
 def test_refusals(change, complaint):
     forth, back = times(20.0)
     with pytest.raises(ValidityError) as caught:
-        path_temperatures(forth, back, 5e-6, **{**PATH, "u_crosswind": 0.0, **change})
+        temperatures(forth, back, 5e-6, **{**PATH, "u_crosswind": 0.0, **change})
     assert complaint in str(caught.value)
 
 
 def test_one_direction_without_a_wind_is_refused():
     with pytest.raises(ValidityError, match="give wind and u_wind"):
-        path_temperatures(times(20.0)[0], None, 5e-6, **PATH, u_crosswind=0.0)
+        temperatures(times(20.0)[0], None, 5e-6, **PATH, u_crosswind=0.0)

@@ -1,5 +1,7 @@
 """An array of loudspeakers and microphones: fields integrated along rays, inverted, compared with what was there."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,8 @@ from catseye.atmosphere.index.air import group_refractivity
 from catseye.atmosphere.sound.speed import sound
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import FieldPrior, Scale
-from catseye.reduction.air.acoustic import NO_TIME, OUTSIDE, USED
-from catseye.reduction.air.acoustic_field import COMMON, sound_field
+from catseye.reduction.air.acoustic import NO_TIME, OUTSIDE, USED, StationAir
+from catseye.reduction.air.acoustic_field import COMMON, FieldTimes, sound_field
 
 P, H = 933.0, 60.0
 STATIONS = np.array(
@@ -54,9 +56,19 @@ def on_laser(quantity):
     return np.mean(quantity(LASER[0] + NODES[:, None] * (LASER[1] - LASER[0])), axis=0)
 
 
+def field_of(stations, **given):
+    """`sound_field` with the fields of its times and its air as one row of keywords."""
+    times, weather = (
+        kind(**{field.name: given.pop(field.name) for field in fields(kind) if field.name in given})
+        for kind in (FieldTimes, StationAir)
+    )
+    return sound_field(stations, times, weather=weather, **given)
+
+
 def inverted(time, u_time=1e-5, **change):
-    given = {"u_position": 2e-3, "u_delay": 1e-5, **WEATHER, "temperature": TEMPERATURE, "wind": WIND, **change}
-    return sound_field(STATIONS, SOURCE, RECEIVER, time, u_time, **given)
+    given = {"source": SOURCE, "receiver": RECEIVER, "u_position": 2e-3, "u_delay": 1e-5, **WEATHER}
+    given |= {"temperature": TEMPERATURE, "wind": WIND, **change}
+    return field_of(STATIONS, time=time, u_time=u_time, **given)
 
 
 @pytest.fixture(scope="module")
@@ -206,7 +218,7 @@ def test_refusals(change, kind, complaint):
 
 def test_a_path_from_a_station_to_itself_is_refused():
     with pytest.raises(ValidityError, match="length of the path 0 m"):
-        sound_field(STATIONS, [0], [0], [0.1], 1e-5, u_position=1e-3, **WEATHER, temperature=TEMPERATURE, wind=None)
+        inverted([0.1], source=[0], receiver=[0], wind=None)
 
 
 @pytest.mark.parametrize(
@@ -231,7 +243,7 @@ def test_what_would_be_answered_wrongly_or_not_at_all_is_refused(change, complai
     given = {"stations": STATIONS, "source": SOURCE, "receiver": RECEIVER, "time": heard(STATIONS), "u_time": 1e-5}
     given |= {"u_position": 2e-3, **WEATHER, "temperature": TEMPERATURE, "wind": WIND, **change}
     with pytest.raises(ValidityError) as caught:
-        sound_field(**given)
+        field_of(**given)
     assert complaint in str(caught.value)
 
 

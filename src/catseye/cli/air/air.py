@@ -70,7 +70,7 @@ def air(
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
     from catseye.gateways.air.objects import air_object
     from catseye.gateways.writers.objects import json_line
-    from catseye.reduction.air.routes import air_by, station_pressure, surface_of
+    from catseye.reduction.air.routes import IndexFormula, air_by, station_pressure, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -91,10 +91,13 @@ def air(
         raise typer.BadParameter("belongs to --surface-c.", param_hint="'--u-surface-c'")
     _one_pressure(pressure_hpa, barometer_mmhg, mercury_c, gravity, latitude_deg, elevation_m)
     if pressure_hpa is None:
+        assert barometer_mmhg is not None  # else `_one_pressure` has refused
+        assert mercury_c is not None
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
-        where = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
         read = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
-        found_p, u_p = station_pressure(barometer_mmhg, mercury_c, **where, **read)
+        found_p, u_p = station_pressure(
+            barometer_mmhg, mercury_c, gravity=gravity, latitude=latitude, elevation=elevation_m, **read
+        )
         pressure_hpa, u_pressure_hpa = float(found_p), math.hypot(u_pressure_hpa, float(u_p))
     elif u_barometer_mmhg > 0.0 or u_mercury_c > 0.0:
         raise typer.BadParameter("belong to --barometer-mmhg.", param_hint="'--u-barometer-mmhg', '--u-mercury-c'")
@@ -106,9 +109,7 @@ def air(
         u_temperature_c=u_temperature_c,
         u_pressure_hpa=u_pressure_hpa,
         u_co2_ppm=u_co2_ppm,
-        wavelength_um=wavelength_um,
-        model=model,
-        co2_ppm=co2_ppm,
+        formula=IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm),
     )
     found = air_object(state, wavelength_um, u)
     if surface_c is not None:
@@ -138,7 +139,9 @@ def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple
         if u > 0.0 and kind not in kinds_of:
             raise typer.BadParameter(f"does not belong to --{kind.replace('_', '-')}.", param_hint=f"'--{option}'")
     u = next(u for u, kinds_of in u_of.values() if kind in kinds_of)
-    return Moisture(kind, given[kind], u)
+    value = given[kind]
+    assert value is not None  # it is the one that was given
+    return Moisture(kind, value, u)
 
 
 def _one_pressure(

@@ -60,7 +60,7 @@ def _correlation(traces: Sequence["ChannelTrace"]) -> Figure:
 
 
 def _in_time(path: "AcousticPath") -> Figure:
-    used, found, sheet = path.used, path.found, path.sheet
+    used, found, sheet = path.used, path.temperatures, path.sheet
     minutes = (path.shots.mjd[used] - path.shots.mjd[0]) * 1440.0
     t, u, noise = found.temperature_c[used], found.u_temperature_c[used], found.parts_c["time"][used]
     both = path.shots.time_ba is not None

@@ -32,7 +32,7 @@ class Mean(NamedTuple):
 
 def mean(path: "AcousticPath") -> Mean:
     """Means over the used shots, by the full covariance: what is common to all does not shrink."""
-    used, found = path.used, path.found
+    used, found = path.used, path.temperatures
     count = int(used.sum())
     if count == 0:
         return Mean(0, *(np.nan,) * 5)
@@ -56,13 +56,16 @@ def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
     """The same with the covariances, as acoustic.json keeps it."""
     items = []
     for path in paths:
-        covariances = {"covariance_c2": path.found.covariance_c2, "covariance_group": path.found.covariance_group}
+        covariances = {
+            "covariance_c2": path.temperatures.covariance_c2,
+            "covariance_group": path.temperatures.covariance_group,
+        }
         items.append({**_path(path), **covariances})
     return {"format": "catseye-acoustic-1", "paths": items}
 
 
 def _path(path: "AcousticPath") -> dict[str, Any]:
-    sheet, found, over = path.sheet, path.found, mean(path)
+    sheet, found, over = path.sheet, path.temperatures, mean(path)
     return {
         "ranger": sheet.ranger,
         "target": sheet.target,
@@ -85,7 +88,7 @@ def _first(values: np.ndarray) -> float:
 
 
 def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
-    shots, found = path.shots, path.found
+    shots, found = path.shots, path.temperatures
     return {
         "mjd_utc": shots.mjd[k],
         "file": shots.file[k],
@@ -106,8 +109,8 @@ def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
 def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
     """The table that a campaign takes: a row a shot that has a temperature, in order of time."""
     rows = [
-        (path.shots.mjd[k], path.sheet.ranger, path.sheet.target, path.found.temperature_c[k],
-         path.found.u_temperature_c[k])
+        (path.shots.mjd[k], path.sheet.ranger, path.sheet.target, path.temperatures.temperature_c[k],
+         path.temperatures.u_temperature_c[k])
         for path in paths
         for k in np.flatnonzero(path.used)
     ]  # fmt: skip
@@ -119,7 +122,7 @@ def shots_csv(paths: Sequence["AcousticPath"]) -> str:
     """Every shot, used or not."""
     rows = []
     for path in paths:
-        shots, found = path.shots, path.found
+        shots, found = path.shots, path.temperatures
         back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
         with np.errstate(invalid="ignore", divide="ignore"):
             decibel = 10.0 * np.log10(shots.snr)
@@ -145,9 +148,9 @@ def words(path: "AcousticPath") -> list[tuple[str, str]]:
     if over.used == 0:
         return [("Path", ends), ("No shot", f"of {total} was used. The first: {path.status(0)}")]
     ways = "both directions" if path.shots.time_ba is not None else "one direction, the wind given"
-    scatter = path.found.temperature_c[path.used].std(ddof=1) if over.used > 1 else np.nan
+    scatter = path.temperatures.temperature_c[path.used].std(ddof=1) if over.used > 1 else np.nan
     spread = f"; they scatter by {scatter:.3f} °C" if over.used > 1 else ""
-    parts = sorted(((_first(part[path.used]), name) for name, part in path.found.parts_c.items()), reverse=True)
+    parts = sorted(((_first(part[path.used]), name) for name, part in path.temperatures.parts_c.items()), reverse=True)
     largest = ", ".join(f"{name} {size:.3f}" for size, name in parts[:4])
     passages = [
         ("Path", f"{ends}; {over.used} of {total} shots used, {ways}"),

@@ -82,15 +82,15 @@ def _budget(path: "AcousticPath") -> str:
     if not path.used.any():
         return ""
     k = int(np.argmax(path.used))
-    rows = [(name, f"{float(part[k]):.4f}") for name, part in path.found.parts_c.items()]
-    rows.append(("all together", f"{float(path.found.u_temperature_c[k]):.4f}"))
+    rows = [(name, f"{float(part[k]):.4f}") for name, part in path.temperatures.parts_c.items()]
+    rows.append(("all together", f"{float(path.temperatures.u_temperature_c[k]):.4f}"))
     return paragraph("Standard uncertainty of the first used shot, °C, by cause; causes add in squares.") + table(
         ("cause", "u (°C)"), rows, "tn"
     )
 
 
 def _shots(path: "AcousticPath") -> str:
-    shots, found = path.shots, path.found
+    shots, found = path.shots, path.temperatures
     back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
 
     def cell(value: float, form: str) -> str:

@@ -5,14 +5,15 @@ common to all measurements of a path is kept common: its length, the delay of lo
 pressure and humidity, the crosswind, the bend of the ray, the formula itself. Only times are noise.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.atmosphere.index.air import AirState, air
 from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.sound.dispersion import dispersion
+from catseye.atmosphere.sound.model import SoundSensitivity
 from catseye.atmosphere.sound.path import WIND, bent_ray_excess, pair, straight_line_speed
 from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, model_named, sound, temperatures_c
 from catseye.atmosphere.weather import humidity
@@ -26,6 +27,59 @@ NO_WIND = f"wind above {WIND.upper:g} m/s: the two times do not belong together"
 LENGTH = ValidInterval("length of the path", "m", 0.1, 10_000.0, "the notion of a path", places=1)
 DELAY = ValidInterval("delay", "s", -1.0, 1.0, "the notion of a delay")
 GRADIENT = ValidInterval("gradient of the speed", "1/s", -10.0, 10.0, "the notion of a smoothly bent ray")
+
+
+@dataclass(frozen=True, eq=False)
+class StationAir:
+    """The air as a weather station has it; what is uncertain of it is common to all times.
+
+    pressure_hpa         one or (k,), with u_pressure_hpa
+    humidity_percent     relative, one or (k,), with u_humidity_percent
+    co2_ppm, u_co2_ppm   carbon dioxide
+    """
+
+    pressure_hpa: ArrayLike
+    u_pressure_hpa: float
+    humidity_percent: ArrayLike
+    u_humidity_percent: float
+    co2_ppm: float = 450.0
+    u_co2_ppm: float = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class SoundLine:
+    """The line between loudspeaker and microphone, and how sound runs on it; uncertainties common to all times.
+
+    length, u_length     m, of the path, one or (k,)
+    delay, u_delay       s, of the equipment, taken off each time
+    speed_gradient       1/s across the path, with u_speed_gradient: rays bend and arrive early (`bent_ray_excess`)
+    frequency_hz         of the sound: air's dispersion is taken off (`atmosphere.sound.dispersion`)
+    model                of its speed, a name in `atmosphere.sound.speed.MODELS`
+    """
+
+    length: ArrayLike
+    u_length: float
+    delay: float = 0.0
+    u_delay: float = 0.0
+    speed_gradient: float = 0.0
+    u_speed_gradient: float = 0.0
+    frequency_hz: float = 0.0
+    model: str = THERMOMETRY
+
+
+@dataclass(frozen=True, eq=False)
+class PathWind:
+    """What is known of the wind on a path, m/s, each one or (k,).
+
+    crosswind      expected across the path, u_crosswind its uncertainty: with no anemometer 0 and the rms wind of the
+                   site. A crosswind slows sound whatever its sign (`straight_line_speed`)
+    wind, u_wind   along the path, positive from A to B: needed with one direction, refused with two
+    """
+
+    u_crosswind: ArrayLike
+    crosswind: ArrayLike = 0.0
+    wind: ArrayLike | None = None
+    u_wind: ArrayLike | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,49 +111,26 @@ class PathTemperatures:
 
 
 def path_temperatures(
-    time_ab: Any,
-    time_ba: Any,
-    u_time: Any,
+    time_ab: ArrayLike,
+    time_ba: ArrayLike | None,
+    u_time: ArrayLike,
     *,
-    length: Any,
-    u_length: float,
-    delay: float = 0.0,
-    u_delay: float = 0.0,
-    pressure_hpa: Any,
-    u_pressure_hpa: float,
-    humidity_percent: Any,
-    u_humidity_percent: float,
-    u_crosswind: Any,
-    crosswind: Any = 0.0,
-    wind: Any = None,
-    u_wind: Any = None,
-    speed_gradient: float = 0.0,
-    u_speed_gradient: float = 0.0,
-    co2_ppm: float = 450.0,
-    u_co2_ppm: float = 20.0,
-    frequency_hz: float = 0.0,
-    model: str = THERMOMETRY,
+    line: SoundLine,
+    station: StationAir,
+    wind: PathWind,
     wavelength_um: float = 0.780,
     air_model: str = "ciddor_hill1999",
 ) -> PathTemperatures:
     """Mean temperature along a path from the travel times of sound in one direction or, better, in both.
 
-    time_ab              (k,) or one, s, from the signal's departure at A to its arrival at B, delay included
-    time_ba              the same from B to A at the same instants; None where one direction was measured
-    u_time               one, (k,) or (2, k), s: noise of each time, independent
-    length, u_length     m, of the path; its uncertainty is common to all
-    delay, u_delay       s, of the equipment, taken off each time; its uncertainty is common to all times
-    pressure_hpa         one or (k,), of a station; u_pressure_hpa common to all
-    humidity_percent     one or (k,), of a station; u_humidity_percent common to all
-    crosswind            m/s expected across the path, one or (k,); u_crosswind its uncertainty: with no anemometer 0
-                         and the rms wind of the site. A crosswind slows sound whatever its sign (`straight_line_speed`)
-    wind, u_wind         m/s along the path, positive from A to B: needed with one direction, refused with two
-    speed_gradient       1/s across the path, with u_speed_gradient: rays bend and arrive early (`bent_ray_excess`)
-    co2_ppm, u_co2_ppm   carbon dioxide
-    frequency_hz         of the sound: air's dispersion is taken off (`atmosphere.sound.dispersion`)
-    model                a name in `atmosphere.sound.speed.MODELS`
-    wavelength_um        of the light whose group refractivity is wanted
-    air_model            a name in `atmosphere.index.air.MODELS`
+    time_ab         (k,) or one, s, from the signal's departure at A to its arrival at B, delay included
+    time_ba         the same from B to A at the same instants; None where one direction was measured
+    u_time          one, (k,) or (2, k), s: noise of each time, independent
+    line            length, delay, bend, and how sound runs
+    station         pressure and humidity
+    wind            across the path; along it where one direction was measured
+    wavelength_um   of the light whose group refractivity is wanted
+    air_model       a name in `atmosphere.index.air.MODELS`
 
     Relative humidity is held where temperature is sought, and where its uncertainty is carried on: a humidity read 1 %
     too high at 20 °C lowers the temperature by 0.022 °C and so raises the index by more than it lowers it directly.
@@ -107,77 +138,51 @@ def path_temperatures(
     Source: [PARKER04] eqs. 4.6 and 4.7 with the erratum of `atmosphere.sound.parker2004`; [JCGM100] eq. 13.
     Raises ValidityError for weather, lengths and uncertainties outside their limits; a bad time is a status.
 
-    >>> found = path_temperatures(
-    ...     0.28735632, 0.29585799, 10e-6, length=100.0, u_length=1e-3, pressure_hpa=933.0, u_pressure_hpa=0.3,
-    ...     humidity_percent=50.0, u_humidity_percent=3.0, u_crosswind=0.0)
-    >>> [round(float(v), 2) for v in (found.temperature_c[0], found.u_temperature_c[0], found.wind[0])]
+    >>> line, wind = SoundLine(length=100.0, u_length=1e-3), PathWind(u_crosswind=0.0)
+    >>> station = StationAir(933.0, 0.3, humidity_percent=50.0, u_humidity_percent=3.0)
+    >>> path = path_temperatures(0.28735632, 0.29585799, 10e-6, line=line, station=station, wind=wind)
+    >>> [round(float(v), 2) for v in (path.temperature_c[0], path.u_temperature_c[0], path.wind[0])]
     [18.4, 0.08, 5.0]
     """
-    forth = np.atleast_1d(np.asarray(time_ab, float)) - delay
+    forth = np.atleast_1d(np.asarray(time_ab, float)) - line.delay
     count = forth.shape[0]
-    back = None if time_ba is None else np.broadcast_to(np.asarray(time_ba, float), (count,)) - delay
+    back = None if time_ba is None else np.broadcast_to(np.asarray(time_ba, float), (count,)) - line.delay
     u_time = np.broadcast_to(np.asarray(u_time, float), (2, count))
-    _check(length, delay, crosswind, speed_gradient, wind, u_wind, back is None)
-    model_named(model).check(pressure_hpa=pressure_hpa, humidity_percent=humidity_percent, co2_ppm=co2_ppm)
-    length, p, h, across, u_across = (
+    _check(line, station, wind, u_time, one_way=back is None)
+    length, p, h = (
         np.broadcast_to(np.asarray(v, float), (count,))
-        for v in (length, pressure_hpa, humidity_percent, crosswind, u_crosswind)
+        for v in (line.length, station.pressure_hpa, station.humidity_percent)
     )
-    check_spreads(
-        u_time=u_time,
-        u_length=u_length,
-        u_delay=u_delay,
-        u_pressure_hpa=u_pressure_hpa,
-        u_humidity_percent=u_humidity_percent,
-        u_crosswind=u_crosswind,
-        u_speed_gradient=u_speed_gradient,
-        u_co2_ppm=u_co2_ppm,
-    )
-
     good = np.isfinite(forth) & (forth > 0.0) & np.isfinite(length)
     if back is not None:
         good &= np.isfinite(back) & (back > 0.0)
-    seen = _Seen.of(np.where(good, forth, np.nan), None if back is None else np.where(good, back, np.nan), length)
+    forth, back = np.where(good, forth, np.nan), None if back is None else np.where(good, back, np.nan)
+    along = _SpeedAlong.of(forth, back, length)
     if back is None:
-        seen = seen.less_wind(np.broadcast_to(np.asarray(wind, float), (count,)), u_wind)
-
-    bend_rms = np.hypot(speed_gradient, u_speed_gradient)
-    early = bent_ray_excess(length, 343.0, bend_rms)
-    spread = np.sqrt(4.0 * (speed_gradient * u_speed_gradient) ** 2 + 2.0 * u_speed_gradient**4)
-    speed, u_speed_crosswind = straight_line_speed(seen.speed * (1.0 - early), across, u_across)
-    t = np.atleast_1d(temperatures_c(speed, p, h, None, model, co2_ppm, frequency_hz))
-    calm = ~(np.abs(seen.wind) > WIND.upper)
+        along = along.less_wind(wind)
+    straight = _StraightSpeed.of(along, line, wind)
+    t = np.atleast_1d(temperatures_c(straight.speed, p, h, None, line.model, station.co2_ppm, line.frequency_hz))
+    calm = ~(np.abs(along.wind) > WIND.upper)
     status = np.where(~good, NO_TIME, np.where(~calm, NO_WIND, np.where(np.isfinite(t), USED, OUTSIDE)))
     t = np.where(calm, t, np.nan)
     good = np.isfinite(t)
 
-    at = np.where(np.isfinite(t), t, 20.0)  # only so that slopes exist everywhere; nan again below
-    slope = sound(at, p, h, model=model, co2_ppm=co2_ppm).sensitivity
-    e = humidity.vapour_pressure_hpa(at, p, h, MODELS[model].vapour_formula)
-    lag = dispersion(at, p, e, frequency_hz).of_a_pulse()[1]
-    per_speed = np.where(np.isfinite(t), 1.0 / slope.temperature_c, np.nan)
-    noise = per_speed * np.sqrt((seen.per_forth * u_time[0]) ** 2 + (seen.per_back * u_time[1]) ** 2)
-    common = {
-        "length": per_speed * seen.along / length * u_length,
-        "delay": -per_speed * (seen.per_forth + seen.per_back) * u_delay,
-        "pressure": -per_speed * slope.pressure_hpa * u_pressure_hpa,
-        "humidity": -per_speed * slope.humidity_percent * u_humidity_percent,
-        "carbon dioxide": -per_speed * slope.co2_ppm * u_co2_ppm,
-        "wind": per_speed * seen.u_prior,
-        "crosswind": per_speed * u_speed_crosswind,
-        "bend": per_speed * speed * early * spread / np.where(bend_rms > 0.0, bend_rms**2, 1.0),
-        "dispersion": per_speed * speed * lag,
-        "formula": per_speed * MODELS[model].standard_uncertainty,
-    }
+    at = np.where(good, t, 20.0)  # only so that slopes exist everywhere; nan again below
+    slope = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm).sensitivity
+    e = humidity.vapour_pressure_hpa(at, p, h, MODELS[line.model].vapour_formula)
+    lag = dispersion(at, p, e, line.frequency_hz).of_a_pulse()[1]
+    per_speed = np.where(good, 1.0 / slope.temperature_c, np.nan)
+    noise = per_speed * np.sqrt((along.per_forth * u_time[0]) ** 2 + (along.per_back * u_time[1]) ** 2)
+    common = _common_parts(straight, per_speed, slope, lag, line, station)
     covariance = np.diag(noise**2) + sum(np.outer(part, part) for part in common.values())
-    light = air(at, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=co2_ppm)
-    group = _group_covariance(light, good, noise, common, {"pressure": u_pressure_hpa, "humidity": u_humidity_percent})
+    light = air(at, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=station.co2_ppm)
+    group = _group_covariance(light, good, noise, common, station)
     return PathTemperatures(
         temperature_c=t,
         u_temperature_c=np.sqrt(np.diag(covariance)),
         covariance_c2=covariance,
-        wind=np.where(good, seen.wind, np.nan),
-        u_wind=np.where(good, seen.u_wind(u_time, length, u_length, u_delay), np.nan),
+        wind=np.where(good, along.wind, np.nan),
+        u_wind=np.where(good, along.u_wind(u_time, line), np.nan),
         group_refractivity=np.where(good, light.group_refractivity, np.nan),
         u_group_refractivity=np.sqrt(np.diag(group)),
         covariance_group=group,
@@ -186,25 +191,64 @@ def path_temperatures(
     )
 
 
+def _common_parts(
+    straight: "_StraightSpeed",
+    per_speed: np.ndarray,
+    slope: SoundSensitivity,
+    lag: np.ndarray,
+    line: SoundLine,
+    station: StationAir,
+) -> dict[str, np.ndarray]:
+    """What each standard uncertainty that all times share does to the temperatures, °C (k,), by its cause.
+
+    per_speed   °C per m/s, at each temperature
+    slope       of the speed, by weather
+    lag         standard uncertainty of the dispersion, relative to the speed
+    """
+    along, bend_rms = straight.along, straight.bend_rms
+    bend_square = np.where(bend_rms > 0.0, bend_rms**2, 1.0)
+    return {
+        "length": per_speed * along.along / along.length * line.u_length,
+        "delay": -per_speed * (along.per_forth + along.per_back) * line.u_delay,
+        "pressure": -per_speed * slope.pressure_hpa * station.u_pressure_hpa,
+        "humidity": -per_speed * slope.humidity_percent * station.u_humidity_percent,
+        "carbon dioxide": -per_speed * slope.co2_ppm * station.u_co2_ppm,
+        "wind": per_speed * along.u_prior,
+        "crosswind": per_speed * straight.u_crosswind,
+        "bend": per_speed * straight.speed * straight.early * straight.spread / bend_square,
+        "dispersion": per_speed * straight.speed * lag,
+        "formula": per_speed * MODELS[line.model].standard_uncertainty,
+    }
+
+
 def _group_covariance(
-    light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], u: dict[str, Any]
+    light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], station: StationAir
 ) -> np.ndarray:
     """Of the group refractivity: through the temperature, and what weather does at a given temperature as well."""
     slopes = light.sensitivity
-    direct = {"pressure": slopes.pressure_hpa * u["pressure"], "humidity": slopes.humidity_percent * u["humidity"]}
+    direct = {
+        "pressure": slopes.pressure_hpa * station.u_pressure_hpa,
+        "humidity": slopes.humidity_percent * station.u_humidity_percent,
+    }
     parts = [slopes.temperature_c * part + direct.get(name, 0.0) for name, part in common.items()]
     parts.append(np.where(good, light.standard_uncertainty, np.nan))
     return np.diag((slopes.temperature_c * noise) ** 2) + sum(np.outer(part, part) for part in parts)
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _SpeedAlong:
     """What the times say: speed along the path without the wind along it, its slopes by the times, and the wind.
 
-    along      length over time, what the length scales, m/s
-    u_prior    standard uncertainty of a wind that was given, m/s
+    length      (k,) m
+    speed       (k,) m/s, of sound, the wind along it taken off
+    wind        (k,) m/s, measured or given
+    along       (k,) length over time, what the length scales, m/s
+    per_forth   (k,) of the speed by the time from A to B, m/s²; per_back from B to A
+    u_prior     (k,) standard uncertainty of a wind that was given, m/s
+    both        both directions were measured
     """
 
+    length: np.ndarray
     speed: np.ndarray
     wind: np.ndarray
     along: np.ndarray
@@ -214,13 +258,14 @@ class _Seen:
     both: bool = True
 
     @classmethod
-    def of(cls, forth: np.ndarray, back: np.ndarray | None, length: np.ndarray) -> "_Seen":
+    def of(cls, forth: np.ndarray, back: np.ndarray | None, length: np.ndarray) -> "_SpeedAlong":
         zero = np.zeros_like(forth)
         if back is None:
             speed = length / forth
-            return cls(speed, zero, speed, -speed / forth, zero, zero, both=False)
+            return cls(length, speed, zero, speed, -speed / forth, zero, zero, both=False)
         both = pair(forth, back, length)
         return cls(
+            length,
             both.speed_along,
             both.wind,
             both.speed_along,
@@ -229,32 +274,83 @@ class _Seen:
             zero,
         )
 
-    def less_wind(self, wind: np.ndarray, u_wind: Any) -> "_Seen":
-        u = np.broadcast_to(np.asarray(u_wind, float), wind.shape)
-        return _Seen(self.speed - wind, wind, self.along, self.per_forth, self.per_back, u, both=False)
+    def less_wind(self, given: PathWind) -> "_SpeedAlong":
+        """With a wind that was given instead of measured."""
+        wind, u = (np.broadcast_to(np.asarray(v, float), self.speed.shape) for v in (given.wind, given.u_wind))
+        return replace(self, speed=self.speed - wind, wind=wind, u_prior=u)
 
-    def u_wind(self, u_time: np.ndarray, length: np.ndarray, u_length: float, u_delay: float) -> np.ndarray:
+    def u_wind(self, u_time: np.ndarray, line: SoundLine) -> np.ndarray:
+        """(k,) m/s, standard uncertainty of the wind."""
         if not self.both:
             return self.u_prior
         noise = (self.per_forth * u_time[0]) ** 2 + (self.per_back * u_time[1]) ** 2
-        delay = (self.per_forth - self.per_back) * u_delay
-        return np.sqrt(noise + delay**2 + (self.wind / length * u_length) ** 2)
+        delay = (self.per_forth - self.per_back) * line.u_delay
+        return np.sqrt(noise + delay**2 + (self.wind / self.length * line.u_length) ** 2)
 
 
-def _check(length, delay, crosswind, speed_gradient, wind, u_wind, one_way) -> None:
-    LENGTH.check(length)
-    DELAY.check(delay)
-    WIND.check(crosswind)
-    GRADIENT.check(speed_gradient)
+@dataclass(frozen=True, eq=False)
+class _StraightSpeed:
+    """The speed in still air on the straight line: that along the path less what bend and crosswind do.
+
+    along         what the times say
+    speed         (k,) m/s
+    u_crosswind   (k,) m/s, what is not known of the crosswind's part
+    bend_rms      1/s, rms gradient of the speed
+    early         (k,) share of the time by which a ray so bent comes early
+    spread        1/s², standard uncertainty of the gradient's square
+    """
+
+    along: _SpeedAlong
+    speed: np.ndarray
+    u_crosswind: np.ndarray
+    bend_rms: float
+    early: np.ndarray
+    spread: float
+
+    @classmethod
+    def of(cls, along: _SpeedAlong, line: SoundLine, wind: PathWind) -> "_StraightSpeed":
+        gradient, u_gradient = line.speed_gradient, line.u_speed_gradient
+        bend_rms = np.hypot(gradient, u_gradient)
+        early = bent_ray_excess(along.length, 343.0, bend_rms)
+        spread = np.sqrt(4.0 * (gradient * u_gradient) ** 2 + 2.0 * u_gradient**4)
+        shape = along.length.shape
+        across, u_across = (np.broadcast_to(np.asarray(v, float), shape) for v in (wind.crosswind, wind.u_crosswind))
+        speed, u_crosswind = straight_line_speed(along.speed * (1.0 - early), across, u_across)
+        return cls(along, speed, u_crosswind, bend_rms, early, spread)
+
+
+def _check(line: SoundLine, station: StationAir, wind: PathWind, u_time: np.ndarray, *, one_way: bool) -> None:
+    """Raise ValidityError for what is outside its limits, and for a wind that is missing or too much."""
+    LENGTH.check(line.length)
+    DELAY.check(line.delay)
+    WIND.check(wind.crosswind)
+    GRADIENT.check(line.speed_gradient)
+    _check_wind_along(wind, one_way)
+    model_named(line.model).check(
+        pressure_hpa=station.pressure_hpa, humidity_percent=station.humidity_percent, co2_ppm=station.co2_ppm
+    )
+    check_spreads(
+        u_time=u_time,
+        u_length=line.u_length,
+        u_delay=line.u_delay,
+        u_pressure_hpa=station.u_pressure_hpa,
+        u_humidity_percent=station.u_humidity_percent,
+        u_crosswind=wind.u_crosswind,
+        u_speed_gradient=line.u_speed_gradient,
+        u_co2_ppm=station.u_co2_ppm,
+    )
+
+
+def _check_wind_along(given: PathWind, one_way: bool) -> None:
     if not one_way:
-        if wind is not None or u_wind is not None:
+        if given.wind is not None or given.u_wind is not None:
             raise ValidityError(
                 "wind and u_wind are for one direction; two directions measure the wind: leave them out"
             )
         return
-    if wind is None or u_wind is None:
+    if given.wind is None or given.u_wind is None:
         raise ValidityError(
             "one direction does not tell wind from temperature: give wind and u_wind, m/s along the path"
         )
-    WIND.check(wind)
-    check_spreads(u_wind=u_wind)
+    WIND.check(given.wind)
+    check_spreads(u_wind=given.u_wind)

@@ -7,9 +7,9 @@ K rms and 0.007 °C for 1 m/s rms (`atmosphere.sound.path`), and bent rays.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.atmosphere.index.air import air
 from catseye.atmosphere.limit import ValidInterval, check_spreads
@@ -17,7 +17,7 @@ from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Tomogram, tomogram
-from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED
+from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED, StationAir
 
 PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
 CLOSE_ENOUGH_C = 1e-6
@@ -57,7 +57,7 @@ class LineAir:
 
 @dataclass(frozen=True, eq=False)
 class SoundField:
-    """What an array of paths tells.
+    """Temperature and wind between the stations of an array, from its travel times.
 
     tomogram   the estimate, its observations those used
     status     a text for each time given: `used`, or why not
@@ -89,7 +89,7 @@ class SoundField:
         return self.used[self.tomogram.suspects]
 
     def along(
-        self, start: Any, end: Any, *, wavelength_um: float = 0.780, air_model: str = "ciddor_hill1999"
+        self, start: ArrayLike, end: ArrayLike, *, wavelength_um: float = 0.780, air_model: str = "ciddor_hill1999"
     ) -> LineAir:
         """Temperature, wind and group refractivity along straight lines, such as those of lasers.
 
@@ -130,74 +130,66 @@ class SoundField:
         if self.tomogram.vector is None:
             nothing = np.full((count, 3), np.nan)
             return nothing, nothing
-        found = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
-        return np.stack([m.value for m in found], axis=1), np.stack([m.u for m in found], axis=1)
+        means = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
+        return np.stack([m.value for m in means], axis=1), np.stack([m.u for m in means], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class FieldTimes:
+    """Travel times between the stations of an array, m of them.
+
+    source, receiver   (m,) which station sent, which heard
+    time               (m,) s, delay included; nan where none was found
+    u_time             one or (m,), s: noise of each
+    delay, u_delay     s, of the equipment, common to all
+    """
+
+    source: ArrayLike
+    receiver: ArrayLike
+    time: ArrayLike
+    u_time: ArrayLike
+    delay: float = 0.0
+    u_delay: float = 0.0
 
 
 def sound_field(
-    stations: Any,
-    source: Any,
-    receiver: Any,
-    time: Any,
-    u_time: Any,
+    stations: ArrayLike,
+    times: FieldTimes,
     *,
     u_position: float,
-    delay: float = 0.0,
-    u_delay: float = 0.0,
-    pressure_hpa: float,
-    u_pressure_hpa: float,
-    humidity_percent: float,
-    u_humidity_percent: float,
+    weather: StationAir,
     temperature: FieldPrior,
     wind: FieldPrior | None,
-    co2_ppm: float = 450.0,
-    u_co2_ppm: float = 20.0,
     frequency_hz: float = 0.0,
     model: str = THERMOMETRY,
 ) -> SoundField:
     """Temperature field and wind from travel times between loudspeakers and microphones.
 
-    stations             (n, 3) m, places of loudspeakers and microphones
-    source, receiver     (m,) which station sent, which heard
-    time                 (m,) s, delay included; nan where none was found
-    u_time               one or (m,), s: noise of each
-    u_position           m, of each coordinate of each station: shared by all its paths
-    delay, u_delay       s, of the equipment, common to all
-    pressure_hpa, humidity_percent   of the air, with their uncertainties: common to all
-    temperature          prior of the field, °C
-    wind                 prior of each component of the wind, m/s, expected 0; None for still air
-    co2_ppm, u_co2_ppm   carbon dioxide
-    frequency_hz         of the sound: air's dispersion is taken off, a share of it is uncertain
-    model                a name in `atmosphere.sound.speed.MODELS`
+    stations       (n, 3) m, places of loudspeakers and microphones
+    times          between them
+    u_position     m, of each coordinate of each station: shared by all its paths
+    weather        pressure and humidity of the air, one number each: common to all
+    temperature    prior of the field, °C
+    wind           prior of each component of the wind, m/s, expected 0; None for still air
+    frequency_hz   of the sound: air's dispersion is taken off, a share of it is uncertain
+    model          a name in `atmosphere.sound.speed.MODELS`
 
     Source: exact geometry of `atmosphere.sound.path`, [TARANTOLA05] for the estimate; linearised about each path's own
     temperature and wind, again until nothing changes. Raises ValidityError for weather and shapes, EstimationError
     where no time is left, or where temperature and wind do not settle.
     """
-    stations, time = np.asarray(stations, float), np.asarray(time, float)
-    source, receiver, u_time = _ends(stations, source, receiver, time, u_time)
-    check_spreads(
-        u_time=u_time,
-        u_position=u_position,
-        u_delay=u_delay,
-        u_pressure_hpa=u_pressure_hpa,
-        u_humidity_percent=u_humidity_percent,
-        u_co2_ppm=u_co2_ppm,
-    )
-    ray = stations[receiver] - stations[source]
+    places, time = np.asarray(stations, float), np.asarray(times.time, float)
+    source, receiver, u_time = _ends(places, times, time)
+    sigmas = _sigmas(places.size, u_time, times.u_delay, u_position, weather, model)
+    ray = places[receiver] - places[source]
     LENGTH.check(np.linalg.norm(ray, axis=1))
     if temperature.u_mean <= 0.0 and not temperature.scales:
         raise ValidityError("the temperature's prior leaves nothing to find; give u_mean or scales")
-    good = np.isfinite(time) & (time > delay)
+    good = np.isfinite(time) & (time > times.delay)
     status = np.where(good, USED, NO_TIME).astype(object)
-    paths = _Paths(stations, source, receiver, time - delay, u_time)
-    values = (pressure_hpa, humidity_percent, co2_ppm, frequency_hz)
-    sigmas = np.concatenate(
-        [
-            np.full(stations.size, u_position),
-            [u_delay, u_pressure_hpa, u_humidity_percent, u_co2_ppm, 1.0, model_named(model).standard_uncertainty],
-        ]
-    )
+    paths = _Paths(places, source, receiver, time - times.delay, u_time)
+    pressure_hpa, humidity_percent = (float(np.asarray(v)) for v in (weather.pressure_hpa, weather.humidity_percent))
+    values = (pressure_hpa, humidity_percent, weather.co2_ppm, frequency_hz)
     at, blown = np.full(len(time), temperature.mean), np.zeros((len(time), 3))
     before = np.full(len(time), np.inf)
     limit = model_named(model).limits["temperature_c"]
@@ -215,12 +207,11 @@ def sound_field(
             raise EstimationError(NOTHING.format(len(time)))
         noise = np.diag((kept.per_second(along) * kept.u_time) ** 2)
         along = np.zeros_like(along) if wind is None else along
-        found = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
-        at[good] = found.scalar_along(kept.lines).value
+        estimate = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
+        at[good] = estimate.scalar_along(kept.lines).value
         if wind is not None:
-            blown[good] = np.stack(
-                [found.vector_along(kept.lines, np.tile(axis, (len(observed), 1))).value for axis in np.eye(3)], axis=1
-            )
+            axes = [np.tile(axis, (len(observed), 1)) for axis in np.eye(3)]
+            blown[good] = np.stack([estimate.vector_along(kept.lines, axis).value for axis in axes], axis=1)
         beyond = good & ~((at >= limit.lower) & (at <= limit.upper))
         status[beyond], good[beyond] = OUTSIDE, False
         if not np.any(beyond) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
@@ -228,25 +219,43 @@ def sound_field(
         before = at.copy()
     else:
         raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; leave out the wildest times")
-    return SoundField(found, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
+    return SoundField(estimate, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
 
 
-def _ends(stations: np.ndarray, source: Any, receiver: Any, time: np.ndarray, u_time: Any) -> tuple:
+def _sigmas(
+    coordinates: int, u_time: np.ndarray, u_delay: float, u_position: float, weather: StationAir, model: str
+) -> np.ndarray:
+    """Standard uncertainties of what all paths share: coordinates of the stations, then `COMMON`."""
+    check_spreads(
+        u_time=u_time,
+        u_position=u_position,
+        u_delay=u_delay,
+        u_pressure_hpa=weather.u_pressure_hpa,
+        u_humidity_percent=weather.u_humidity_percent,
+        u_co2_ppm=weather.u_co2_ppm,
+    )
+    of_weather = [weather.u_pressure_hpa, weather.u_humidity_percent, weather.u_co2_ppm]
+    formula = model_named(model).standard_uncertainty
+    return np.concatenate([np.full(coordinates, u_position), [u_delay, *of_weather, 1.0, formula]])
+
+
+def _ends(stations: np.ndarray, times: FieldTimes, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Source, receiver and noise of each time, (m,) each; ValidityError for other shapes and unknown stations."""
     if stations.ndim != 2 or stations.shape[1] != 3:
         raise ValidityError(f"stations have the shape {stations.shape} (expected (n, 3), m)")
     ends = []
-    for name, given in (("source", source), ("receiver", receiver)):
+    for name, given in (("source", times.source), ("receiver", times.receiver)):
         index = np.asarray(given)
         if time.ndim != 1 or index.shape != time.shape:
             raise ValidityError(f"{name} has the shape {index.shape}, time {time.shape} (expected (m,) both)")
         if index.dtype.kind not in "iu" or np.any((index < 0) | (index >= len(stations))):
             raise ValidityError(f"{name} is not all whole numbers from 0 to {len(stations) - 1}, a station each")
         ends.append(index.astype(int))
-    u_time = np.asarray(u_time, float)
+    u_time = np.asarray(times.u_time, float)
     if u_time.shape not in ((), time.shape):
         raise ValidityError(f"u_time has the shape {u_time.shape} (expected one, or {time.shape})")
-    return *ends, np.broadcast_to(u_time, time.shape)
+    source, receiver = ends
+    return source, receiver, np.broadcast_to(u_time, time.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import InputError, ValidityError
 from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
-from catseye.reduction.air.acoustic import USED, PathTemperatures, path_temperatures
+from catseye.reduction.air.acoustic import USED, PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
 from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import sampled
 
@@ -73,7 +73,7 @@ class AcousticPath:
     sheet         of the path
     sheet_file    its name
     shots         the travel times
-    found         temperatures, wind and index
+    temperatures  of the air, with wind and index
     model         formula of the speed of sound
     air_model     formula of the index
     hashes        SHA-256 of each file read
@@ -82,7 +82,7 @@ class AcousticPath:
     sheet: AcousticSheet
     sheet_file: str
     shots: SoundShots
-    found: PathTemperatures
+    temperatures: PathTemperatures
     model: str
     air_model: str
     hashes: dict[str, str]
@@ -90,11 +90,11 @@ class AcousticPath:
     @property
     def used(self) -> np.ndarray:
         """(k,) bool: has a temperature."""
-        return np.array([status == USED for status in self.found.status])
+        return np.array([status == USED for status in self.temperatures.status])
 
     def status(self, shot: int) -> str:
         """What became of one shot, in words."""
-        text, formula = self.shots.texts[shot], self.found.status[shot]
+        text, formula = self.shots.texts[shot], self.temperatures.status[shot]
         return "; ".join(part for part in (text, "" if formula == USED else formula) if part) or USED
 
 
@@ -142,10 +142,10 @@ def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> Ac
             beside.name, "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)"
         )
     try:
-        found = _temperatures(shots, sheet, model, air_model)
+        temperatures = _temperatures(shots, sheet, model, air_model)
     except ValidityError as problem:
         raise refusal(beside.name, str(problem)) from problem
-    return AcousticPath(sheet, beside.name, shots, found, model, air_model, hashes)
+    return AcousticPath(sheet, beside.name, shots, temperatures, model, air_model, hashes)
 
 
 def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
@@ -202,6 +202,13 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Sound
 
 @dataclass(frozen=True, eq=False)
 class _Arrivals:
+    """Arrivals of k shots in one channel.
+
+    delay, u_delay   (k,) s, from the file's first sample; nan where none was found
+    snr              (k,)
+    texts            what became of each
+    """
+
     delay: np.ndarray
     u_delay: np.ndarray
     snr: np.ndarray
@@ -241,15 +248,16 @@ class _Listener:
         begin = np.clip(np.rint(expected * self.sampling_hz).astype(int) - before, 0, n - wide)
         rows = np.stack([samples[b : b + wide] for b in begin])
         at = begin / self.sampling_hz
-        found = plan(rows, expected - at)
-        good = found.status <= DelayStatus.ECHO
-        delay = np.where(good, found.delay + at, np.nan)
+        delays = plan(rows, expected - at)
+        good = delays.status <= DelayStatus.ECHO
+        delay = np.where(good, delays.delay + at, np.nan)
         lag, height = plan.correlation(np.nan_to_num(rows[0].astype(float)), float(expected[0] - at[0]))
         self.traces.append(
             ChannelTrace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
                   height, float(delay[0]))
         )  # fmt: skip
-        return _Arrivals(delay, np.where(good, found.u_delay, np.nan), found.snr, list(map(found.text, range(len(at)))))
+        texts = [delays.text(k) for k in range(len(at))]
+        return _Arrivals(delay, np.where(good, delays.u_delay, np.nan), delays.snr, texts)
 
     def _quiet(self, samples: np.ndarray, until: float) -> np.ndarray | None:
         """Noise for the whitened weights: after the near loudspeaker has ended, before the first arrival's window."""
@@ -327,50 +335,60 @@ def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model
     u_offset = sheet.u_clock_offset_us * MICROSECOND
     u_delay = sheet.u_delay_us * MICROSECOND
 
+    line = SoundLine(
+        length=sheet.length_m,
+        u_length=sheet.u_length_mm * 1e-3,
+        delay=sheet.delay_us * MICROSECOND,
+        u_delay=float(np.hypot(u_delay, u_offset)) if one_way else u_delay,
+        speed_gradient=sheet.speed_gradient_per_s,
+        u_speed_gradient=sheet.u_speed_gradient_per_s,
+        frequency_hz=frequency_hz(sheet),
+        model=model,
+    )
+    station = StationAir(
+        pressure_hpa=shots.weather[1],
+        u_pressure_hpa=sheet.u_pressure_hpa,
+        humidity_percent=shots.weather[2],
+        u_humidity_percent=sheet.u_humidity_percent,
+        co2_ppm=sheet.co2_ppm,
+    )
+    wind = PathWind(
+        crosswind=sheet.crosswind_m_per_s,
+        u_crosswind=sheet.u_crosswind_m_per_s,
+        wind=sheet.wind_m_per_s if one_way else None,
+        u_wind=sheet.u_wind_m_per_s if one_way else None,
+    )
+
     def at(shift: float) -> PathTemperatures:
         return path_temperatures(
             shots.time_ab - shift,
             None if shots.time_ba is None else shots.time_ba + shift,
             np.nan_to_num(shots.u_time),
-            length=sheet.length_m,
-            u_length=sheet.u_length_mm * 1e-3,
-            delay=sheet.delay_us * MICROSECOND,
-            u_delay=float(np.hypot(u_delay, u_offset)) if one_way else u_delay,
-            pressure_hpa=shots.weather[1],
-            u_pressure_hpa=sheet.u_pressure_hpa,
-            humidity_percent=shots.weather[2],
-            u_humidity_percent=sheet.u_humidity_percent,
-            crosswind=sheet.crosswind_m_per_s,
-            u_crosswind=sheet.u_crosswind_m_per_s,
-            speed_gradient=sheet.speed_gradient_per_s,
-            u_speed_gradient=sheet.u_speed_gradient_per_s,
-            co2_ppm=sheet.co2_ppm,
-            frequency_hz=frequency_hz(sheet),
-            model=model,
+            line=line,
+            station=station,
+            wind=wind,
             wavelength_um=sheet.wavelength_um,
             air_model=air_model,
-            wind=sheet.wind_m_per_s if one_way else None,
-            u_wind=sheet.u_wind_m_per_s if one_way else None,
         )
 
-    found = at(0.0)
-    return found if one_way or u_offset == 0.0 else _with_clock(found, at(u_offset))
+    temperatures = at(0.0)
+    return temperatures if one_way or u_offset == 0.0 else _with_clock(temperatures, at(u_offset))
 
 
-def _with_clock(found: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
+def _with_clock(temperatures: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
     """The clock offset's uncertainty added, common to all: it goes into the wind, hardly into the temperature.
 
     moved   the same with the clock offset larger by its standard uncertainty
     """
-    t, w = moved.temperature_c - found.temperature_c, moved.wind - found.wind
-    n = moved.group_refractivity - found.group_refractivity
-    covariance, group = found.covariance_c2 + np.outer(t, t), found.covariance_group + np.outer(n, n)
+    t, w = moved.temperature_c - temperatures.temperature_c, moved.wind - temperatures.wind
+    n = moved.group_refractivity - temperatures.group_refractivity
+    covariance, group = temperatures.covariance_c2 + np.outer(t, t), temperatures.covariance_group + np.outer(n, n)
     return replace(
-        found,
+        temperatures,
         covariance_c2=covariance,
         u_temperature_c=np.sqrt(np.diag(covariance)),
-        u_wind=np.hypot(found.u_wind, w),
+        u_wind=np.hypot(temperatures.u_wind, w),
         covariance_group=group,
         u_group_refractivity=np.sqrt(np.diag(group)),
-        parts_c={**found.parts_c, "clock": np.abs(t)},
+        parts_c={**temperatures.parts_c, "clock": np.abs(t)},
     )

@@ -150,8 +150,8 @@ def absolute_group_index(
     Source: [PARKER04] eq. 1.31 with the sign of 5.18; rule of `signal.cycles.whole.decision`; [JCGM100] eq. 10.
 
     >>> sure = {"u_path_length": 2e-5, "u_expected_index": 1e-6, "u_phase": 1e-3}
-    >>> found = absolute_group_index(1.0, path_length=100.0, expected_index=1.00025, **sure)
-    >>> int(found.cycles), round(float(found.group_index), 9), float(f"{found.u:.2g}")
+    >>> absolute = absolute_group_index(1.0, path_length=100.0, expected_index=1.00025, **sure)
+    >>> int(absolute.cycles), round(float(absolute.group_index), 9), float(f"{absolute.u:.2g}")
     (1001, 1.000148457, 2.6e-07)
     """
     length, u_length = np.asarray(path_length, dtype=float), np.asarray(u_path_length, dtype=float)
@@ -160,12 +160,12 @@ def absolute_group_index(
     expected = np.asarray(expected_index, dtype=float)
     u_coarse = np.hypot(expected * u_length, length * np.asarray(u_expected_index, dtype=float))
     chosen = decision(expected * length, part, half, u_coarse=u_coarse, u_phase=u_phase)
-    found = group_index(part, chosen.cycles, path_length=length, modulation_hz=modulation_hz)
+    index = group_index(part, chosen.cycles, path_length=length, modulation_hz=modulation_hz)
     by_phase = phase_slope(length, modulation_hz=modulation_hz)
-    u = np.hypot(found * u_length / length, np.asarray(u_phase, dtype=float) / by_phase)
+    u = np.hypot(index * u_length / length, np.asarray(u_phase, dtype=float) / by_phase)
     sure = chosen.status == CycleStatus.SURE
     return AbsoluteIndex(
-        np.where(sure, found, np.nan), np.where(sure, u, np.nan), chosen.cycles, chosen.margin, chosen.status
+        np.where(sure, index, np.nan), np.where(sure, u, np.nan), chosen.cycles, chosen.margin, chosen.status
     )
 
 
@@ -222,10 +222,10 @@ def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, .
     ends = list(zip(ranges.ranger, ranges.target, strict=True))
     series = []
     for benchmark in reduction.campaign.benchmarks:
-        mine = [row for row, pair in enumerate(ends) if pair == (benchmark.ranger, benchmark.target)]
-        if mine:
-            times = reduction.campaign.shots.mjd_utc[ranges.shot[mine]]
-            series.append(_series(reduction, benchmark, np.array(mine)[np.argsort(times, kind="stable")]))
+        rows = [row for row, pair in enumerate(ends) if pair == (benchmark.ranger, benchmark.target)]
+        if rows:
+            times = reduction.campaign.shots.mjd_utc[ranges.shot[rows]]
+            series.append(_series(reduction, benchmark, np.array(rows)[np.argsort(times, kind="stable")]))
     return tuple(series)
 
 

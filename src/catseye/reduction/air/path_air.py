@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.atmosphere.path.air_profile import AirProfile, PathIndex, WeatherReadings
 from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, TEMPERATURE, ProfilePrior
@@ -22,6 +23,15 @@ from catseye.records.site.site import SiteRecord
 
 SCREEN = 2.0  # m, height of a station's sensors above the ground, as weather services stand them
 FIELDS = (("temperature", "C"), ("pressure", "hPa"), ("humidity", "%"))
+
+
+@dataclass(frozen=True)
+class WeatherPriors:
+    """What is expected of each quantity's field before a reading."""
+
+    temperature: ProfilePrior = TEMPERATURE
+    pressure: ProfilePrior = PRESSURE
+    humidity: ProfilePrior = HUMIDITY
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +55,7 @@ class SiteAir:
     co2_ppm: float
     notes: tuple[str, ...]
 
-    def along(self, mjd_utc, a, b) -> PathIndex:
+    def along(self, mjd_utc: ArrayLike, a: ArrayLike, b: ArrayLike) -> PathIndex:
         """Mean group refractivity of straight paths, with covariance, as `AirProfile.along`.
 
         mjd_utc   (m,) time of each
@@ -66,9 +76,7 @@ def site_air(
     block: float | None = None,
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
-    temperature: ProfilePrior = TEMPERATURE,
-    pressure: ProfilePrior = PRESSURE,
-    humidity: ProfilePrior = HUMIDITY,
+    priors: WeatherPriors | None = None,
 ) -> SiteAir:
     """The air of a site from its record and its table of weather.
 
@@ -79,7 +87,7 @@ def site_air(
     block     s, average readings over it; None: none up to 2000 readings, beyond that just as much as is needed
     model     a name in `atmosphere.index.air.MODELS`
     co2_ppm   carbon dioxide, ppm
-    temperature, pressure, humidity   priors
+    priors    of the profiles; the usual where it is None
 
     Wild readings and lying stations are named in `notes`; nothing is left out that was not asked for.
     Source: recipe; the model is `atmosphere.path.profile`'s. Raises InputError for a name that is no station and where
@@ -94,7 +102,10 @@ def site_air(
         readings = readings.averaged(block)
     lowest = min(station.elevation_m for station in site.weather_station) - site.site.elevation_of_z0_m
     ground = lowest - SCREEN if ground is None else ground
-    profile = AirProfile.of(readings, ground=ground, temperature=temperature, pressure=pressure, humidity=humidity)
+    of = priors or WeatherPriors()
+    profile = AirProfile.of(
+        readings, ground=ground, temperature=of.temperature, pressure=of.pressure, humidity=of.humidity
+    )
     names = tuple(station.name for station in site.weather_station)
     notes = _notes(profile, names, start)
     return SiteAir(profile, names, start, block, site.ranging.wavelength_um, model, co2_ppm, notes)
@@ -135,21 +146,21 @@ def _block(readings: WeatherReadings) -> float:
 def _notes(profile: AirProfile, names: tuple[str, ...], start_mjd: float) -> tuple[str, ...]:
     notes = []
     for field, unit in FIELDS:
-        one = getattr(profile, field)
-        found = suspect_readings(one)
-        if len(found.readings):
-            row = int(found.readings[0])
-            who, when = names[one.readings.station[row]], start_mjd + one.readings.seconds[row] / SECONDS_PER_DAY
+        of_field = getattr(profile, field)
+        readings, suspects = of_field.readings, suspect_readings(of_field)
+        if len(suspects.readings):
+            row = int(suspects.readings[0])
+            who, when = names[readings.station[row]], start_mjd + readings.seconds[row] / SECONDS_PER_DAY
             notes.append(
-                f"{field}: {len(found.readings)} of {len(one.readings.value)} readings are wild, the worst "
-                f"{one.readings.value[row]:.2f} {unit} of {who} at MJD {when:.5f}, w = {found.w[row]:.1f}; check them"
+                f"{field}: {len(suspects.readings)} of {len(readings.value)} readings are wild, the worst "
+                f"{readings.value[row]:.2f} {unit} of {who} at MJD {when:.5f}, w = {suspects.w[row]:.1f}; check them"
             )
-        for station in found.stations:
+        for station in suspects.stations:
             notes.append(
-                f"{field}: {names[station]} reads {found.error[station]:+.2f} {unit} against the others, "
-                f"w = {found.w_station[station]:.1f}; leave it out or compare it"
+                f"{field}: {names[station]} reads {suspects.error[station]:+.2f} {unit} against the others, "
+                f"w = {suspects.w_station[station]:.1f}; leave it out or compare it"
             )
-        if len(found.undecided):
-            who = " and ".join(names[station] for station in found.undecided)
+        if len(suspects.undecided):
+            who = " and ".join(names[station] for station in suspects.undecided)
             notes.append(f"{field}: {who} contradict each other and nothing says which is wrong; compare them")
     return tuple(notes)

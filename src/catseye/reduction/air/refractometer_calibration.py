@@ -38,7 +38,7 @@ class SlopeTest:
     """How far the weather's index goes, fitted freely, over what the phase and -(4 pi f/c) L say of it.
 
     ratio       1 when the phase follows the weather; above 1 the path's air changes less than the sensors'
-    u           of the scatter
+    u           of the ratio, by the scatter
     agrees      within three u, the length's own included; None where the index hardly changed
     """
 
@@ -125,12 +125,12 @@ def calibrate_path(readings: PathReadings) -> PathCalibration:
     followed = follow_phase(readings, weather)
     fit = PathFit(readings, weather, followed)
     fit.run()
-    return _told(fit)
+    return _calibration(fit)
 
 
-def _told(fit: PathFit) -> PathCalibration:
+def _calibration(fit: PathFit) -> PathCalibration:
     """The answer in SI, from the fit in ppm."""
-    readings, followed, sheet = fit.readings, fit.followed, fit.readings.sheet
+    readings, followed = fit.readings, fit.followed
     mean, w_reading, _ = fit.tests()
     keep = fit.reading_in & fit.value_in.any(axis=1)
     first = followed.section[fit.rows] == fit.calibrated[0]  # the section that phase_0 and index_0 belong to
@@ -148,20 +148,7 @@ def _told(fit: PathFit) -> PathCalibration:
     temperature, u_temperature = _temperatures(fit, refractivity, gradient)
     residual, standardised = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
     residual[fit.rows], standardised[fit.rows] = mean * PPM, w_reading
-    absolute = absolute_group_index(
-        phase_0,
-        path_length=sheet.path_length_m,
-        u_path_length=sheet.u_path_length_mm * MILLIMETRE,
-        expected_index=1.0 + index_0,
-        u_expected_index=u_0,
-        u_phase=float(np.median(readings.u_phase)),
-        modulation_hz=sheet.modulation_hz,
-    )
-    length, u_length = np.nan, np.nan
-    if absolute.status == CycleStatus.SURE:
-        half = 0.5 * SPEED_OF_LIGHT / sheet.modulation_hz
-        length = float((absolute.cycles - np.mod(phase_0, TWO_PI) / TWO_PI) * half / (1.0 + index_0))
-        u_length = length * u_0
+    absolute, length = _absolute(readings, phase_0, index_0, u_0)
     d, g = fit.weights()
     pvv = float(np.sum(d * fit.v**2) - np.sum(g * np.sum(d * fit.v, axis=1) ** 2))
     used = int(np.sum(fit.value_in & fit.reading_in[:, None]))
@@ -198,9 +185,30 @@ def _told(fit: PathFit) -> PathCalibration:
         degrees_of_freedom=freedom,
         absolute=absolute,
         path_length=length,
-        u_path_length=u_length,
+        u_path_length=length * u_0,
         notes=_notes(fit, slope, absolute, index_0, u_0),
     )
+
+
+def _absolute(readings: PathReadings, phase_0: float, index_0: float, u_0: float) -> tuple[AbsoluteIndex, float]:
+    """What the sheet's length says of the index at the reference phase, and the length that this index gives, m.
+
+    The length is nan where its whole cycles are not sure; its standard uncertainty is u_0 of it.
+    """
+    sheet = readings.sheet
+    absolute = absolute_group_index(
+        phase_0,
+        path_length=sheet.path_length_m,
+        u_path_length=sheet.u_path_length_mm * MILLIMETRE,
+        expected_index=1.0 + index_0,
+        u_expected_index=u_0,
+        u_phase=float(np.median(readings.u_phase)),
+        modulation_hz=sheet.modulation_hz,
+    )
+    if absolute.status != CycleStatus.SURE:
+        return absolute, np.nan
+    half = 0.5 * SPEED_OF_LIGHT / sheet.modulation_hz
+    return absolute, float((absolute.cycles - np.mod(phase_0, TWO_PI) / TWO_PI) * half / (1.0 + index_0))
 
 
 def _indices(fit: PathFit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -241,9 +249,9 @@ def _temperatures(fit: PathFit, refractivity: np.ndarray, gradient: np.ndarray) 
     noise = noise + (slopes[:, 1] / PPM * sheet.noise_pressure_hpa) ** 2
     noise = noise + (slopes[:, 2] / PPM * sheet.noise_humidity_percent) ** 2
     u = np.sqrt(np.einsum("mq,qr,mr->m", by, fit.covariance, by) + noise) * PPM / np.abs(slopes[:, 0])
-    found = np.full((2, len(r)), np.nan)
-    found[:, rows] = np.where(inside, [warm, u], np.nan)
-    return found[0], found[1]
+    temperature_and_u = np.full((2, len(r)), np.nan)
+    temperature_and_u[:, rows] = np.where(inside, [warm, u], np.nan)
+    return temperature_and_u[0], temperature_and_u[1]
 
 
 def _statuses(fit: PathFit) -> tuple[str, ...]:

@@ -91,9 +91,9 @@ class PathFit:
         f = self.followed
         design = np.zeros((len(rows), len(self.names)))
         for k, s in enumerate(self.calibrated):
-            mine = f.section[rows] == s
-            design[mine, k] = 1.0
-            design[mine, self.names.index("length")] = (f.phase[rows[mine]] - self.phase_0[k]) * self.per_radian
+            own = f.section[rows] == s
+            design[own, k] = 1.0
+            design[own, self.names.index("length")] = (f.phase[rows[own]] - self.phase_0[k]) * self.per_radian
         if len(self.knots):
             grid = np.concatenate([[0.0], self.knots])
             first = len(self.names) - len(self.knots)
@@ -175,9 +175,9 @@ class PathFit:
         k, first = len(self.readings.thermometers), len(self.calibrated)
         if k < FEWEST_PLACES:
             return
-        mine = np.arange(first, first + k)
-        self.places = max(1.0, float(np.sqrt(self.x[mine] ** 2 @ np.diag(self.prior)[mine] / (k - 1))))
-        self.prior[mine, mine] /= self.places**2
+        thermometers = np.arange(first, first + k)
+        self.places = max(1.0, float(np.sqrt(self.x[thermometers] ** 2 @ np.diag(self.prior)[thermometers] / (k - 1))))
+        self.prior[thermometers, thermometers] /= self.places**2
         self.solve()
 
     def _spread(self) -> None:

@@ -174,7 +174,7 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
         u_phase = np.full(len(table), sheet.u_phase_rad)
     if "amplitude_v" in table.cells:
         table.numbers("amplitude_v", blank=0.0)
-    found = PathReadings(
+    readings = PathReadings(
         file=str(path),
         sheet=sheet,
         mjd_utc=mjd,
@@ -189,10 +189,10 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
         where=table.where(),
         hashes={**folder.hashes, **(sheet_hashes or {})},
     )
-    serving = found.has_weather & np.array([not why for why in found.left_out])
+    serving = readings.has_weather & np.array([not why for why in readings.left_out])
     if serving.sum() < LASTING:
         raise refusal(str(path), f"holds {serving.sum()} readings with weather (expected at least {LASTING})")
-    return found
+    return readings
 
 
 def _limited(table: TextColumns, name: str, limit) -> np.ndarray:
@@ -268,7 +268,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class FollowedPhase:
-    """The phase of a night without turns.
+    """The phase of a night, unwrapped, in sections within which its whole cycles are known.
 
     phase      (m,) rad, continuous within a section; of a stray the turn nearest to its neighbours
     section    (m,) number of the section
@@ -306,9 +306,9 @@ def follow_phase(readings: PathReadings, weather: PathWeather) -> FollowedPhase:
     noise = np.interp(hours, hours[read], weather.noise[read])
     sigma = np.sqrt(readings.u_phase**2 + (slope * noise) ** 2 + (slope * AIR_WALK_PPM * PPM) ** 2 * unread)
     steps = _wrapped(np.diff(rest[rows]))
-    found = float(1.4826 * np.median(np.abs(steps)) / np.sqrt(2.0)) if len(steps) else 0.0
+    scatter = float(1.4826 * np.median(np.abs(steps)) / np.sqrt(2.0)) if len(steps) else 0.0
     walk = np.hypot(sheet.drift_mrad_per_root_hour * 1e-3, slope * DEPARTURE_PPM * PPM)
-    follower = _Follower(hours, rest, np.maximum(sigma, found), walk, TWO_PI / slope * sheet.path_length_m)
+    follower = _Follower(hours, rest, np.maximum(sigma, scatter), walk, TWO_PI / slope * sheet.path_length_m)
     return follower.follow(rows, expected, np.array([bool(why) for why in readings.left_out]))
 
 

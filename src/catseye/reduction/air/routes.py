@@ -4,9 +4,10 @@ Each way that the notes name ends in the same answer, with the uncertainty that 
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from catseye.atmosphere.index import hygrometer
 from catseye.atmosphere.index.air import MODELS, AirState, air, air_of_vapour, group_partials
@@ -41,20 +42,36 @@ class Moisture:
     """
 
     kind: Hygrometer
-    value: Any
-    u: Any = 0.0
+    value: ArrayLike
+    u: ArrayLike = 0.0
+
+
+@dataclass(frozen=True)
+class IndexFormula:
+    """The formula of an index of air, and the light that it is for, as `atmosphere.index.air.air` takes them.
+
+    wavelength_um   of the light, in vacuum
+    model           a name in `atmosphere.index.air.MODELS`
+    co2_ppm         carbon dioxide
+    modulation_hz   of the light, Hz
+    """
+
+    wavelength_um: float = 0.780
+    model: str = "ciddor_hill1999"
+    co2_ppm: float = 450.0
+    modulation_hz: float = 1500e6
 
 
 def station_pressure(
-    reading_mmhg,
-    mercury_c,
+    reading_mmhg: ArrayLike,
+    mercury_c: ArrayLike,
     *,
-    gravity=None,
-    latitude=None,
-    elevation=None,
-    u_reading_mmhg=0.0,
-    u_mercury_c=0.0,
-) -> tuple[Any, Any]:
+    gravity: ArrayLike | None = None,
+    latitude: ArrayLike | None = None,
+    elevation: ArrayLike | None = None,
+    u_reading_mmhg: ArrayLike = 0.0,
+    u_mercury_c: ArrayLike = 0.0,
+) -> tuple[float | NDArray[np.float64], float | NDArray[np.float64]]:
     """Station pressure from a mercury barometer and its standard uncertainty, hPa.
 
     reading_mmhg     uncorrected height of the mercury on a brass scale, mm
@@ -82,19 +99,16 @@ def station_pressure(
 
 
 def air_by(
-    temperature_c,
-    pressure_hpa,
+    temperature_c: ArrayLike,
+    pressure_hpa: ArrayLike,
     moisture: Moisture,
     *,
-    above_barometer=0.0,
-    u_temperature_c=0.0,
-    u_pressure_hpa=0.0,
-    u_co2_ppm=0.0,
-    wavelength_um=0.780,
-    model="ciddor_hill1999",
-    co2_ppm=450.0,
-    modulation_hz=1500e6,
-) -> tuple[AirState, Any]:
+    above_barometer: ArrayLike = 0.0,
+    u_temperature_c: ArrayLike = 0.0,
+    u_pressure_hpa: ArrayLike = 0.0,
+    u_co2_ppm: ArrayLike = 0.0,
+    formula: IndexFormula | None = None,
+) -> tuple[AirState, float | NDArray[np.float64]]:
     """The air and the standard uncertainty of its group index, formula and instruments.
 
     temperature_c     of the air, °C
@@ -106,42 +120,49 @@ def air_by(
     u_temperature_c   standard uncertainty of the temperature, °C; it reaches the index by the density and by the vapour
     u_pressure_hpa    of the pressure, hPa
     u_co2_ppm         of the carbon dioxide, ppm
-    others            as of `atmosphere.index.air.air`
+    formula           of the index, with its light; None: the defaults
 
     Raises ValidityError for what cannot be.
     Source: [JCGM100] eq. 10; the instruments' equations are in `atmosphere.index.hygrometer`.
 
-    >>> found, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), model="rueger1990")
-    >>> round(float(found.humidity_percent), 2), round(float(u) * 1e6, 4)
+    >>> state, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), formula=IndexFormula(model="rueger1990"))
+    >>> round(float(state.humidity_percent), 2), round(float(u) * 1e6, 4)
     (50.0, 0.0791)
     """
-    light = {"wavelength_um": wavelength_um, "model": model, "co2_ppm": co2_ppm}
+    of = formula or IndexFormula()
+    light = {"wavelength_um": of.wavelength_um, "model": of.model, "co2_ppm": of.co2_ppm}
     u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
     at, u["u_pressure_hpa"], at_per_c = _carried(
-        temperature_c, pressure_hpa, above_barometer, moisture, model, u_pressure_hpa
+        temperature_c, pressure_hpa, above_barometer, moisture, of.model, u_pressure_hpa
     )
     if moisture.kind == "humidity_percent":
-        found = air(temperature_c, at, moisture.value, modulation_hz=modulation_hz, **light)
-        slope = found.sensitivity
+        state = air(temperature_c, at, moisture.value, modulation_hz=of.modulation_hz, **light)
+        slope = state.sensitivity
         # a thermometer read too high also carries the pressure wrongly
         by_c = slope._replace(temperature_c=slope.temperature_c + slope.pressure_hpa * at_per_c)
-        whole = replace(found, sensitivity=by_c)
-        return found, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
-    vapour = read(temperature_c, at, moisture, model)
-    found = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=modulation_hz, **light)
+        whole = replace(state, sensitivity=by_c)
+        return state, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
+    vapour = read(temperature_c, at, moisture, of.model)
+    state = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=of.modulation_hz, **light)
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
     by_p = partials.pressure_hpa + partials.vapour_pressure_hpa * vapour.per_pressure_hpa
     partials = partials._replace(temperature_c=partials.temperature_c + by_p * at_per_c)
-    formula = np.hypot(found.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
-    return found, vapour.index_uncertainty(partials, moisture.u, **u, u_model=formula)
+    u_formula = np.hypot(state.standard_uncertainty, partials.co2_ppm * np.asarray(u_co2_ppm, float))
+    return state, vapour.index_uncertainty(partials, moisture.u, **u, u_model=u_formula)
 
 
 def surface_of(
-    state: AirState, moisture: Moisture, surface_c, *, u_surface_c=0.0, u_temperature_c=0.0, u_pressure_hpa=0.0
+    state: AirState,
+    moisture: Moisture,
+    surface_c: ArrayLike,
+    *,
+    u_surface_c: ArrayLike = 0.0,
+    u_temperature_c: ArrayLike = 0.0,
+    u_pressure_hpa: ArrayLike = 0.0,
 ) -> Condensation:
     """Whether a surface in this air will dew or frost over.
 
-    state             the air that `air_by` found
+    state             as `air_by` gives it
     moisture          what was read: its uncertainty is the dew point's, and the air's temperature counts only where the
                       instrument needs it (a mirror reads the dew point itself)
     surface_c         temperature of the surface, °C
@@ -150,8 +171,8 @@ def surface_of(
     u_pressure_hpa    that of the pressure, hPa
 
     >>> read_so = Moisture("humidity_percent", 75.0, 3.0)
-    >>> found, _ = air_by(10.0, 933.0, read_so)
-    >>> surface = surface_of(found, read_so, 5.0)
+    >>> state, _ = air_by(10.0, 933.0, read_so)
+    >>> surface = surface_of(state, read_so, 5.0)
     >>> str(surface.deposit), round(float(surface.u_margin_k), 2)
     ('dew', 0.58)
     """
@@ -172,7 +193,7 @@ def surface_of(
     )
 
 
-def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrometer.VapourReading:
+def read(temperature_c: ArrayLike, pressure_hpa: ArrayLike, moisture: Moisture, model: str) -> hygrometer.VapourReading:
     """Vapour pressure from an instrument, by the saturation formula that goes with the model where it has one.
 
     Over ice and in a psychrometer the formula is the notes', Buck's.
@@ -191,7 +212,14 @@ def read(temperature_c, pressure_hpa, moisture: Moisture, model: str) -> hygrome
     return hygrometer.of_wet_bulb(temperature_c, moisture.value, pressure_hpa, over_ice=over_ice)
 
 
-def _carried(temperature_c, pressure_hpa, above, moisture: Moisture, model: str, u_pressure_hpa):
+def _carried(
+    temperature_c: ArrayLike,
+    pressure_hpa: ArrayLike,
+    above: ArrayLike,
+    moisture: Moisture,
+    model: str,
+    u_pressure_hpa: ArrayLike,
+) -> tuple[ArrayLike, ArrayLike, float | NDArray[np.float64]]:
     """Pressure at the air's height, its standard uncertainty but for the temperature's, its slope by that (hPa/°C).
 
     The air between has the vapour that the instrument shows at the barometer.

@@ -114,11 +114,11 @@ def explain_shot(
     Source: [PARKER04] eqs. 5.12-5.19; [JCGM100] clause 5 and annex G; [JCGM101] clause 7.
     """
     settings = settings or ReductionSettings()
-    found = np.flatnonzero(campaign.shots.shot == shot)
-    if not len(found):
+    rows = np.flatnonzero(campaign.shots.shot == shot)
+    if not len(rows):
         low, high = int(campaign.shots.shot.min()), int(campaign.shots.shot.max())
         raise InputError(f"shot {shot} is not in shots.csv (expected {low} to {high}, {len(campaign.shots)} shots)")
-    row, notes = int(found[0]), []
+    row, notes = int(rows[0]), []
     try:
         reduction = reduction or reduce_epoch(campaign, settings, progress)
     except (InputError, EstimationError) as problem:
@@ -163,9 +163,9 @@ def budget_of(scene: ShotScene, items: tuple[Item, ...]) -> Budget:
 def scatter_of(scene: ShotScene, items: tuple[Item, ...], draws: int, seed: int) -> Scattered:
     """The Monte Carlo of a scene's range."""
     generator = np.random.default_rng(seed)
-    found = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
+    scattered = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
     spreadless = any(i.given.distribution == STUDENT and i.given.degrees_of_freedom <= 2.0 for i in items)
-    return replace(found, u=float("nan")) if spreadless else found  # such a t has no variance, only an interval
+    return replace(scattered, u=float("nan")) if spreadless else scattered  # such a t has no variance, only an interval
 
 
 def _budgeted(known: Explanation, scene: ShotScene, draws: int, seed: int, progress: Progress | None) -> Explanation:
@@ -217,19 +217,19 @@ def _places(
 ) -> tuple[tuple[np.ndarray, np.ndarray], RangedPoint]:
     names = campaign.shots.ranger[row], campaign.shots.target[row]
     if reduction and set(names) <= set(reduction.coordinates.points):
-        found = reduction.coordinates
-        a, b = (found.x[found.index(name)] for name in names)
-        return (a, b), found.places[names[1]]
+        coordinates = reduction.coordinates
+        a, b = (coordinates.x[coordinates.index(name)] for name in names)
+        return (a, b), coordinates.places[names[1]]
     places = places_of(campaign)
     return (places[names[0]].start, places[names[1]].start), places[names[1]]
 
 
 def _adjusted(coordinates: AdjustedCoordinates, row: int) -> AdjustedShot | None:
     ranges = coordinates.ranges
-    mine = np.flatnonzero(ranges.shot == row)
-    if not len(mine):
+    at = np.flatnonzero(ranges.shot == row)
+    if not len(at):
         return None
-    k = int(mine[0])
+    k = int(at[0])
     names = [ranges.ranger[k], ranges.target[k]]
     a, b = (coordinates.x[coordinates.index(name)] for name in names)
     distance = float(np.linalg.norm(b - a))
@@ -267,8 +267,8 @@ def _cycles(scene: ShotScene, adjusted: AdjustedShot | None, items: tuple[Item, 
     else:
         coarse = observed - scene.index * (scene.range_ - float(np.linalg.norm(scene.a - scene.b)))
         u_coarse, source = _u_typed(scene), "the records' places"
-    found = decision(coarse, scene.phase, scene.half, u_coarse=scene.index * u_coarse, u_phase=u_phase)
-    return found, source
+    cycles = decision(coarse, scene.phase, scene.half, u_coarse=scene.index * u_coarse, u_phase=u_phase)
+    return cycles, source
 
 
 def _u_typed(scene: ShotScene) -> float:

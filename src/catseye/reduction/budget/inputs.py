@@ -92,8 +92,8 @@ def _noise(scene: ShotScene, row: int, phasor: complex) -> tuple[str, float]:
     m, n = int(shots.cycles[row]), int(shots.samples_per_cycle[row])
     if m < FEWEST_FOR_BATCHES:
         return STUDENT, float(2 * (m - 1) if m > 1 else n - 7)
-    found = inspect_buffers(scene.campaign.frames[shots.frame[[row]], : m * n], n).detection
-    _, degrees = found.scatter.variance(np.array([phasor]))
+    detection = inspect_buffers(scene.campaign.frames[shots.frame[[row]], : m * n], n).detection
+    _, degrees = detection.scatter.variance(np.array([phasor]))
     return STUDENT, float(degrees[0, 1])
 
 
@@ -189,7 +189,7 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
     """Axes, coupling and cyclic deviation, where the sheet knows of them."""
     mirror = scene.mirror
     unknowns = head_unknowns(scene.campaign, scene.ranger)
-    found = head_corrections(
+    corrections = head_corrections(
         scene.campaign,
         scene.ranger,
         head_columns(scene.campaign, scene.ranger),
@@ -199,7 +199,7 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
         reference_amplitude=np.array([scene.references.amplitude]),
         index=np.array([scene.index]),
     )
-    slopes = iter(found.slopes[0])
+    slopes = iter(corrections.slopes[0])
     items = []
     for unknown in unknowns:
         kind = unknown.quantity.kind
@@ -302,7 +302,7 @@ def _weather_slopes(scene: ShotScene) -> tuple[float, float]:
 
     def slopes(z: np.ndarray) -> np.ndarray:
         at = pressure_at(pressure, middle, z)
-        found = air(
+        moist = air(
             level + slope * (z - middle),
             at,
             np.full(z.shape, humidity),
@@ -310,11 +310,11 @@ def _weather_slopes(scene: ShotScene) -> tuple[float, float]:
             model=field.model,
         )
         if line is None:
-            return np.stack([found.sensitivity.pressure_hpa, found.sensitivity.humidity_percent])
+            return np.stack([moist.sensitivity.pressure_hpa, moist.sensitivity.humidity_percent])
         # sound gives the temperature, the stations' air the vapour
         chosen = MODELS[field.model]
         saturated = saturation(level + slope * (z - middle), at, chosen.vapour_formula)
-        state = (warm, at, found.vapour_pressure_hpa)
+        state = (warm, at, moist.vapour_pressure_hpa)
         held = chosen.partials(*state, wavelength_um=field.wavelength_um, co2_ppm=chosen.co2_ppm)
         by_pressure = held.pressure_hpa + held.vapour_pressure_hpa * humidity / 100.0 * saturated.per_hpa
         return np.stack([by_pressure, held.vapour_pressure_hpa * saturated.pressure_hpa / 100.0])

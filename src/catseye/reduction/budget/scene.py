@@ -74,7 +74,7 @@ class References:
 
 @dataclass(frozen=True, eq=False)
 class ShotScene:
-    """One shot's measurement.
+    """One shot with everything that its range follows from.
 
     row                  of the campaign's shots
     seconds              of the shot, after the campaign's first
@@ -169,8 +169,6 @@ def scene_of(
 
     Raises InputError where the target's face looks away from the ranger: it cannot have returned the light.
     """
-    from catseye.optics.retroreflector.prism import obliquity_correction
-
     shots = campaign.shots
     ranger, target = shots.ranger[row], shots.target[row]
     a, b = ends
@@ -179,15 +177,10 @@ def scene_of(
     field = AirField.of(campaign, settings).on_lines(shots.mjd_utc[[row]], [frozenset((ranger, target))])
     path = field.along(shots.mjd_utc[[row]], a[None], b[None], np.zeros(len(field.names)))
     distance = float(np.linalg.norm(a - b))
-    incidence, obliquity = 0.0, 0.0
-    if place.normal is not None:
-        cosine = float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
-        if cosine <= 0.0:
-            raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
-        ranging = campaign.site.ranging
-        ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
-        incidence = float(np.arccos(cosine))
-        obliquity = float(obliquity_correction(place.height, ratio, cosine, phase=bends))
+    cosine = 1.0 if place.normal is None else float(np.clip(place.normal @ (a - b) / distance, -1.0, 1.0))
+    if cosine <= 0.0:
+        raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
+    incidence, obliquity = (0.0, 0.0) if place.normal is None else _obliquity(campaign, place, cosine)
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
     phase = float(fraction(phases.phase[row], references.phase))
     index = 1.0 + float(path.refractivity[0])
@@ -222,6 +215,15 @@ def scene_of(
     )
 
 
+def _obliquity(campaign: Campaign, place: RangedPoint, cosine: float) -> tuple[float, float]:
+    """Incidence on a prism's face, rad, and what it changes of the glass's range constant, m."""
+    from catseye.optics.retroreflector.prism import obliquity_correction
+
+    ranging = campaign.site.ranging
+    ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
+    return float(np.arccos(cosine)), float(obliquity_correction(place.height, ratio, cosine, phase=bends))
+
+
 def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], row: int) -> References:
     """The good reference shots of a shot's ranger, and how the electronics' phase at the shot follows from them.
 
@@ -230,14 +232,14 @@ def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], 
     Source: as `follow_electronics`; the weights are those of `drift_at`, which is linear in the phases.
     """
     shots = campaign.shots
-    mine = [
+    good = [
         k
         for k, (ranger, target) in enumerate(zip(shots.ranger, shots.target, strict=True))
         if ranger == shots.ranger[row] and target == REFERENCE and not phases.reason[k] and k not in wrong
     ]
-    if not mine:
+    if not good:
         raise InputError(f"shot {shots.shot[row]}: {shots.ranger[row]} has no usable shot on its internal cube")
-    rows = np.array(sorted(mine, key=lambda k: float(shots.mjd_utc[k])))
+    rows = np.array(sorted(good, key=lambda k: float(shots.mjd_utc[k])))
     seconds = np.array([_seconds(campaign, k) for k in rows])
     when = np.array([_seconds(campaign, row)])
     walk = walk_of(campaign)
@@ -287,7 +289,7 @@ def _head(
     reference_amplitude: float,
     index: float,
 ) -> float:
-    found = head_corrections(
+    corrections = head_corrections(
         campaign,
         ranger,
         head_columns(campaign, ranger),
@@ -297,4 +299,4 @@ def _head(
         reference_amplitude=np.array([reference_amplitude]),
         index=np.array([index]),
     )
-    return float(found.value[0])
+    return float(corrections.value[0])

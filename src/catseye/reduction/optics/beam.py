@@ -136,11 +136,11 @@ def range_effects(train: BeamTrain, back: tuple[BeamPlace, ...]) -> dict[str, fl
 
     Source: `coating.group_path`, `receiver.lens_group_range`, `detector.spot_range`.
     """
-    found: dict[str, float] = {}
+    effects: dict[str, float] = {}
     for element in (*train.outward, *train.inward):
         if element.kind == "mirror" and element.coating is not None:
             path = _reflected(train, element)[1]
-            found[f"coating of {_called(element)}"] = found.get(f"coating of {_called(element)}", 0.0) + 0.5 * path
+            effects[f"coating of {_called(element)}"] = effects.get(f"coating of {_called(element)}", 0.0) + 0.5 * path
     inward = [place for place in back if place.leg == "inward"]
     for element, place in zip((e for e in train.inward if e.kind != "space"), inward, strict=True):
         if element.kind == "thick_lens":
@@ -148,9 +148,9 @@ def range_effects(train: BeamTrain, back: tuple[BeamPlace, ...]) -> dict[str, fl
             light = float(np.sqrt(np.mean(place.radius**2)))
             bent = {"powers": -float(_matrices(train, element)[0][1, 0]), "phase": n_p, "group": n_g}
             edge = min(place.aperture, WIDE * light)
-            found[f"group lag of {_called(element)}"] = float(receiver.lens_group_range(edge, light, **bent))
-    found.update(_image_effects(train, back[-1]))
-    return found
+            effects[f"group lag of {_called(element)}"] = float(receiver.lens_group_range(edge, light, **bent))
+    effects.update(_image_effects(train, back[-1]))
+    return effects
 
 
 def _diode(train: BeamTrain) -> detector.Photodiode | None:
@@ -185,25 +185,25 @@ def _u_image(train: BeamTrain) -> float:
 
 def _into_laser(train: BeamTrain) -> dict[str, float]:
     """Isolation, what comes back into the laser, and the most that its fringes move a range."""
-    found: dict[str, float] = {}
+    quantities: dict[str, float] = {}
     share, as_it_left = 1.0, 1.0
     for element in train.outward:
         if element.kind == "isolator":
-            made = _isolator(element)
-            left = isolator.jones_out(made)[:, 0]
-            share, as_it_left = share * isolator.back_share(made), as_it_left * isolator.back_share(made, left)
-            found["isolation_db"], found["worst_isolation_db"] = _decibel(as_it_left), _decibel(share)
+            device = _isolator(element)
+            left = isolator.jones_out(device)[:, 0]
+            share, as_it_left = share * isolator.back_share(device), as_it_left * isolator.back_share(device, left)
+            quantities["isolation_db"], quantities["worst_isolation_db"] = _decibel(as_it_left), _decibel(share)
     if train.laser.back_reflection is None:
-        return found
+        return quantities
     share *= train.laser.back_reflection
     half = SPEED_OF_LIGHT / train.modulation_hz / (2.0 * TWO_PI)  # m for each radian of the modulation
     contrast = float(fringe_contrast(share))
-    found["share_into_laser"] = share
-    found["power_contrast"] = contrast
-    found["range_bound_by_interference"] = 0.5 * contrast * half
+    quantities["share_into_laser"] = share
+    quantities["power_contrast"] = contrast
+    quantities["range_bound_by_interference"] = 0.5 * contrast * half
     if train.laser.regulation_rad is not None:
-        found["range_bound_by_regulation"] = abs(train.laser.regulation_rad) * contrast * half
-    return found
+        quantities["range_bound_by_regulation"] = abs(train.laser.regulation_rad) * contrast * half
+    return quantities
 
 
 def _decibel(share: float) -> float:
@@ -297,7 +297,7 @@ def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, A
     q, way = _laser_beam(train), 0.0
     there = BeamElement(kind="space", length_mm=train.distance_m / MILLIMETRE)
     legs = {"outward": train.outward, "range": (there,), "back": (there,), "inward": train.inward}
-    found = {}
+    profile = {}
     for leg, elements in legs.items():
         ways, radii = [np.array([way])], [abcd.radius(q, _light(train))[None]]
         for element in elements:
@@ -306,8 +306,8 @@ def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, A
                 ways.append(np.array([way + step]))
                 radii.append(abcd.radius(abcd.onward(q, abcd.free_space(step)), _light(train))[None])
             q, way = abcd.onward(q, _matrices(train, element)), way + _length(element)
-        found[leg] = np.concatenate(ways), np.concatenate(radii)
-    return found
+        profile[leg] = np.concatenate(ways), np.concatenate(radii)
+    return profile
 
 
 def _diffracted(q: NDArray[np.complex128], light: Array, discs: list[float], systems: list[Array]) -> Array:
@@ -379,12 +379,13 @@ def _isolator(element: BeamElement) -> isolator.Isolator:
 def _reflected(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
     """Reflectance of a coated mirror, and the group path, m, that it adds, for the polarization that it meets."""
     angle = (element.incidence_deg or 0.0) * DEGREE
-    made = coating.named(element.coating or "", train.wavelength_um, angle)
+    mirror_coating = coating.named(element.coating or "", train.wavelength_um, angle)
     power, path = 0.0, 0.0
     for polarization, share in _polarization(train, element).items():
-        seen = share * float(coating.response(made, train.wavelength_um, angle, polarization=polarization).reflectance)
-        added = float(coating.group_path(made, train.wavelength_um, angle, polarization=polarization))
-        power, path = power + seen, path + seen * added
+        response = coating.response(mirror_coating, train.wavelength_um, angle, polarization=polarization)
+        reflected = share * float(response.reflectance)
+        added = float(coating.group_path(mirror_coating, train.wavelength_um, angle, polarization=polarization))
+        power, path = power + reflected, path + reflected * added
     return power, path / power
 
 

@@ -45,7 +45,7 @@ class WeakDirection:
 
 @dataclass(frozen=True, eq=False)
 class PointingFit:
-    """A fit of the series.
+    """A fit of the eight-term pointing series.
 
     series              terms, values and covariance, rad
     azimuth, elevation  (n,) rad, on the sky, of all observations
@@ -97,7 +97,7 @@ def fit_pointing(
     reject: bool = False,
     where: Sequence[str] | None = None,
 ) -> PointingFit:
-    """The series by least squares.
+    """The eight-term pointing series by least squares.
 
     azimuth, elevation   (n,) rad, on the sky
     observed             (n, 2) rad, azimuth times cos E and elevation: encoders less sky
@@ -119,32 +119,32 @@ def fit_pointing(
     scaled = covariance is None and u is None
     used = np.ones(n, dtype=bool)
     while True:
-        found = _solved(full, observed, q, used, terms, named)
-        factor = found.pvv / found.degrees_of_freedom if found.degrees_of_freedom else float("nan")
-        w = _standardised(found, used, factor if scaled else 1.0)
+        solution = _solved(full, observed, q, used, terms, named)
+        factor = solution.pvv / solution.degrees_of_freedom if solution.degrees_of_freedom else float("nan")
+        w = _standardised(solution, used, factor if scaled else 1.0)
         worst = int(np.argmax(np.nan_to_num(np.abs(w)).max(axis=1)))
-        if not reject or np.nan_to_num(np.abs(w[worst])).max() <= LIMIT or found.degrees_of_freedom <= 2:
+        if not reject or np.nan_to_num(np.abs(w[worst])).max() <= LIMIT or solution.degrees_of_freedom <= 2:
             break
         used[worst] = False
-    if scaled and not found.degrees_of_freedom:
+    if scaled and not solution.degrees_of_freedom:
         raise EstimationError(
             f"{int(used.sum())} observations just hold {len(terms)} terms and no uncertainty is claimed: nothing says "
             "how sure they are (expected more observations, or u)"
         )
-    spread = found.covariance * (factor if scaled else 1.0)
+    spread = solution.covariance * (factor if scaled else 1.0)
     unit = full[used].reshape(-1, len(chosen))
     return PointingFit(
-        series=PointingSeries(tuple(terms), found.estimate, spread),
+        series=PointingSeries(tuple(terms), solution.estimate, spread),
         azimuth=np.asarray(azimuth),
         elevation=np.asarray(elevation),
         observed=np.asarray(observed),
-        residual=np.asarray(observed) - full @ found.estimate,
+        residual=np.asarray(observed) - full @ solution.estimate,
         w=w,
         used=used,
         variance_factor=factor,
         scaled=scaled,
-        pvv=found.pvv,
-        degrees_of_freedom=found.degrees_of_freedom,
+        pvv=solution.pvv,
+        degrees_of_freedom=solution.degrees_of_freedom,
         condition=float(np.linalg.cond(unit / np.linalg.norm(unit, axis=0))),
         weak=_weak(tuple(terms), spread, unit),
     )
@@ -164,20 +164,20 @@ def _solved(
     return best_linear_estimate(flat, values, q[np.ix_(rows, rows)], parameters=list(terms), rows=called)
 
 
-def _standardised(found: LinearEstimate, used: np.ndarray, factor: float) -> np.ndarray:
+def _standardised(solution: LinearEstimate, used: np.ndarray, factor: float) -> np.ndarray:
     """(n, 2) w = (P v)_i / sqrt(P_ii), over the root of the variance factor; nan where left out or unchecked."""
-    weight = np.diag(found.weight)
+    weight = np.diag(solution.weight)
     good = weight > 1e-12 * max(float(weight.max(initial=0.0)), 1e-300)
     w = np.full((len(used), 2), np.nan)
     scale = np.sqrt(factor) if np.isfinite(factor) and factor > 0.0 else np.nan
-    own = found.weighted_residual / np.sqrt(np.where(good, weight, 1.0)) / scale
+    own = solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)) / scale
     w[used] = np.where(good, own, np.nan).reshape(-1, 2)
     return w
 
 
 def _weak(terms: tuple[str, ...], covariance: np.ndarray, unit: np.ndarray) -> tuple[WeakDirection, ...]:
     """The weakest combination within each family, the other terms being free."""
-    made = []
+    directions = []
     for family in FAMILIES:
         at = [terms.index(t) for t in family if t in terms]
         if len(at) > 1:
@@ -185,8 +185,8 @@ def _weak(terms: tuple[str, ...], covariance: np.ndarray, unit: np.ndarray) -> t
             v = vectors[:, -1] * (1.0 if vectors[np.argmax(np.abs(vectors[:, -1])), -1] > 0 else -1.0)
             u = float(np.sqrt(max(values[-1], 0.0)))
             sky = float(np.sqrt(np.mean(np.sum((unit[:, at] @ v).reshape(-1, 2) ** 2, axis=1))))
-            made.append(WeakDirection({terms[i]: float(part) for i, part in zip(at, v, strict=True)}, u, u * sky))
-    return tuple(made)
+            directions.append(WeakDirection({terms[i]: float(part) for i, part in zip(at, v, strict=True)}, u, u * sky))
+    return tuple(directions)
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,12 +151,12 @@ def pose_of_group(
     )
     kept = np.array([n in set(pose.names) for n in have])
     to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)
-    told = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
+    shown = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
     wanted = pivot if pivot is not None else default_pivot(group or "", frame, site)
-    told = told if wanted is None else told.about(wanted)
+    shown = shown if wanted is None else shown.about(wanted)
     against = "design" if earlier is None else earlier.campaign or earlier.file
     places = first[kept] if to_frame.to == to_frame.from_ else to_frame.points(first[kept])
-    return GroupPose(group or "points", told, against, places, missing, later)
+    return GroupPose(group or "points", shown, against, places, missing, later)
 
 
 def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFolder:

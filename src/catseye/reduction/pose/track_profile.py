@@ -132,27 +132,28 @@ def track_profile(
     if tilts is not None:
         q[2 * m :, 2 * m :] = np.diag(np.repeat(tilts.u**2, 2))
     parameters = [*coefficient_names(harmonics), *(("zero x", "zero y") if n else ())]
-    found = best_linear_estimate(
+    solution = best_linear_estimate(
         design, values.ravel(), q, parameters=parameters, rows=[f"{c} {a}" for c in called for a in "xy"]
     )
     size = 4 * harmonics + 2
-    series = TiltSeries(harmonics, coefficient_names(harmonics), found.estimate[:size], found.covariance[:size, :size])
+    values_of_series, spread = solution.estimate[:size], solution.covariance[:size, :size]
+    series = TiltSeries(harmonics, coefficient_names(harmonics), values_of_series, spread)
     from scipy import special
 
-    free = found.degrees_of_freedom
-    weight = np.diag(found.weight)
+    free = solution.degrees_of_freedom
+    weight = np.diag(solution.weight)
     good = weight > 1e-9 * float(weight.max(initial=0.0))
-    w = np.where(good, found.weighted_residual / np.sqrt(np.where(good, weight, 1.0)), np.nan)
+    w = np.where(good, solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)), np.nan)
     return TrackProfile(
         series=series,
-        zero=(found.estimate[size:], found.covariance[size:, size:]) if n else None,
+        zero=(solution.estimate[size:], solution.covariance[size:, size:]) if n else None,
         azimuth=every,
-        residual=(values.ravel() - design @ found.estimate).reshape(-1, 2),
+        residual=(values.ravel() - design @ solution.estimate).reshape(-1, 2),
         w=w.reshape(-1, 2),
         poses=m,
-        pvv=found.pvv,
+        pvv=solution.pvv,
         degrees_of_freedom=free,
-        p=float(special.chdtrc(free, found.pvv)) if free else float("nan"),
+        p=float(special.chdtrc(free, solution.pvv)) if free else float("nan"),
     )
 
 
@@ -178,15 +179,16 @@ def joined_tilt(
     return rotation + gain @ (np.asarray(tilt) - pick @ rotation), spread
 
 
-def pose_with_tilt(found: GroupPose, tilt: np.ndarray, u: float) -> GroupPose:
+def pose_with_tilt(group_pose: GroupPose, tilt: np.ndarray, u: float) -> GroupPose:
     """An alidade's pose in its own frame with an inclinometer's reading joined, see `joined_tilt`.
 
     The residuals of the points, their sum of squares and `gain` stay those of the ranges alone.
     """
-    motion = found.pose.motion
-    if found.pose.frame != "alidade":
-        raise FrameError(f"pose in the frame '{found.pose.frame}', expected 'alidade', in which the inclinometer turns")
+    pose = group_pose.pose
+    motion = pose.motion
+    if pose.frame != "alidade":
+        raise FrameError(f"pose in the frame '{pose.frame}', expected 'alidade', in which the inclinometer turns")
     six = np.concatenate([motion.translation, motion.rotation])
     six, covariance = joined_tilt(six, motion.covariance, tilt, u)
     joined = replace(motion, translation=six[:3], matrix=from_vector(six[3:]), covariance=covariance)
-    return replace(found, pose=replace(found.pose, motion=joined))
+    return replace(group_pose, pose=replace(pose, motion=joined))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from itertools import islice
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,10 +91,10 @@ def rotation_at(mjd: ArrayLike) -> Rotation:
     if not np.all(np.isfinite(days)):
         raise ValidityError("mjd holds a number that is not finite (expected UTC as Modified Julian Day)")
     table = _table()
-    known = (days >= table["mjd"][0]) & (days <= table["mjd"][-1])
-    ut1_minus_tai = np.interp(days, table["mjd"], table["ut1_minus_tai"])
-    leaps = table["steps"][np.searchsorted(table["starts"], days, side="right")]
-    code = np.where(known, np.where(days > table["last_measured"], 1, 0), 2).astype(np.int8)
+    known = (days >= table.mjd[0]) & (days <= table.mjd[-1])
+    ut1_minus_tai = np.interp(days, table.mjd, table.ut1_minus_tai)
+    leaps = table.steps[np.searchsorted(table.starts, days, side="right")]
+    code = np.where(known, np.where(days > table.last_measured, 1, 0), 2).astype(np.int8)
     return Rotation(np.where(known, ut1_minus_tai - leaps, 0.0), code)
 
 
@@ -176,9 +175,27 @@ def _many(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
     return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
 
 
+@dataclass(frozen=True, eq=False)
+class _RotationTable:
+    """The turn of the Earth by day.
+
+    mjd             (n,) UTC
+    ut1_minus_tai   (n,) s, free of steps
+    starts          (k,) mjd, where a step of UTC starts
+    steps           (k + 1,) s, UTC - TAI less that of the table's first day, before the first start and from each on
+    last_measured   mjd; later rows are predicted
+    """
+
+    mjd: NDArray[np.float64]
+    ut1_minus_tai: NDArray[np.float64]
+    starts: NDArray[np.float64]
+    steps: NDArray[np.float64]
+    last_measured: float
+
+
 @cache
-def _table() -> dict[str, Any]:
-    """UT1 - TAI by day, free of steps; the steps of UTC (UT1 - UTC less UT1 - TAI) and where they start."""
+def _table() -> _RotationTable:
+    """What astropy-iers-data has: the older table until the newer begins."""
     from astropy_iers_data import IERS_A_FILE, IERS_B_FILE
 
     newer_mjd, newer_ut1, flag = _newer(IERS_A_FILE)
@@ -193,13 +210,13 @@ def _table() -> dict[str, Any]:
     jumps = np.concatenate([[0.0], np.round(np.diff(ut1_minus_utc))])  # a leap second, seen from one day to the next
     steps = -np.cumsum(jumps)
     measured = newer_mjd[(flag == "B") | (flag == "I")]
-    return {
-        "mjd": mjd,
-        "ut1_minus_tai": ut1_minus_utc + steps,
-        "starts": mjd[jumps != 0.0],
-        "steps": np.concatenate([[0.0], steps[jumps != 0.0]]),
-        "last_measured": measured[-1],
-    }
+    return _RotationTable(
+        mjd=mjd,
+        ut1_minus_tai=ut1_minus_utc + steps,
+        starts=mjd[jumps != 0.0],
+        steps=np.concatenate([[0.0], steps[jumps != 0.0]]),
+        last_measured=measured[-1],
+    )
 
 
 def _newer(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.str_]]:

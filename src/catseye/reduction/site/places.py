@@ -1,5 +1,6 @@
 """What can be ranged to or from, at its approximate place in the ground frame."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from catseye.geometry.frames.frame import Transform
 from catseye.geometry.mirror.mount import gamma, scan_point
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.site.folder import SiteFolder
+from catseye.records.site.target import TargetRow
+from catseye.records.site.triplet import TripletRecord
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 
@@ -27,7 +30,7 @@ class RangedPoint:
     u_constant m, its standard uncertainty from that of the glass's dimensions, shared by all shots on it
     group      what its normal's error is shared with: its own name, or its triplet's; "" for none
     typed      its start is an approximate position that somebody typed
-    u_start    m, each coordinate of the start, as its record says; None where it says nothing: `Settings.u_position`
+    u_start    m, each coordinate of the start, as its record says; None: `ReductionSettings.u_position` counts
     """
 
     name: str
@@ -87,49 +90,57 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
         where = to_ground["reflector"].points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE)
         places[ranger.name] = RangedPoint(ranger.name, "ranger", where, u_start=_metres(ranger.u_position_mm))
     for target in campaign.targets.values():
-        frame = to_ground[target.frame]
-        where = frame.points(np.array(target.position_mm) * MILLIMETRE)
-        if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
-            places[target.name] = RangedPoint(
-                target.name,
-                "prism",
-                where,
-                unit(frame.directions(target.normal)),
-                target.height_mm * MILLIMETRE,
-                target.pc_mm * MILLIMETRE,
-                n * (target.u_height_mm or 0.0) * MILLIMETRE,
-                target.name,
-                u_start=_metres(target.u_position_mm),
-            )
-        else:
-            places[target.name] = RangedPoint(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
+        places[target.name] = _target(target, to_ground[target.frame], n)
     for triplet in campaign.triplets.values():
-        frame = to_ground[triplet.frame]
-        ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
-        normal, axis = unit(frame.directions(triplet.normal)), unit(frame.directions(triplet.axis))
-        middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
-        half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
-        for side, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
-            places[side.target] = RangedPoint(
-                side.target,
-                "prism",
-                where,
-                normal,
-                side.height_mm * MILLIMETRE,
-                side.pc_mm * MILLIMETRE,
-                n * side.u_height_mm * MILLIMETRE,
-                triplet.triplet,
-                u_start=_metres(triplet.u_position_mm),
-            )
-        places[triplet.ball.target] = RangedPoint(
-            triplet.ball.target,
-            "ball",
-            ball,
-            constant=triplet.ball.pc_b_mm * MILLIMETRE,
-            u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
+        for point in _triplet(triplet, to_ground[triplet.frame], n):
+            places[point.name] = point
+    return places
+
+
+def _target(target: TargetRow, frame: Transform, n: float) -> RangedPoint:
+    """A prism or a hollow cube by itself; n is the glass's group index over the air's."""
+    where = frame.points(np.array(target.position_mm) * MILLIMETRE)
+    if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
+        return RangedPoint(
+            target.name,
+            "prism",
+            where,
+            unit(frame.directions(target.normal)),
+            target.height_mm * MILLIMETRE,
+            target.pc_mm * MILLIMETRE,
+            n * (target.u_height_mm or 0.0) * MILLIMETRE,
+            target.name,
+            u_start=_metres(target.u_position_mm),
+        )
+    return RangedPoint(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
+
+
+def _triplet(triplet: TripletRecord, frame: Transform, n: float) -> Iterator[RangedPoint]:
+    """A triplet's left and right prism and its ball; n is the glass's group index over the air's."""
+    ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
+    normal, axis = unit(frame.directions(triplet.normal)), unit(frame.directions(triplet.axis))
+    middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
+    half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
+    for side, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
+        yield RangedPoint(
+            side.target,
+            "prism",
+            where,
+            normal,
+            side.height_mm * MILLIMETRE,
+            side.pc_mm * MILLIMETRE,
+            n * side.u_height_mm * MILLIMETRE,
+            triplet.triplet,
             u_start=_metres(triplet.u_position_mm),
         )
-    return places
+    yield RangedPoint(
+        triplet.ball.target,
+        "ball",
+        ball,
+        constant=triplet.ball.pc_b_mm * MILLIMETRE,
+        u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
+        u_start=_metres(triplet.u_position_mm),
+    )
 
 
 def _metres(value_mm: float | None) -> float | None:

@@ -91,8 +91,8 @@ def offset_of(mirror: MirrorGeometry) -> np.ndarray:
 
 def imperfections_of(mirror: MirrorGeometry) -> Imperfections | None:
     """What the record says of offsets, tilts and encoder errors; None where it knows of none."""
-    found = _imperfections(mirror)
-    return found if found.matter else None
+    imperfections = _imperfections(mirror)
+    return imperfections if imperfections.matter else None
 
 
 def _imperfections(mirror: MirrorGeometry) -> Imperfections:
@@ -113,7 +113,7 @@ def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: n
     Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
     """
     whole = _imperfections(mirror)
-    answer = np.zeros((len(to), 2))
+    variance = np.zeros((len(to), 2))
     for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
         if u == 0.0:
             continue
@@ -124,9 +124,9 @@ def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: n
             )
             apart = ahead - behind
             apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
-            answer += np.square(u * apart / (2.0 * step))
+            variance += np.square(u * apart / (2.0 * step))
     orders = np.array([whole.azimuth_waves.shape[1], whole.elevation_waves.shape[1]])
-    return answer + np.square(mirror.u_encoder_counts or 0.0) * orders
+    return variance + np.square(mirror.u_encoder_counts or 0.0) * orders
 
 
 def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -189,13 +189,13 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
     for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
         raise InputError(f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m)")
-    found = aim(station, to)
+    aimed = aim(station, to)
     low, high = mirror.az_low_limit, mirror.az_high_limit
-    direct = np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
+    direct = np.stack([aimed.azimuth_counts, aimed.elevation_counts], axis=-1)
     if imperfections is None:
         prime = np.stack(prime_counts(direct[:, 0], direct[:, 1], station.zeros[1]), axis=-1)
-        face = autocollimation_counts(found.phi, station.zeros[1])
-        back = back_retro_counts(found.phi, station.zeros[1])
+        face = autocollimation_counts(aimed.phi, station.zeros[1])
+        back = back_retro_counts(aimed.phi, station.zeros[1])
     else:
         prime = imperfect_counts(station, imperfections, to, prime=True)
         direct = imperfect_counts(station, imperfections, to)
@@ -203,8 +203,8 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
         face, back = both[:, 1], imperfect_back_counts(station, imperfections, both)
     for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
         raise InputError(
-            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {found.range[k]:.4g} m from the scan point of "
-            f"{mirror.zp} on {monument.monument}, {np.degrees(found.phi[k]):.4g} deg from its azimuth axis: no setting "
+            f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {aimed.range[k]:.4g} m from the scan point of "
+            f"{mirror.zp} on {monument.monument}, {np.degrees(aimed.phi[k]):.4g} deg from its azimuth axis: no setting "
             "of the mirror looks there"
         )
     lower = prime[:, 0] - COUNTS_PER_TURN
@@ -217,7 +217,7 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
     return Pointings(
         to=to,
-        aim=found,
+        aim=aimed,
         counts=direct,
         prime=prime,
         autocollimation=face,

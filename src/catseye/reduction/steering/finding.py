@@ -87,13 +87,13 @@ def find(
             spot, light = _centred(at, head, look, looked), at
             if spot.found:
                 break
-    seen = list(looked.values())
+    amplitudes = list(looked.values())
     status = spot.status
     if light is None:
-        status = _nothing(pattern, len(refused), seen, predicted, head, search_radius)
+        status = _nothing(pattern, len(refused), amplitudes, predicted, head, search_radius)
     elif not spot.found:
-        status = f"{status} (light of {np.nanmax(seen):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
-    return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(seen))
+        status = f"{status} (light of {np.nanmax(amplitudes):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
+    return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(amplitudes))
 
 
 def _centred(
@@ -130,7 +130,7 @@ def found_point(
     """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
 
     station       the ranger
-    spot          found
+    spot          that was found
     distance      m from the scan point, above 0; u_distance m
     of_station    (13, 13) covariance of the station's parameters; none if None
 
@@ -154,7 +154,7 @@ def found_point(
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """A target that was found: its name, the spot, and when."""
+    """What the search for one target came to: its name, the spot (which says whether it was found), and when."""
 
     target: str
     spot: Spot
@@ -166,12 +166,12 @@ def search_results(results: Sequence[SearchResult]) -> str:
 
     Those that were not found have no row: what has no counts adjusts nothing. Raises ValidityError where none was.
     """
-    found = [result for result in results if result.spot.found]
-    if not found:
+    hits = [result for result in results if result.spot.found]
+    if not hits:
         raise ValidityError(f"none of {len(results)} targets was found: there is no table of search results to write")
     lines = [",".join(COLUMNS)]
-    _refuse_commas(found)
-    for result in found:
+    _refuse_commas(hits)
+    for result in hits:
         spot, u = result.spot, result.spot.u_counts
         numbers = [*(f"{n:.3f}" for n in spot.counts), *(f"{v:.4f}" for v in u), f"{spot.amplitude:.4f}"]
         lines.append(",".join([result.target, *numbers, result.when.text()]))
@@ -187,14 +187,14 @@ def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, Ar
 
     Raises ValidityError where none was found, or where a target that was has no place.
     """
-    found = [result for result in results if result.spot.found]
-    missing = [result.target for result in found if result.target not in places]
-    if missing or not found:
+    hits = [result for result in results if result.spot.found]
+    missing = [result.target for result in hits if result.target not in places]
+    if missing or not hits:
         what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
         raise ValidityError(f"{what}: there is nothing to adjust by")
-    _refuse_commas(found)
+    _refuse_commas(hits)
     lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,u_azimuth_counts,u_elevation_counts,pointing,mjd_utc"]
-    for result in found:
+    for result in hits:
         (na, ne), u = result.spot.counts, result.spot.u_counts
         where = [f"{x:.5f}" for x in np.asarray(places[result.target], dtype=float)]
         pointing = "prime" if ne < ne0 else "direct"
@@ -210,15 +210,15 @@ def _refuse_commas(results: Sequence[SearchResult]) -> None:
 
 
 def _nothing(
-    pattern: Pattern, forbidden: int, seen: list[float], predicted: ArrayLike, head: SearchHead, radius: float
+    pattern: Pattern, forbidden: int, amplitudes: list[float], predicted: ArrayLike, head: SearchHead, radius: float
 ) -> str:
     """The status of a search that saw no light."""
     na, ne = np.asarray(predicted, dtype=float)
-    readings = [value for value in seen if np.isfinite(value)]
+    readings = [value for value in amplitudes if np.isfinite(value)]
     gaps = {
         "beyond the stops": pattern.left_out,
         "forbidden": forbidden,
-        "without a reading": len(seen) - len(readings),
+        "without a reading": len(amplitudes) - len(readings),
     }
     left = ", ".join(f"{number} {what}" for what, number in gaps.items() if number)
     narrow = "; the spot is narrower than whole counts surely meet" if reach(head.radius, 0.5) < LEAST_REACH else ""

@@ -222,14 +222,14 @@ class Guard:
         self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew
     ) -> tuple[float, NDArray[np.float64], int, bool] | None:
         """Time, s after mjd, counts, zone of the first entry of moves in a row, and whether it is their start."""
-        found = self.entries(mjd + before / SECONDS_PER_DAY, moves)
-        bad = np.flatnonzero(found.status)
+        entries = self.entries(mjd + before / SECONDS_PER_DAY, moves)
+        bad = np.flatnonzero(entries.status)
         if len(bad) == 0:
             return None
         first = int(bad[0])
-        inside = first == 0 and found.status[0] == EntryStatus.STARTS_INSIDE
-        time = found.time[first]
-        return float(before[first] + time), moves[first].position(time), int(found.zone[first]), inside
+        inside = first == 0 and entries.status[0] == EntryStatus.STARTS_INSIDE
+        time = entries.time[first]
+        return float(before[first] + time), moves[first].position(time), int(entries.zone[first]), inside
 
     def _free_start(self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew) -> float | None:
         """The first start from which the whole way keeps out of the Sun; None if none is within a day, or a box is hit.
@@ -298,14 +298,14 @@ class Guard:
         """The Sun's cone for paths that begin at mjd (...) and take a total (...) s; not counting while it is set."""
         if self.place is None:
             return ConeZone(np.array([0.0, 0.0, 1.0]), np.array(-np.inf))
-        seen = sun_at(np.stack([mjd, mjd + total / SECONDS_PER_DAY]), self.place).direction
-        highest = np.max(np.arcsin(np.clip(seen[..., 2], -1.0, 1.0)), axis=0) + 0.5 * SUN_RATE * total
+        sun = sun_at(np.stack([mjd, mjd + total / SECONDS_PER_DAY]), self.place).direction
+        highest = np.max(np.arcsin(np.clip(sun[..., 2], -1.0, 1.0)), axis=0) + 0.5 * SUN_RATE * total
         bend = (SUN_RATE * total) ** 2 / 8.0
         if self.place.pressure_hpa is not None:
-            lowest = np.min(np.arcsin(np.clip(seen[..., 2], -1.0, 1.0)), axis=0) - 0.5 * SUN_RATE * total
+            lowest = np.min(np.arcsin(np.clip(sun[..., 2], -1.0, 1.0)), axis=0) - 0.5 * SUN_RATE * total
             bend = bend * np.where(lowest > HIGH, BENDING_HIGH, BENDING)
         half = np.where(highest >= self.horizon, np.minimum(self.half_angle + bend, WIDEST), -np.inf)
-        return ConeZone(seen[0], half, seen[1])
+        return ConeZone(sun[0], half, sun[1])
 
     def _change(self, mjd: float, n: NDArray[np.float64], *, comes: bool = False) -> float | None:
         """The first time from mjd on when the Sun's cone has left a standing beam, or come to it; None within a day.

@@ -111,9 +111,9 @@ def route(
             return soonest
     ways = _Grid.between(guard, mjd, slack, step, here, goals).ways(here, goals)
     for way, last in ways:
-        found = _shortened(guard, mjd, way)
-        if found is not None and (soonest is None or found[1] < soonest.duration):
-            soonest = Route(RouteStatus.AROUND, found[0], found[1], bool(prime[last]))
+        shortened = _shortened(guard, mjd, way)
+        if shortened is not None and (soonest is None or shortened[1] < soonest.duration):
+            soonest = Route(RouteStatus.AROUND, shortened[0], shortened[1], bool(prime[last]))
     return soonest or Route(RouteStatus.BLOCKED, none, np.nan)
 
 
@@ -180,7 +180,7 @@ class _Grid:
         weights = np.r_[np.tile(self._time(self.nodes[a], self.nodes[b]), 2), self._time(here, self.nodes[first])]
         graph = csr_array((np.maximum(weights, 1e-9), (rows, columns)), shape=(n + 1, n + 1))
         arrival, before = dijkstra(graph, indices=n, return_predecessors=True)
-        found = []
+        ways = []
         for last, goal in enumerate(goals):
             at = self._near(goal, self.mjd + arrival[:n] / SECONDS_PER_DAY, outward=False)
             if len(at) == 0:
@@ -190,8 +190,8 @@ class _Grid:
             while node != n:
                 way.append(self.nodes[node])
                 node = int(before[node])
-            found.append((np.array([here, *way[::-1]]), last))
-        return found
+            ways.append((np.array([here, *way[::-1]]), last))
+        return ways
 
     def _edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Pairs of neighbours between which a slew is free."""
@@ -234,9 +234,9 @@ def _shortened(guard: Guard, mjd: float, way: NDArray[np.float64]) -> tuple[NDAr
     """The soonest way through some of the nodes (n, 2): first a few of them, more where those do not join."""
     for most in (*THINNED, len(way)):
         kept = np.unique(np.linspace(0, len(way) - 1, min(most, len(way))).astype(int))
-        found = _soonest(guard, mjd, way[kept])
-        if found is not None:
-            return found
+        soonest = _soonest(guard, mjd, way[kept])
+        if soonest is not None:
+            return soonest
     return None
 
 

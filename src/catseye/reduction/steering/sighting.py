@@ -50,9 +50,9 @@ def place_of_monument(
     Raises InputError where neither says it, and for one that is no place.
     """
     given = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-    found = {key: getattr(monument, key) if value is None else value for key, value in given.items()}
+    angles = {key: getattr(monument, key) if value is None else value for key, value in given.items()}
     for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
-        value = found[key]
+        value = angles[key]
         if value is not None and not limits[0] <= value <= limits[1]:
             raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
@@ -61,7 +61,7 @@ def place_of_monument(
                 f"there, or --{key.replace('_', '-')})"
             )
     height = monument.elevation_m or 0.0
-    latitude, longitude = float(found["latitude_deg"]) * DEGREE, float(found["longitude_deg"]) * DEGREE
+    latitude, longitude = float(angles["latitude_deg"]) * DEGREE, float(angles["longitude_deg"]) * DEGREE
     return FramePlace(latitude, longitude, height, standard_pressure_hpa(height))
 
 
@@ -87,15 +87,15 @@ def sightings(
     boxed = replace(free, place=None) if keep_out.box else None
     imperfections = imperfections_of(mirror)
     sun = None if mjd is None or place is None else sun_at(mjd, place)
-    answer = []
+    sighted = []
     for n in counts:
-        seen = Sighting(keep_out=None if boxed is None else boxed.pointing(mjd or 0.0, n))
+        sighting = Sighting(keep_out=None if boxed is None else boxed.pointing(mjd or 0.0, n))
         if sun is not None and under_sun is not None and mjd is not None:
             altitude, azimuth = altitude_azimuth(sun.direction)
             beam = ray(station, n) if imperfections is None else imperfect_ray(station, imperfections, n)
             across = np.linalg.norm(np.cross(beam.direction, sun.direction))
-            seen = replace(
-                seen,
+            sighting = replace(
+                sighting,
                 mjd=mjd,
                 sun=under_sun.pointing(mjd, n),
                 separation=float(np.arctan2(across, beam.direction @ sun.direction)),
@@ -103,8 +103,8 @@ def sightings(
                 azimuth=float(azimuth),
                 earth_rotation=str(sun.status),
             )
-        answer.append(seen)
-    return answer
+        sighted.append(sighting)
+    return sighted
 
 
 def seen_from(

@@ -228,7 +228,7 @@ class _Sheet:
             def active(x: Array) -> Array:
                 return np.where(self.clipped & (self.residual(x) == 0.0), 0.0, 1.0)
 
-            answer = least_squares(
+            solution = least_squares(
                 lambda x, s=sigma: np.append(self.residual(x) / s, x[5] / FLAT_PRIOR),
                 np.clip(p, -BOUNDS, BOUNDS),
                 bounds=(-BOUNDS, BOUNDS),
@@ -238,7 +238,7 @@ class _Sheet:
                 loss="huber",
                 f_scale=FEW_SIGMAS,
             )
-            p = answer.x
+            p = solution.x
         on = active(p) > 0.0
         sigma = self.sigma(p)[on]
         v = self.residual(p)[on] / sigma

@@ -72,7 +72,7 @@ ACCEPTANCE: Mapping[str, Acceptance] = {
 
 
 class Sight(IntEnum):
-    """What becomes of a pair of ranger and target."""
+    """Whether a ranger sees a target, or the first reason why not."""
 
     SEEN = 0
     TOO_NEAR = 1

@@ -62,7 +62,7 @@ class RestPoints:
 
 @dataclass(frozen=True, eq=False)
 class SubreflectorPosition:
-    """What the subreflector's drives were told: see geometry.subreflector.
+    """Commanded position of the subreflector's drives: see geometry.subreflector.
 
     shift    (..., 3) m
     angles   (..., 3) rad, about x, then y, then z
@@ -110,7 +110,7 @@ class Antenna:
     def nominal(
         self, frame: str, posture: TelescopePosture, subreflector: SubreflectorPosition | None = None
     ) -> Transforms:
-        """The frame's parent from the frame at rest: first order, and what the subreflector was told.
+        """The frame's parent from the frame at rest: first order, and the subreflector as commanded.
 
         frame, posture   which, and how the telescope stands
         subreflector     its position, for the frame of that name
@@ -135,8 +135,8 @@ class Antenna:
 
     def six(self, name: str, posture: TelescopePosture, added: Added | None = None) -> np.ndarray:
         """Shift and turn (..., 6), m and rad, of a frame or group, with what is added; zero without a motion."""
-        found = self.motions[name].six(posture) if name in self.motions else np.zeros((*posture.shape, 6))
-        return found + np.asarray(added[name], dtype=float) if added and name in added else found
+        six = self.motions[name].six(posture) if name in self.motions else np.zeros((*posture.shape, 6))
+        return six + np.asarray(added[name], dtype=float) if added and name in added else six
 
     def refuse_strangers(self, added: Added | None) -> None:
         """Raises InputError where something is added to what does not move as a whole: it would be lost in silence."""
@@ -174,13 +174,13 @@ class Antenna:
         self.refuse_strangers(added)
         if deformed:
             self.validity.refuse_outside(posture)
-        found = Transforms(ROOT, ROOT, np.eye(3), np.zeros(3))
+        transforms = Transforms(ROOT, ROOT, np.eye(3), np.zeros(3))
         for name in self.chain(frame):
-            found = found @ self.nominal(name, posture, subreflector)
+            transforms = transforms @ self.nominal(name, posture, subreflector)
             if deformed:
                 rotation, translation = carried(self.six(name, posture, added), self.pivot(name))
-                found = found @ Transforms(name, name, rotation, translation)
-        return found
+                transforms = transforms @ Transforms(name, name, rotation, translation)
+        return transforms
 
     def points(
         self,
@@ -196,25 +196,25 @@ class Antenna:
 
         Raises as `ground_from`.
         """
-        found = self.groups[_known(group, self.groups)]
-        transform = self.ground_from(found.frame, posture, added=added, subreflector=subreflector)
+        rest = self.groups[_known(group, self.groups)]
+        transform = self.ground_from(rest.frame, posture, added=added, subreflector=subreflector)
         return transform[..., None].points(self.in_frame(group, posture, added=added))
 
     def in_frame(self, group: str, posture: TelescopePosture, *, added: Added | None = None) -> np.ndarray:
         """Points of a group in the axes of their frame (..., n, 3), m, as the group's own motion leaves them."""
-        found = self.groups[_known(group, self.groups)]
+        rest = self.groups[_known(group, self.groups)]
         record = next(g for g in self.record.group if g.name == group)
         if record.shifts is not None:
             rows = _basis(record.shifts, self.record.reference_temperature_c).rows(posture)
-            return found.position + np.einsum("...k,ndk->...nd", rows, _shifts(record))
+            return rest.position + np.einsum("...k,ndk->...nd", rows, _shifts(record))
         rotation, translation = carried(self.six(group, posture, added), self.pivot(group))
-        return Transforms(group, group, rotation, translation)[..., None].points(found.position)
+        return Transforms(group, group, rotation, translation)[..., None].points(rest.position)
 
     def u_points(self, group: str) -> np.ndarray:
         """(n,) m, standard uncertainty of each coordinate in the frame, of the sheet and of tables of points."""
-        found = self.groups[_known(group, self.groups)]
+        rest = self.groups[_known(group, self.groups)]
         record = next(g for g in self.record.group if g.name == group)
-        return np.hypot(found.u, (record.u_shift_mm or 0.0) * MILLIMETRE)
+        return np.hypot(rest.u, (record.u_shift_mm or 0.0) * MILLIMETRE)
 
     def derivatives(
         self,
@@ -231,15 +231,15 @@ class Antenna:
         points   (..., 3), m, in the frame, whose batch axes broadcast against the posture's
         """
         x = np.asarray(points, dtype=float)
-        found: dict[str, np.ndarray] = {}
+        by_frame: dict[str, np.ndarray] = {}
         for name in self.chain(frame)[::-1]:
             six = self.six(name, posture, added)
             slopes = carried_jacobian(six, self.pivot(name), x)
             rotation, translation = carried(six, self.pivot(name))
             x = Transforms(name, name, rotation, translation).points(x)
             x = self.nominal(name, posture, subreflector).points(x)
-            found[name] = self._outward(name, posture, added, subreflector) @ slopes
-        return found
+            by_frame[name] = self._outward(name, posture, added, subreflector) @ slopes
+        return by_frame
 
     def _outward(
         self, frame: str, posture: TelescopePosture, added: Added | None, subreflector: SubreflectorPosition | None
@@ -262,12 +262,12 @@ class Antenna:
 
         group, posture, added, subreflector   as for `points`; one posture, or (..., 1) of them to leave room for n
         """
-        found = self.groups[_known(group, self.groups)]
+        rest = self.groups[_known(group, self.groups)]
         at = self.in_frame(group, posture, added=added)
-        slopes = self.derivatives(found.frame, at, posture, added=added, subreflector=subreflector)
+        slopes = self.derivatives(rest.frame, at, posture, added=added, subreflector=subreflector)
         if group in self.motions:
-            out = self.ground_from(found.frame, posture, added=added, subreflector=subreflector).rotation
-            slopes[group] = out @ carried_jacobian(self.six(group, posture, added), self.pivot(group), found.position)
+            out = self.ground_from(rest.frame, posture, added=added, subreflector=subreflector).rotation
+            slopes[group] = out @ carried_jacobian(self.six(group, posture, added), self.pivot(group), rest.position)
         return slopes
 
     def axis_derivatives(self, points: ArrayLike, posture: TelescopePosture) -> np.ndarray:
@@ -287,11 +287,11 @@ class Antenna:
 
     def turns(self, frame: str, posture: TelescopePosture, added: Added | None = None) -> dict[str, np.ndarray]:
         """Derivatives (..., 3, 6) of the frame's small turn about ground axes by shifts and turns on the way to it."""
-        found: dict[str, np.ndarray] = {}
+        by_frame: dict[str, np.ndarray] = {}
         for name in self.chain(frame)[::-1]:
             turn = self._outward(name, posture, added, None) @ left_jacobian(self.six(name, posture, added)[..., 3:])
-            found[name] = np.concatenate([np.zeros_like(turn), turn], axis=-1)
-        return found
+            by_frame[name] = np.concatenate([np.zeros_like(turn), turn], axis=-1)
+        return by_frame
 
 
 def antenna_of(record: StructuralModel) -> Antenna:

@@ -77,17 +77,17 @@ def left_out(
             progress("leaving out", k, folds)
         out = np.flatnonzero(fold == k)
         try:
-            found = fit_structure(series.part(np.flatnonzero(fold != k)), what)
+            fit = fit_structure(series.part(np.flatnonzero(fold != k)), what)
         except EstimationError as problem:
             first, last = (series.labels[i] if series.labels else str(i) for i in (out[0], out[-1]))
             raise EstimationError(f"without epochs {first} to {last}: {problem}") from problem
-        at = np.array([series.names.index(name) for name in found.series.names])
-        _foretell(found, series, out, at, residual, covariance, extrapolated)
+        at = np.array([series.names.index(name) for name in fit.series.names])
+        _foretell(fit, series, out, at, residual, covariance, extrapolated)
     return LeaveOut(residual, covariance, fold, extrapolated)
 
 
 def _foretell(
-    found: StructureFit,
+    fit: StructureFit,
     series: GroupSeries,
     out: NDArray[np.intp],
     at: NDArray[np.intp],
@@ -97,12 +97,12 @@ def _foretell(
 ) -> None:
     """Residuals and claimed covariances of the epochs left out, into their places."""
     e = np.asarray(series.posture.elevation)[out]
-    warm = np.asarray(series.posture.temperature_c)[out] if found.model.temperature else None
-    told = found.predict(e, temperature_c=warm, way=series.way[out])
-    residual[np.ix_(out, at)] = series.places[np.ix_(out, at)] - told.place
-    covariance[np.ix_(out, at)] = told.covariance + of_points(series)[np.ix_(out, at)]
+    warm = np.asarray(series.posture.temperature_c)[out] if fit.model.temperature else None
+    prediction = fit.predict(e, temperature_c=warm, way=series.way[out])
+    residual[np.ix_(out, at)] = series.places[np.ix_(out, at)] - prediction.place
+    covariance[np.ix_(out, at)] = prediction.covariance + of_points(series)[np.ix_(out, at)]
     for i, epoch in enumerate(out):
-        single = found.predict(e[i : i + 1], temperature_c=None if warm is None else warm[i : i + 1])
+        single = fit.predict(e[i : i + 1], temperature_c=None if warm is None else warm[i : i + 1])
         beyond[epoch] = bool(single.outside)
 
 
@@ -116,7 +116,7 @@ def of_points(series: GroupSeries, scatter: EpochScatter | None = None) -> Array
         blocks = spread.full.reshape(-1, n, 3, n, 3)[:, np.arange(n), :, np.arange(n)]  # (n, T, 3, 3)
         return np.broadcast_to(np.swapaxes(blocks, 0, 1), shape)
     assert spread.points is not None  # a spread has one of both
-    found = np.broadcast_to(spread.points, shape)
+    covariance = np.broadcast_to(spread.points, shape)
     if spread.shared is not None:
-        found = found + np.einsum("tniq,tnlq->tnil", spread.shared, spread.shared)
-    return found
+        covariance = covariance + np.einsum("tniq,tnlq->tnil", spread.shared, spread.shared)
+    return covariance

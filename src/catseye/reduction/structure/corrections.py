@@ -9,7 +9,7 @@ Measured coordinates come with their full covariance, as `coordinates.json` has 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -91,8 +91,21 @@ class Corrections:
     degrees_of_freedom: int
 
 
+class CoordinatesDocument(TypedDict):
+    """What of a `coordinates.json` a comparison with the structural model needs.
+
+    points             name: x, y, z (m) among what else is said of each
+    covariance_order   "ZEG10001 x" and so on, of each row
+    covariance         m^2
+    """
+
+    points: Mapping[str, Mapping[str, object]]
+    covariance_order: Sequence[str]
+    covariance: Sequence[Sequence[float]]
+
+
 def measured_of(
-    document: Mapping[str, Any],
+    document: CoordinatesDocument,
     antenna: Antenna,
     posture: TelescopePosture,
     *,
@@ -253,22 +266,21 @@ def predicted_points(
     predicted = np.zeros((n, 3))
     by_frame: dict[str, np.ndarray] = {}
     owners = [group_of(antenna, name) for name in measured.names]
-    told = measured.subreflector
+    commanded = measured.subreflector
     for group in dict.fromkeys(owners):
-        mine = [i for i, owner in enumerate(owners) if owner == group]
+        targets = [i for i, owner in enumerate(owners) if owner == group]
         points = antenna.groups[group]
-        rows = [points.names.index(measured.names[i]) for i in mine]
+        rows = [points.names.index(measured.names[i]) for i in targets]
         at = antenna.in_frame(group, measured.posture, added=added)[rows]
         if places is not None:
-            at = at + np.array([places[measured.names[i]] for i in mine])
-        predicted[mine] = ground_from_group(antenna, measured, group, added).points(at)
-        found = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=told)
+            at = at + np.array([places[measured.names[i]] for i in targets])
+        predicted[targets] = ground_from_group(antenna, measured, group, added).points(at)
+        slopes = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=commanded)
         if group in antenna.motions:
-            found[group] = antenna.group_derivatives(group, measured.posture, added=added, subreflector=told)[group][
-                rows
-            ]
-        for frame, slope in found.items():
-            by_frame.setdefault(frame, np.zeros((n, 3, 6)))[mine] = slope
+            by_name = antenna.group_derivatives(group, measured.posture, added=added, subreflector=commanded)
+            slopes[group] = by_name[group][rows]
+        for frame, slope in slopes.items():
+            by_frame.setdefault(frame, np.zeros((n, 3, 6)))[targets] = slope
     return predicted, {frame: slope.reshape(3 * n, 6) for frame, slope in by_frame.items()}
 
 

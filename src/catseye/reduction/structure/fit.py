@@ -9,13 +9,13 @@ in each posture anew (u of a motion), which is noise there, correlated between t
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from catseye.errors import EstimationError, InputError
 from catseye.geometry.antenna.deformation import COMPONENTS
-from catseye.records.site.structural_model import KEYS, MotionRecord, StructuralModel
+from catseye.records.site.structural_model import KEYS, FrameRecord, GroupRecord, MotionRecord, StructuralModel
 from catseye.reduction.structure.antenna import UNITS, Antenna
 from catseye.reduction.structure.corrections import (
     ITERATIONS,
@@ -26,6 +26,8 @@ from catseye.reduction.structure.corrections import (
     predicted_points,
     u_sheet,
 )
+
+Owner = TypeVar("Owner", FrameRecord, GroupRecord)
 
 FLOATING = 1e-12  # of the normal matrix scaled to ones: an eigenvalue below it is a direction that nothing holds
 
@@ -142,13 +144,13 @@ def updated_model(
     named = sorted({name for name, _ in fit.free})
     changed = {name: _motion_record(_owner(record, name), antenna, fit, name) for name in named}
 
-    def entries(kind: str) -> list[Any]:
-        return [
-            entry.model_copy(update={"motion": changed[entry.name]}) if entry.name in changed else entry
-            for entry in getattr(record, kind)
-        ]
+    def moved(owners: Sequence[Owner]) -> tuple[Owner, ...]:
+        return tuple(
+            owner.model_copy(update={"motion": changed[owner.name]}) if owner.name in changed else owner
+            for owner in owners
+        )
 
-    values = {"frame": tuple(entries("frame")), "group": tuple(entries("group"))}
+    values = {"frame": moved(record.frame), "group": moved(record.group)}
     who = {"by": by, "measured_on": measured_on, "report": report, "valid_until": None}
     copy = record.model_copy(update={**values, **who})
     return StructuralModel.model_validate(copy.model_dump())
@@ -158,7 +160,7 @@ def _motion_record(motion: MotionRecord, antenna: Antenna, fit: ModelFit, name: 
     """A motion with new values and covariance, in the units of the file."""
     k = len(antenna.motions[name].basis)
     values = fit.coefficients[name] / UNITS[:, None]
-    shaped: dict[str, Any] = {}
+    shaped: dict[str, tuple[float, ...] | tuple[tuple[float, ...], ...]] = {}
     for key, row in zip(KEYS, values, strict=True):
         cells = tuple(float(v) for v in row)
         width = len(motion.temperature_c) if motion.temperature_c is not None else 0
@@ -271,10 +273,10 @@ def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[
         for component in components:
             if component not in COMPONENTS:
                 raise InputError(f"{name}: {component!r} is no component (expected {', '.join(COMPONENTS)})")
-    found = tuple((name, c) for name, components in free.items() for c in COMPONENTS if c in components)
-    if not found:
+    layout = tuple((name, c) for name, components in free.items() for c in COMPONENTS if c in components)
+    if not layout:
         raise InputError("no coefficient is free: name a frame and its components")
-    return found
+    return layout
 
 
 def _indices(antenna: Antenna, layout: tuple[tuple[str, str], ...], name: str) -> np.ndarray:
@@ -309,15 +311,15 @@ def _priors(antenna: Antenna, layout: tuple[tuple[str, str], ...], size: int) ->
 
 def _spread_out(antenna: Antenna, layout: tuple[tuple[str, str], ...], theta: np.ndarray) -> dict[str, np.ndarray]:
     """All coefficients (6, k) of the frames that have free ones."""
-    found: dict[str, np.ndarray] = {}
+    coefficients: dict[str, np.ndarray] = {}
     first = 0
     for name in dict.fromkeys(name for name, _ in layout):
         at = _indices(antenna, layout, name)
         values = np.array(antenna.motions[name].coefficients)
         values.ravel()[at] = theta[first : first + len(at)]
-        found[name] = values
+        coefficients[name] = values
         first += len(at)
-    return found
+    return coefficients
 
 
 def _labels(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> list[str]:

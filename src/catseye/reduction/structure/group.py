@@ -81,11 +81,11 @@ def group_series(
     """
     if frame not in FRAMES:
         raise InputError(f"frame {frame!r} (expected {', '.join(FRAMES)})")
-    found = sorted({name for epoch in epochs for name in epoch.names})
-    names = tuple(name for name in found if any(fnmatchcase(name, pattern) for pattern in points))
+    every_name = sorted({name for epoch in epochs for name in epoch.names})
+    names = tuple(name for name in every_name if any(fnmatchcase(name, pattern) for pattern in points))
     for pattern in points:
-        if not any(fnmatchcase(name, pattern) for name in found):
-            some = ", ".join(found[:8]) + (", ..." if len(found) > 8 else "")
+        if not any(fnmatchcase(name, pattern) for name in every_name):
+            some = ", ".join(every_name[:8]) + (", ..." if len(every_name) > 8 else "")
             raise InputError(f"no epoch has a point {pattern!r} (they have {some})")
     kept = [epoch for epoch in epochs if set(epoch.names) & set(names)]
     labels = [epoch.label for epoch in kept]
@@ -122,9 +122,9 @@ def group_series(
     )
     middle = np.nanmean(places, axis=(0, 1)) if pivot is None else np.asarray(pivot, dtype=float)
     mjd = np.array([epoch.mjd for epoch in kept])
-    told = tuple(epoch.label for epoch in kept)
+    sorted_labels = tuple(epoch.label for epoch in kept)
     spread = Spread(full=full) if correlated else Spread(points=alone)
-    return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, told)
+    return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, sorted_labels)
 
 
 def carrier_of(frame: str, azimuth: float, elevation: float, nominal: Nominal) -> Transforms:
@@ -155,9 +155,9 @@ def ways(elevation: Array) -> Array:
     >>> ways(np.radians([10.0, 20.0, 20.01, 15.0])).tolist()
     [0.0, 1.0, 1.0, -1.0]
     """
-    found, last = np.zeros(len(elevation)), 0.0
+    way, last = np.zeros(len(elevation)), 0.0
     for t in range(1, len(elevation)):
         step = elevation[t] - elevation[t - 1]
         last = float(np.sign(step)) if abs(step) > MOVED else last
-        found[t] = last
-    return found
+        way[t] = last
+    return way

@@ -106,12 +106,12 @@ class MovingRanger:
         """
         by_point, _ = counts_jacobian(self.station, points)
         arm = np.asarray(points, dtype=float) - self.station.scan_point
-        seen = np.concatenate([np.broadcast_to(-np.eye(3), (*arm.shape, 3)), skew(arm)], axis=-1)
-        slopes = by_point @ seen
-        found = slopes @ self.covariance @ np.swapaxes(slopes, -1, -2)
+        by_pose = np.concatenate([np.broadcast_to(-np.eye(3), (*arm.shape, 3)), skew(arm)], axis=-1)
+        slopes = by_point @ by_pose
+        covariance = slopes @ self.covariance @ np.swapaxes(slopes, -1, -2)
         if of_points is not None:
-            found = found + by_point @ np.asarray(of_points, dtype=float) @ np.swapaxes(by_point, -1, -2)
-        return found
+            covariance = covariance + by_point @ np.asarray(of_points, dtype=float) @ np.swapaxes(by_point, -1, -2)
+        return covariance
 
 
 def tracked(
@@ -282,11 +282,11 @@ def projected(
 
 def _added(known: tuple[FrameCorrections, ...]) -> dict[str, np.ndarray]:
     """The sum of all that is known, by frame."""
-    found: dict[str, np.ndarray] = {}
+    total: dict[str, np.ndarray] = {}
     for one in known:
         for name, six in one.six.items():
-            found[name] = found[name] + np.asarray(six) if name in found else np.asarray(six, dtype=float)
-    return found
+            total[name] = total[name] + np.asarray(six) if name in total else np.asarray(six, dtype=float)
+    return total
 
 
 def _propagated(

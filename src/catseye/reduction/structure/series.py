@@ -31,7 +31,7 @@ UP = "up"
 
 @dataclass(frozen=True)
 class SeriesModel:
-    """Which functions, and who has them.
+    """Which functions of posture a flexible model has, and whether points have them alone or as one body.
 
     harmonics     of elevation, 1 or 2
     temperature   whether there is a coefficient of temperature
@@ -69,11 +69,11 @@ class SeriesModel:
         reference_c   degrees C at which t is 0
         """
         named = tuple(name for name in self.functions if name != UP)
-        found = PostureTerms(named, reference_c).rows(posture)
+        values = PostureTerms(named, reference_c).rows(posture)
         if not self.hysteresis:
-            return found
-        ways = np.broadcast_to(np.asarray(way, dtype=float), found.shape[:-1])
-        return np.concatenate([found, ways[..., None]], axis=-1)
+            return values
+        ways = np.broadcast_to(np.asarray(way, dtype=float), values.shape[:-1])
+        return np.concatenate([values, ways[..., None]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +120,12 @@ class GroupSeries:
             return kept[:, at] if kept.shape[1] > 1 else kept
 
         spread = Spread(cut(self.spread.full, 2), cut(self.spread.points, 1), cut(self.spread.shared, 1))
-        told = (np.asarray(v, dtype=float)[epochs] for v in vars(self.posture).values())
+        posture = (np.asarray(v, dtype=float)[epochs] for v in vars(self.posture).values())
         return replace(
             self,
             names=tuple(self.names[i] for i in at),
             mjd=self.mjd[epochs],
-            posture=TelescopePosture(*told),
+            posture=TelescopePosture(*posture),
             way=self.way[epochs],
             places=self.places[np.ix_(epochs, at)],
             spread=spread,
@@ -180,7 +180,7 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """A group's flexible model.
+    """A flexible model fitted to a group's epochs.
 
     series, model   what was fitted
     rest            (n, 3) m, the middle of each point's places, from which displacements count
@@ -239,20 +239,20 @@ class StructureFit:
 
     def outside(self, posture: TelescopePosture, way: ArrayLike = 0.0) -> tuple[str, ...]:
         """What of a posture lies outside the epochs of the fit, in words."""
-        found = []
+        notes = []
         asked: list[tuple[str, ArrayLike, ArrayLike, float, str]] = [
             ("elevation", posture.elevation, self.series.posture.elevation, DEGREE, "deg")
         ]
         if self.model.temperature:
             asked.append(("temperature", posture.temperature_c, self.series.posture.temperature_c, 1.0, "C"))
-        for name, values, seen, unit, text in asked:
-            low, high = float(np.min(seen)) / unit, float(np.max(seen)) / unit
+        for name, values, fitted, unit, text in asked:
+            low, high = float(np.min(fitted)) / unit, float(np.max(fitted)) / unit
             x = np.atleast_1d(np.asarray(values, dtype=float)) / unit
             for value in x[(x < low - 1e-9) | (x > high + 1e-9)]:
-                found.append(f"{name} {value:.6g} {text} is outside {low:.6g} to {high:.6g} {text}: extrapolated")
+                notes.append(f"{name} {value:.6g} {text} is outside {low:.6g} to {high:.6g} {text}: extrapolated")
         if self.model.hysteresis and np.any(np.abs(np.asarray(way, dtype=float)) > 1.0):
-            found.append("way is outside -1 to 1: extrapolated")
-        return tuple(found)
+            notes.append("way is outside -1 to 1: extrapolated")
+        return tuple(notes)
 
     def _asked(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> TelescopePosture:
         e = np.atleast_1d(np.asarray(elevation, dtype=float))
@@ -266,7 +266,7 @@ class StructureFit:
 
 
 def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> StructureFit:
-    """A group's flexible model.
+    """A flexible model of a group, by least squares from its epochs.
 
     series   its epochs
     model    which functions; the usual where it is None
@@ -287,21 +287,21 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
     def fitted() -> StructureFit:
         spread = widened(series.spread, rest - series.pivot, scatter)
         try:
-            found = fit_harmonics(
+            harmonics = fit_harmonics(
                 series.places - rest, rest - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
             )
         except EstimationError as problem:
             raise EstimationError(_named(str(problem), series, what)) from problem
-        return StructureFit(series, what, rest, reference_c, found, scatter)
+        return StructureFit(series, what, rest, reference_c, harmonics, scatter)
 
-    answer = fitted()
+    fit = fitted()
     if what.scatter:
         for _ in range(PASSES):
-            before, scatter = scatter, scatter_of(answer)
-            answer = fitted()
+            before, scatter = scatter, scatter_of(fit)
+            fit = fitted()
             if np.allclose(before.u_six, scatter.u_six, rtol=0.02) and before.u_point == scatter.u_point:
                 break
-    return answer
+    return fit
 
 
 def fitted_posture(series: GroupSeries, model: SeriesModel) -> TelescopePosture:
@@ -333,15 +333,15 @@ def widened(spread: Spread, arms: Array, scatter: EpochScatter) -> Spread:
     return Spread(points=points, shared=shared)
 
 
-def scatter_of(answer: StructureFit) -> EpochScatter:
+def scatter_of(fit: StructureFit) -> EpochScatter:
     """What is new in each epoch, by moments of the residuals' rigid parts and of what is left of them.
 
-    answer   a fit; its own scatter does not matter but for the weights
+    fit   whose own scatter does not matter but for the weights
     """
-    series, arms, e = answer.series, answer.arms, answer.fit.residual
+    series, arms, e = fit.series, fit.arms, fit.fit.residual
     known = variances_of(series)
-    count, m = len(series), answer.model.own_count
-    degrees, own_degrees = (count / max(count - k, 1) for k in (len(answer.model.functions), m))
+    count, m = len(series), fit.model.own_count
+    degrees, own_degrees = (count / max(count - k, 1) for k in (len(fit.model.functions), m))
     squares, noise, left, expected = [], [], 0.0, 0.0
     for t in range(len(series)):
         at = np.flatnonzero(np.isfinite(e[t]).all(axis=1))
@@ -370,12 +370,12 @@ def scatter_of(answer: StructureFit) -> EpochScatter:
     return EpochScatter(more, float(np.sqrt(max(each, 0.0))))
 
 
-def _excess(found: Array, noise: Array) -> Array:
+def _excess(covariance: Array, noise: Array) -> Array:
     """What a covariance (6, 6) has more than that of noise, in the directions in which it has more."""
     size = np.sqrt(np.diag(noise))
     root = size[:, None] * np.linalg.cholesky(noise / np.outer(size, size))
     inverse = np.linalg.inv(root)
-    values, vectors = np.linalg.eigh(inverse @ found @ inverse.T)
+    values, vectors = np.linalg.eigh(inverse @ covariance @ inverse.T)
     half = root @ vectors * np.sqrt(np.maximum(values - 1.0, 0.0))
     return half @ half.T
 

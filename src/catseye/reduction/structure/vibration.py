@@ -85,10 +85,10 @@ class FoundPeak:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """What some series say.
+    """Spectra, peaks and modes of vibration that some series of ranges show.
 
     series     as given
-    spectrum   of all, each by its own times; before the mean of the buffers is not undone
+    spectrum   of all, each by its own times; what the mean over a buffer takes off is not put back
     peaks      the highest first
     modes      by maximum likelihood, frequency with u; none where they did not settle, see the notes
     floor      (A,) m^2/Hz, of the lowest fifth of each density
@@ -132,57 +132,57 @@ def vibration(
     times = [s.seconds[at] for s, at in zip(kept, cut, strict=True)]
     values = [s.ranges[at] for s, at in zip(kept, cut, strict=True)]
     length = (last - first) * 2.0 / (STRETCHES + 1) if stretch is None else stretch
-    found = spectrum(times, values, stretch=length)
-    rate = float(found.rate_hz.min())
+    spectra = spectrum(times, values, stretch=length)
+    rate = float(spectra.rate_hz.min())
     notes = [
         f"Above {0.5 * rate:.3g} Hz, half the rate of {rate:.3g} Hz, nothing is seen where it is: a wave there appears "
         "below, at the distance to the nearest multiple of the rate."
     ]
-    told = [_told(found, peak, times, values, length, highest_hz) for peak in peaks(found)]
-    open_ones = [p for p in told if not p.decided]
+    found_peaks = [_found_peak(spectra, peak, times, values, length, highest_hz) for peak in peaks(spectra)]
+    open_ones = [p for p in found_peaks if not p.decided]
     if open_ones:
         some = ", ".join(f"{p.peak.frequency_hz:.3g}" for p in open_ones[:5])
         notes.append(
             f"Whether the peaks at {some} Hz are aliases is open: rangers of other rhythms on the same target decide."
         )
-    floor = np.quantile(found.density, 0.2, axis=0)
+    floor = np.quantile(spectra.density, 0.2, axis=0)
     modes: tuple[Mode, ...] = ()
-    if told and most_modes:
+    if found_peaks and most_modes:
         try:
-            modes = _modes(kept, found, told[:most_modes], floor, notes)
+            modes = _modes(kept, spectra, found_peaks[:most_modes], floor, notes)
         except CatseyeError as problem:
             notes.append(f"Modes were not found: {problem}.")
-    return Vibration(kept, found, tuple(told), modes, floor, tuple(notes))
+    return Vibration(kept, spectra, tuple(found_peaks), modes, floor, tuple(notes))
 
 
-def _told(
-    found: Spectrum, peak: Peak, times: Sequence[Array], values: Sequence[Array], length: float, highest_hz: float
+def _found_peak(
+    spectra: Spectrum, peak: Peak, times: Sequence[Array], values: Sequence[Array], length: float, highest_hz: float
 ) -> FoundPeak:
     """A peak with all that it may be, by the rate of the series that shows it most."""
-    top = found.density[int(np.argmin(np.abs(found.frequency_hz - peak.frequency_hz)))]
+    top = spectra.density[int(np.argmin(np.abs(spectra.frequency_hz - peak.frequency_hz)))]
     loudest = int(np.argmax(top))
-    may_be = aliases(peak.frequency_hz, float(found.rate_hz[loudest]), max(highest_hz, peak.frequency_hz))
+    may_be = aliases(peak.frequency_hz, float(spectra.rate_hz[loudest]), max(highest_hz, peak.frequency_hz))
     likely, share = likely_alias(times, values, may_be, stretch=length)
     decided = len(may_be) == 1 or (len(times) > 1 and float(np.diff(np.sort(share)[-2:])[0]) > CLEAR)
-    shape = shape_at(found, peak.frequency_hz) if len(times) > 1 else None
+    shape = shape_at(spectra, peak.frequency_hz) if len(times) > 1 else None
     return FoundPeak(peak, may_be, likely if decided else peak.frequency_hz, share, decided, shape)
 
 
 def _modes(
-    series: Sequence[RangeSeries], found: Spectrum, told: Sequence[FoundPeak], floor: Array, notes: list[str]
+    series: Sequence[RangeSeries], spectra: Spectrum, found_peaks: Sequence[FoundPeak], floor: Array, notes: list[str]
 ) -> tuple[Mode, ...]:
     """Modes by maximum likelihood from the peaks on, of the series that shows the faintest of them best."""
-    rows = [int(np.argmin(np.abs(found.frequency_hz - p.peak.frequency_hz))) for p in told]
-    best = int(np.argmax(np.min(found.density[rows] / floor, axis=0)))
+    rows = [int(np.argmin(np.abs(spectra.frequency_hz - p.peak.frequency_hz))) for p in found_peaks]
+    best = int(np.argmax(np.min(spectra.density[rows] / floor, axis=0)))
     one = series[best]
-    near = sorted({round(p.likely_hz, 6) for p in told})
+    near = sorted({round(p.likely_hz, 6) for p in found_peaks})
     count = min(len(one.seconds), MOST_SAMPLES)
     if count < len(one.seconds):
         notes.append(f"Modes are from the first {count} of {len(one.seconds)} ranges of {one.name}.")
     else:
         notes.append(f"Modes are from {one.name}, which shows the faintest of them best.")
     when = one.seconds[:count]
-    samples = one.ranges[:count] - slow(when, one.ranges[:count], 4.0 / min(p.peak.frequency_hz for p in told))
+    samples = one.ranges[:count] - slow(when, one.ranges[:count], 4.0 / min(p.peak.frequency_hz for p in found_peaks))
     u = max(float(np.median(one.u)), float(np.sqrt(floor[best] * 0.5 * one.rate_hz)))
     return find_modes(when, samples[:, None], count=len(near), u_sample=u, window=one.window, near_hz=near)
 

@@ -66,10 +66,10 @@ def actuators_of(site: SiteFolder) -> tuple[tuple[str, ...], np.ndarray]:
 
     Raises InputError for a site without any.
     """
-    found = {n: t for n, t in sorted(site.targets.items()) if t.type == "prism" and t.frame == "reflector"}
-    if not found:
+    prisms = {n: t for n, t in sorted(site.targets.items()) if t.type == "prism" and t.frame == "reflector"}
+    if not prisms:
         raise InputError(f"{site.directory}: targets.toml has no prism in the reflector frame, so no actuator")
-    return tuple(found), np.array([t.position_mm for t in found.values()]) * MILLIMETRE
+    return tuple(prisms), np.array([t.position_mm for t in prisms.values()]) * MILLIMETRE
 
 
 def corrections(
@@ -96,13 +96,13 @@ def corrections(
     """
     own_place = {name: row for row, name in enumerate(shape.prisms.names)}
     same = np.array([own_place.get(name, -1) for name in names])
-    seen, wanted = shape.fit.local[:, :2], places[:, :2]
-    trend, wanted_trend = _trend(shape, seen, wanted)
+    local, wanted = shape.fit.local[:, :2], places[:, :2]
+    trend, wanted_trend = _trend(shape, local, wanted)
     values, noise = shape.fit.deviation, shape.fit.along
-    rough = roughness or find_roughness(seen, values, noise, trend)
+    rough = roughness or find_roughness(local, values, noise, trend)
     nominal_design = _parameter_rows(shape, wanted)
-    told: Foretold = foretell(
-        seen,
+    foretold: Foretold = foretell(
+        local,
         values,
         noise,
         trend,
@@ -118,60 +118,60 @@ def corrections(
     return Actuators(
         names,
         places,
-        told.value,
-        told.covariance,
-        -told.value / lean,
-        np.sqrt(np.diag(told.covariance)) / lean,
+        foretold.value,
+        foretold.covariance,
+        -foretold.value / lean,
+        np.sqrt(np.diag(foretold.covariance)) / lean,
         _positions(names, positions or {}),
-        told.weights,
+        foretold.weights,
         shape.prisms.names,
         same >= 0,
         rough,
     )
 
 
-def rows_of(found: Actuators) -> list[ActuatorCorrection]:
+def rows_of(actuators: Actuators) -> list[ActuatorCorrection]:
     """The table, a record an actuator, in mm; EstimationError for a number that no actuator's table can hold."""
-    made = []
-    u = np.sqrt(np.diag(found.covariance))
-    within = found.within
-    for row, name in enumerate(found.names):
-        size = np.abs(found.weights[row])
+    records = []
+    u = np.sqrt(np.diag(actuators.covariance))
+    within = actuators.within
+    for row, name in enumerate(actuators.names):
+        size = np.abs(actuators.weights[row])
         most = np.argsort(size)[::-1][:SUPPORTS]
-        correction = float(found.correction[row] / MILLIMETRE)
+        correction = float(actuators.correction[row] / MILLIMETRE)
         if not abs(correction) < 1000.0:
             raise EstimationError(f"actuator {name}: a correction of {correction:.4g} mm (expected below 1000)")
         steps = round(correction / STEP_MM)
-        position = float(found.position[row] / MILLIMETRE)
-        x, y, z = (round(float(v), 9) for v in found.places[row])
-        made.append(
+        position = float(actuators.position[row] / MILLIMETRE)
+        x, y, z = (round(float(v), 9) for v in actuators.places[row])
+        records.append(
             ActuatorCorrection(
                 actuator=name,
                 x_m=x,
                 y_m=y,
                 z_m=z,
-                deviation_mm=float(found.deviation[row] / MILLIMETRE),
+                deviation_mm=float(actuators.deviation[row] / MILLIMETRE),
                 u_deviation_mm=float(u[row] / MILLIMETRE),
                 correction_mm=correction,
-                u_correction_mm=float(found.u_correction[row] / MILLIMETRE),
+                u_correction_mm=float(actuators.u_correction[row] / MILLIMETRE),
                 steps=steps,
                 left_mm=correction - steps * STEP_MM,
                 position_mm=position,
                 target_mm=position + correction,
                 within_limits="yes" if within[row] else "no",
-                how="measured" if found.measured[row] else "foretold",
-                prisms=" ".join(found.prisms[k] for k in most),
+                how="measured" if actuators.measured[row] else "foretold",
+                prisms=" ".join(actuators.prisms[k] for k in most),
                 weight=float(size[most].sum() / size.sum()),
             )
         )
-    return made
+    return records
 
 
-def _trend(shape: SurfaceShape, seen: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _trend(shape: SurfaceShape, local: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Columns that span the Zernike terms and the paraboloid's parameters, at prisms and at actuators."""
     aperture: LitAperture = shape.aperture
     low = terms(TREND_TERMS, "noll")
-    here, there = aperture.unit(seen), aperture.unit(wanted)
+    here, there = aperture.unit(local), aperture.unit(wanted)
     one = np.column_stack([shape.fit.design, zernike(low, here[:, 0], here[:, 1])])
     two = np.column_stack([_parameter_rows(shape, wanted), zernike(low, there[:, 0], there[:, 1])])
     size = np.linalg.norm(one, axis=0)

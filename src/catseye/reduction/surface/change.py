@@ -160,13 +160,14 @@ def _own_frame(prisms: Prisms, rows: list[int]) -> tuple[np.ndarray, np.ndarray]
 
 
 def _sum(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Sum of two covariances, each full (3k, 3k) or a block a point (k, 3, 3); full where one of them is."""
     if first.ndim == second.ndim:
         return first + second
     full, blocks = (first, second) if first.ndim == 2 else (second, first)
-    made = full.copy()
+    total = full.copy()
     for k, block in enumerate(blocks):
-        made[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += block
-    return made
+        total[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += block
+    return total
 
 
 def _blocks(covariance: np.ndarray, k: int) -> np.ndarray:

@@ -24,7 +24,7 @@ CONSTANT, SIN, COS, THERMAL, HYSTERESIS = "constant", "gravity_sin", "gravity_co
 
 @dataclass(frozen=True, eq=False)
 class TermModel:
-    """One Zernike term's way with elevation.
+    """One Zernike term as a function of elevation, and of direction and temperature where the epochs tell them.
 
     value, covariance   (p,) m (thermal m/°C), (p, p), as measured by the epochs' covariances
     residual            (T,) m, observed minus predicted
@@ -132,16 +132,16 @@ def directions(elevation_deg: np.ndarray) -> np.ndarray:
     >>> directions(np.array([10.0, 50.0, 80.0, 80.0, 40.0])).tolist()
     [1.0, 1.0, 1.0, 1.0, -1.0]
     """
-    made = np.sign(np.diff(elevation_deg))
-    made = np.concatenate([made[:1], made])
-    known = np.flatnonzero(made)
+    direction = np.sign(np.diff(elevation_deg))
+    direction = np.concatenate([direction[:1], direction])
+    known = np.flatnonzero(direction)
     if not len(known):
         return np.ones(len(elevation_deg))
-    made[: known[0]] = made[known[0]]
-    for k in range(1, len(made)):
-        if made[k] == 0.0:
-            made[k] = made[k - 1]
-    return made
+    direction[: known[0]] = direction[known[0]]
+    for k in range(1, len(direction)):
+        if direction[k] == 0.0:
+            direction[k] = direction[k - 1]
+    return direction
 
 
 def _elevations(shapes: Sequence[SurfaceShape]) -> np.ndarray:

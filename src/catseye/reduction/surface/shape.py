@@ -44,7 +44,7 @@ class LitAperture:
 
 @dataclass(frozen=True)
 class ShapeSettings:
-    """What is asked of a shape.
+    """What is fitted of a surface, and what is asked of its errors.
 
     free           of "vertex", "axis", "focal-length": what of the paraboloid is fitted
     taper_db       how much less power the feed sends to the edge than to the middle; 0: uniform
@@ -254,9 +254,9 @@ def expansion_of(
 
 def _rounded(covariance: np.ndarray) -> np.ndarray:
     """A covariance whose variances are 0 where rounding left them below: of terms that the paraboloid stands for."""
-    made = covariance.copy()
-    made[np.diag_indices_from(made)] = np.maximum(np.diag(made), 0.0)
-    return made
+    rounded = covariance.copy()
+    rounded[np.diag_indices_from(rounded)] = np.maximum(np.diag(rounded), 0.0)
+    return rounded
 
 
 def _beside(
