@@ -119,11 +119,11 @@ class Intake:
         self._fresh, self._solving = 0, True
         self._write((Document(ticks, EPOCH_BEGUN, ""),))
         try:
-            found = await self._solver(job)
+            epoch = await self._solver(job)
         finally:
             self._solving = False
         self.flush()
-        answer = self._live.take_in(job, found)
+        answer = self._live.take_in(job, epoch)
         self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
             self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")

@@ -286,8 +286,12 @@ class Coordinator:
         if self.mode != "passive" or reply.ok is not True:
             return
         try:
-            found = measurement_of(reply)
-            self.intake.take(shot_of(link.ranger, link.names.get(found.cube, found.name), found, None, link.sampling))
+            measurement = measurement_of(reply)
+            self.intake.take(
+                shot_of(
+                    link.ranger, link.names.get(measurement.cube, measurement.name), measurement, None, link.sampling
+                )
+            )
         except InputError as problem:
             self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 

@@ -61,10 +61,10 @@ class Board:
 
         Raises InputError: parameters that do not fit, or what was asked cannot be.
         """
-        found = self._asked.get(request.command)
-        if found is None:
+        command = self._asked.get(request.command)
+        if command is None:
             return None
-        counts, handler = found
+        counts, handler = command
         if len(request.parameters) not in counts:
             raise InputError(f"{len(request.parameters)} parameters do not fit (expected {HELP[request.command][0]})")
         return handler(*request.parameters)

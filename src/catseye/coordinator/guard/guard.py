@@ -113,12 +113,12 @@ class SafetyGuard:
             if request.command == "COO" and len(request.parameters) >= 4:  # thousands of them
                 memory.take(request, ())
                 return None
-            said, values = self._judged(memory, request, now_ticks)
-            if said is None:
+            reason, values = self._judged(memory, request, now_ticks)
+            if reason is None:
                 memory.take(request, values)
         except (CatseyeError, ValueError) as problem:
             return str(problem)
-        return said
+        return reason
 
     def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
         """What SUN should tell a ranger: the unit vector to the Sun in its own frame.
@@ -181,21 +181,21 @@ class SafetyGuard:
             return f"{name} is not known to the safety guard (expected another command)", values
         since = max(now, request.ticks or now)
         until = later(since, LOOK) if name != "TRK" else max(later(since, LOOK), int(values[5]))
-        said = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
-        if said is None and name == "PS" and shines:
-            said = self._lights(memory, since, until)
-        if said is None and moves:
+        reason = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
+        if reason is None and name == "PS" and shines:
+            reason = self._lights(memory, since, until)
+        if reason is None and moves:
             if since > later(now, FARTHEST_STAMP):
                 return (
                     f"its start is {seconds_between(now, since):.0f} s away (expected at most {FARTHEST_STAMP:g})",
                     values,
                 )
-            said = (
+            reason = (
                 self._homing(memory, since, until) if name == "FHM" else self._move(memory, name, values, since, until)
             )
-            if said is None and name == "FHM":
+            if reason is None and name == "FHM":
                 memory.stand.lose(int(values[0]))
-        return said, values
+        return reason, values
 
     def _scheduled(self, memory: Memory, request: Request, now: int) -> str | None:
         start, repeats, interval, inner = schedule_of(request.parameters)
@@ -237,10 +237,10 @@ class SafetyGuard:
         """A vector to the Sun that is none."""
         if not self.keep_clear.counts_at(self.keep_clear.sun(now)):
             return None
-        told = np.array([float(v) for v in values])
-        size = float(np.linalg.norm(told))
+        vector = np.array([float(v) for v in values])
+        size = float(np.linalg.norm(vector))
         true = np.array(self.sun_vector(vantage.name, now))
-        off = float(np.arctan2(np.linalg.norm(np.cross(told, true)), told @ true)) if size > 0.0 else np.pi
+        off = float(np.arctan2(np.linalg.norm(np.cross(vector, true)), vector @ true)) if size > 0.0 else np.pi
         if off <= LIE:
             return None
         return f"that is {off / DEGREE:.1f} deg from the Sun (limit {LIE / DEGREE:g}): ask the guard for its vector"
@@ -284,11 +284,11 @@ class SafetyGuard:
         longest = trapezoid(np.stack([memory.stand.low, memory.stand.high]), np.stack([high, low]), memory.pace)
         seconds = float(np.max(longest.total)) + ARRIVED
         until = max(until, later(since, seconds + SHOT - ARRIVED))
-        said = self._swept(memory, name, (low, high), since, until)
-        if said is None:
+        reason = self._swept(memory, name, (low, high), since, until)
+        if reason is None:
             at = later(max(since, int(values[1]) if name == "TRK" else since), seconds)
             memory.stand.go(low, high, at if name != "SCN" else max(at, until), name)
-        return said
+        return reason
 
     def _goals(self, memory: Memory, name: str, values: tuple[Value, ...]) -> Array:
         """Counts (k, 2) to which a command leads. Raises InputError: it cannot be told."""
@@ -370,8 +370,8 @@ class SafetyGuard:
             self._suns = first, last, self.keep_clear.sun([first, last])
         first, last, suns = self._suns
         share = ((instants(since, until) - first) / (last - first))[:, None]
-        found = suns[0] + share * (suns[1] - suns[0])
-        return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+        directions = suns[0] + share * (suns[1] - suns[0])
+        return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
     def _fresh_posture(self, vantage: Vantage, ticks: int) -> LivePosture:
         posture = self._posture

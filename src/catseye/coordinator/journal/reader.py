@@ -82,11 +82,11 @@ class JournalReader:
         Raises InputError where there is none, or are two.
         """
         runs = self.runs()
-        found = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
-        if len(found) != 1:
+        matching = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
+        if len(matching) != 1:
             held = f"runs 1 to {runs[-1].run}" if runs else "no runs"
-            raise InputError(f"journal {self.place}: run {which!r} names {len(found)} runs (it holds {held})")
-        return found[0]
+            raise InputError(f"journal {self.place}: run {which!r} names {len(matching)} runs (it holds {held})")
+        return matching[0]
 
     def events(
         self,
@@ -179,7 +179,7 @@ class JournalReader:
         self, run: int, after: int, upto: int, tables: Sequence[Table], buffers: bool
     ) -> list[tuple[int, Entry]]:
         """The events after a seq and up to another, one state of the journal."""
-        found: list[tuple[int, Entry]] = []
+        events: list[tuple[int, Entry]] = []
         with self._reading() as connection:
             samples: dict[int, Any] = {}
             if buffers and SHOTS in tables:
@@ -187,13 +187,13 @@ class JournalReader:
             for table in tables:
                 for row in connection.execute(_between(table, run, after, upto)):
                     buffer = samples.get(row.seq) if table is SHOTS else None
-                    taken = None
+                    unpacked = None
                     if buffer is not None:
                         place = f"journal {self.place}: run {run}, event {row.seq}"
-                        taken = unpack(buffer, max(1, row.samples_per_cycle), place)
-                    found.append((row.seq, entry_of(table.name, row, taken)))
-        found.sort(key=lambda pair: pair[0])
-        return found
+                        unpacked = unpack(buffer, max(1, row.samples_per_cycle), place)
+                    events.append((row.seq, entry_of(table.name, row, unpacked)))
+        events.sort(key=lambda pair: pair[0])
+        return events
 
 
 def _between(table: Table, run: int, after: int, upto: int) -> Any:

@@ -133,10 +133,10 @@ class RangerLink:
         why = "no port"
         ports = list(enumerate(self.address.ports))
         for place, port in ports[::-1] if self.wanted == "listen" else ports:
-            said = await self._connect(port, SECOND_CLIENT_TID if place else FIRST_CLIENT_TID)
-            if said is None:
+            problem = await self._connect(port, SECOND_CLIENT_TID if place else FIRST_CLIENT_TID)
+            if problem is None:
                 break
-            why = said
+            why = problem
         client = self._client
         if client is None:
             return why
@@ -161,17 +161,17 @@ class RangerLink:
             return str(problem)
         except TimeoutError:
             return f"{self.address.host} port {port} does not answer within {limit:g} s"
-        said: str | None = "given up"
+        wrong: str | None = "given up"
         try:
-            said = await self._handshake.verdict(self.ranger, port, client.closed, limit)
+            wrong = await self._handshake.verdict(self.ranger, port, client.closed, limit)
         finally:
-            if said is not None:
+            if wrong is not None:
                 client.close()
-        if said is None:
+        if wrong is None:
             self._client = client
         elif self._handshake.stranger:
-            self._event_log.tell("wrong-ranger", said, "alarm")
-        return said
+            self._event_log.tell("wrong-ranger", wrong, "alarm")
+        return wrong
 
     async def _supervise(self, client: ZyClient) -> str:
         """Watch a connection until it is over."""
@@ -262,9 +262,9 @@ class RangerLink:
             raise InputError("not connected")
         asks = COMMANDS[request.command].only_asks(request)
         if not asks:
-            said = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
-            if said is not None:
-                raise Refused("refused", f"{request.command}: {said}")
+            refusal = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
+            if refusal is not None:
+                raise Refused("refused", f"{request.command}: {refusal}")
         tid, future = self._client.request(request.command, *request.parameters, ticks=request.ticks)
         if not asks and self._commanded is not None:
             future.add_done_callback(partial(self._done, tid, format_request(replace(request, tid=tid))))

@@ -117,7 +117,7 @@ def simulate_night(
     for ranger, target in warm:
         if ranger not in heads or target not in points:
             raise InputError(f"a warm line {ranger} - {target}: the night has no such ends")
-    seen = {
+    air_of = {
         r: WarmLine(air.conditions, air.stratification, tuple((points[t], w) for (a, t), w in warm.items() if a == r))
         for r in heads
     }
@@ -127,7 +127,7 @@ def simulate_night(
             plan[r],
             points=points,
             targets=targets,
-            air=seen[r] if seen[r].plumes else air,
+            air=air_of[r] if air_of[r].plumes else air,
             faults=faults,
             planted=planted,
             streams=streams,
@@ -179,7 +179,7 @@ def soundings(
     """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
     if u_sound_c is None:
         return ()
-    found = []
+    rows = []
     for (ranger, target), warmer in warm.items():
         rng = streams(f"sound/{ranger}/{target}")
         offset = u_sound_c * rng.normal()
@@ -187,8 +187,8 @@ def soundings(
         for seconds in np.arange(0.0, until_s + SOUNDING_INTERVAL_S, SOUNDING_INTERVAL_S):
             mean = float(np.mean(air.temperature_c(z, seconds))) + warmer
             read = mean + offset + 0.2 * u_sound_c * rng.normal()
-            found.append(Sounding(float(seconds), ranger, target, read, u_sound_c))
-    return tuple(sorted(found, key=lambda row: row.seconds))
+            rows.append(Sounding(float(seconds), ranger, target, read, u_sound_c))
+    return tuple(sorted(rows, key=lambda row: row.seconds))
 
 
 def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:
