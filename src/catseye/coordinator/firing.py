@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -143,7 +142,7 @@ class Firing:
         idle = (busy is None or busy.done()) and link.ready
         return idle and ranger not in self.dropped and not self.suspensions.resting(ranger, "", now)
 
-    def _start(self, ranger: str, work: Coroutine[Any, Any, None]) -> None:
+    def _start(self, ranger: str, work: Coroutine[object, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work, name=f"shots {ranger}")
         task.add_done_callback(self._ended)
         self._tasks[ranger] = task

@@ -47,7 +47,7 @@ class HeadWorld(Protocol):
 
 
 class TwinHead:
-    """A `ranger.head.Head` of the twin.
+    """The `ranger.head.RangerHead` of the twin.
 
     ranger        whose it is
     world         the site's truth
