@@ -2,6 +2,7 @@
 
 import asyncio
 
+from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.live.live import Live
 from coordinator.link_scene import Linked, planned, run, until
 from coordinator.ziy_scene import Answer, ListLive, Site, weather
@@ -17,7 +18,7 @@ class Misfit(ListLive):
         wrong = {s.number for s in self.shots if s.target == "ZG12"}
         self.epochs += 1
         used = tuple(n for n in self.pending if n not in wrong)
-        rejected = {n: "reflected: range +31.000 mm off, w 99.0" for n in self.pending if n in wrong}
+        rejected = {n: Reason(ShotStatus.REFLECTED, "range +31.000 mm off, w 99.0") for n in self.pending if n in wrong}
         self.pending = []
         return Answer(self.epochs, ticks, used=used, rejected=rejected)
 

@@ -231,6 +231,6 @@ async def _in_a_thread(job: EpochJob) -> Epoch | str:
 
 
 def _later(loop: asyncio.AbstractEventLoop, call: Callable[["Future[int]"], None], done: "Future[int]") -> None:
-    """From the journal's thread into the loop, which may be closed by now."""
+    """Call from the journal's thread into the loop, which may be closed by now."""
     if not loop.is_closed():
         loop.call_soon_threadsafe(call, done)

@@ -38,7 +38,7 @@ class Board:
         self._ziy = coordinator
         self.samplers = Samplers()
         self.parameters = Parameters((*_own(coordinator), *parameters))
-        self._asked: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
+        self._commands: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
             "STATUS": ((0,), lambda _: self._status()),
             "RANGERS": ((0,), lambda _: self._rangers()),
             "PARAMETERS": ((0,), lambda _: self._parameters()),
@@ -60,7 +60,7 @@ class Board:
 
         Raises InputError: parameters that do not fit, or what was asked cannot be.
         """
-        command = self._asked.get(request.command)
+        command = self._commands.get(request.command)
         if command is None:
             return None
         counts, handler = command

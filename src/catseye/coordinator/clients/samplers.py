@@ -61,7 +61,7 @@ def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
 
 
 def _of_solution(entry: EpochSolution) -> Iterable[tuple[str, Row]]:
-    """Of an epoch's answer as `reduction.live.live` gives it; what it does not have is `none`."""
+    """The rows of an epoch's answer; what it does not have is `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     names, places = answer.get("names") or [], answer.get("x") or []
     epoch = _number(answer.get("number"))

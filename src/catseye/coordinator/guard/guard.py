@@ -56,7 +56,7 @@ ALONG_THE_BEAM = (0.0, 0.0, 1.0)
 
 
 class SafetyGuard:
-    """Of all rangers of a site.
+    """The guard of all rangers of a site.
 
     site         its records
     keep_clear   Sun and boxes; the site's Sun without boxes if None
@@ -209,7 +209,7 @@ class SafetyGuard:
         return self._interlocked(memory.vantage.name, since, last, moves=False, shines=True)
 
     def _interlocked(self, ranger: str, since: int, until: int, *, moves: bool, shines: bool) -> str | None:
-        """The first interlock that forbids it, in words."""
+        """The first interlock that forbids it, in words; None where none does."""
         asked: list[Act] = [act for act, on in zip(ACTS, (shines, moves), strict=True) if on]
         for each in self.interlocks:
             acts = [act for act in asked if act in each.forbids]
@@ -234,7 +234,7 @@ class SafetyGuard:
         return None if not spans else max(0.0, (spans[0][0] - begin) * SECONDS_PER_DAY)
 
     def _lie(self, vantage: Vantage, values: tuple[Value, ...], now: int) -> str | None:
-        """A vector to the Sun that is none."""
+        """Why a vector told as the Sun's is wrong; None where it is right, or no Sun counts."""
         if not self.keep_clear.counts_at(self.keep_clear.sun(now)):
             return None
         vector = np.array([float(v) for v in values])
@@ -246,7 +246,7 @@ class SafetyGuard:
         return f"that is {off / DEGREE:.1f} deg from the Sun (limit {LIE / DEGREE:g}): ask the guard for its vector"
 
     def _lights(self, memory: Memory, since: int, until: int) -> str | None:
-        """A laser is not switched on into a box."""
+        """Why a laser may not be switched on, as onto a box; None where it may."""
         if not self.keep_clear.boxes:
             return None
         if not memory.stand.known:
@@ -257,7 +257,7 @@ class SafetyGuard:
         return None if box is None else f"the beam may be on {box} (expected the mirror elsewhere first)"
 
     def _homing(self, memory: Memory, since: int, until: int) -> str | None:
-        """The search for an index sweeps the beam anywhere."""
+        """Why an index may not be searched for, which sweeps the beam anywhere; None where it may."""
         if memory.laser_off:
             return None
         up = self.keep_clear.counts_at(self.keep_clear.sun(instants(since, until)))
@@ -266,7 +266,7 @@ class SafetyGuard:
         return "the search for an index sweeps the beam anywhere (expected PS 0 first)"
 
     def _move(self, memory: Memory, name: str, values: tuple[Value, ...], since: int, until: int) -> str | None:
-        """Whether the mirror may go where a command leads it; if so it is under way."""
+        """Why the mirror may not go where a command leads it; None where it may, and then it is under way."""
         if not memory.stand.known:
             return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
         goals = self._goals(memory, name, values)

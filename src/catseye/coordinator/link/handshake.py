@@ -9,7 +9,7 @@ LINES = frozenset(["HELLO", "CONNECT", "STW"])
 
 
 class Handshake:
-    """Of one new connection; `stranger` where another ranger answered."""
+    """The greeting on one new connection; `stranger` where another ranger answered."""
 
     def __init__(self) -> None:
         self._replies: dict[str, Reply] = {}

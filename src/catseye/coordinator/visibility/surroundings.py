@@ -136,7 +136,7 @@ class KeepClear:
         self._standing: dict[tuple[str, float], Zones] = {}
 
     def guard(self, vantage: Vantage) -> Guard:
-        """Of a ranger, boxes only, as it stands in its own frame."""
+        """The guard of a ranger against boxes only, as it stands in its own frame."""
         if vantage.name not in self._guards:
             self._guards[vantage.name] = guard_of(
                 vantage.name,
@@ -166,7 +166,7 @@ class KeepClear:
         suns: Array | None = None,
         wider: float = 0.0,
     ) -> Surroundings:
-        """Of a ranger between two times.
+        """The Sun and boxes about a ranger between two times.
 
         posture   of the telescope, which a ranger on the feed arm needs; its rates are held
         suns      (NODES, 3) of `instants`, where they are known already
