@@ -243,7 +243,7 @@ class MotionScript:
 
     @staticmethod
     def of_table(table: str, name: str) -> "MotionScript":
-        """From the text of a table. Raises InputError with its line."""
+        """The motion that a table's text tells. Raises InputError with its line."""
         rows = list(csv.reader(io.StringIO(table)))
         if not rows or tuple(word.strip() for word in rows[0]) != COLUMNS:
             raise InputError(f"{name} line 1: expected {','.join(COLUMNS)}")

@@ -169,7 +169,7 @@ class Firing:
                 return
 
     async def _stream(self, ranger: str, target: str, late: float) -> None:
-        """One target again and again, first in so many s."""
+        """Measure one target again and again, first in so many s."""
         await asyncio.sleep(late)
         while self.streams.get(ranger) == target and self._may_go_on(ranger):
             try:

@@ -92,7 +92,7 @@ class Cubes:
         self._counts = {0: self._counts[0]}
 
     def set_geometry(self, name: str, values: tuple[float, ...]) -> None:
-        """One of `GEOMETRY`; every encoder value but ZRG's is dropped."""
+        """Set one of `GEOMETRY`; every encoder value but ZRG's is dropped."""
         self.geometry[name] = values
         self._station = None
         self._counts = {0: self._counts[0]}

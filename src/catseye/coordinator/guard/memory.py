@@ -46,7 +46,7 @@ class Stand:
         return bool(np.isfinite(self.low).all())
 
     def settle(self, now_ticks: int) -> None:
-        """At the goal, if it is time."""
+        """Note that the mirror stands at its goal, if it is time."""
         if self.goal is not None and self.arrives is not None and now_ticks >= self.arrives:
             self.arrive()
 
@@ -124,7 +124,7 @@ class Memory:
         return number
 
     def counts(self, cube: Value) -> Array:
-        """Counts (2,) to which CIL or CMEAS of a cube leads. Raises InputError: unknown, beyond the stops, ZRG not set."""
+        """Counts (2,) to which CIL or CMEAS of a cube leads. Raises InputError: unknown, out of reach, ZRG not set."""
         number = self.number(cube)
         kept = self._counts.get(number, [None, None])
         looked = self.look(self._places[number]) if None in kept and number else np.full(2, np.nan)

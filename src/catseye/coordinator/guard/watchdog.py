@@ -16,7 +16,7 @@ ACT_WITHIN = 60.0  # s: what comes later is told, and the next shot will have mo
 
 
 class BeamWatchdog:
-    """The watch over the beams of all links; it acts only on those that measure, and never while a shot is under way."""
+    """The watch over all links' beams; it acts only on those that measure, and never while a shot is under way."""
 
     def __init__(self, links: Mapping[str, RangerLink], guard: RequestGuard, *, clock: Clock, event_log: EventLog):
         self._links, self._guard, self._clock, self._event_log = links, guard, clock, event_log

@@ -142,7 +142,7 @@ def _server_engine(url: URL) -> Engine:
 
 
 def identity(place: JournalAddress) -> tuple[int, int] | None:
-    """Of a journal's file; None for a server, and where it is not there."""
+    """Device and inode of a journal's file; (0, 0) where it is not there, None for a server."""
     if place.path is None:
         return None
     try:

@@ -201,7 +201,7 @@ class RangerLink:
 
     @property
     def _probe_timeout(self) -> float:
-        """Of VER, s; another client's moves may stand before it."""
+        """How long VER may take, s; another client's moves may stand before it."""
         return self.settings.probe_timeout if self.wanted == "measure" else self.settings.move_timeout
 
     async def _lives(self, *, idle: bool = False) -> bool:

@@ -29,7 +29,7 @@ class ChosenTarget:
 
 
 class Places:
-    """Of one round.
+    """Where rangers and targets are during one round.
 
     site, vantages, retros   the records
     state                    whose `place` predicts

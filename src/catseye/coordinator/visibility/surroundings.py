@@ -47,7 +47,7 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """For one ranger and a span of time.
+    """What one ranger must keep clear of in a span of time.
 
     vantage        the ranger
     suns           (k, 3) directions, own frame; none where the Sun is set

@@ -33,7 +33,7 @@ class TracedDish:
 
     @classmethod
     def of(cls, record: ParaboloidRecord) -> "TracedDish":
-        """Of a site's paraboloid and aperture."""
+        """Rays over a site's paraboloid and aperture."""
         radius = record.aperture_radius_mm * MILLIMETRE
         nodes, weights = np.polynomial.legendre.leggauss(RINGS)
         r, angle = 0.5 * radius * (nodes + 1.0), 2.0 * np.pi * (np.arange(SPOKES) + 0.3) / SPOKES
