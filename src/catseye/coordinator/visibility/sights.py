@@ -67,7 +67,7 @@ class VisibleSights:
     def _pairs(
         self, vantages: Mapping[str, Vantage], retros: Mapping[str, SeenRetroreflector], posture: LivePosture | None
     ) -> Seen:
-        """Who sees what, of rangers and retroreflectors; without a posture that of the record, where riders are asked."""
+        """Which rangers see which retroreflectors; without a posture in the record's, where riders are asked."""
         if not vantages or not retros:
             return Seen(dict.fromkeys(vantages, ()), {})
         stands = posture or nominal_posture(self.site)
