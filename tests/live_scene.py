@@ -109,7 +109,7 @@ class Night:
             if (not rangers or ranger in rangers) and ranger not in without:
                 asked += [(t, ranger, name) for t, name in zip(times, names, strict=True)]
         steps = np.arange(begin - 1.0, begin + ROUND + 1.0, 1.0 / self.postures_hz)
-        told = [self.world.told(self.world.ticks(s)) for s in steps]
+        told = [self.world.live_posture(self.world.ticks(s)) for s in steps]
         stations = [s.name for s in self.world.site.site.weather_station]
         read = [self.world.weather(name, begin + 0.5 * ROUND) for name in stations]
         shots = []

@@ -5,9 +5,10 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from catseye.coordinator.link.ranger import RangerLink
+from catseye.coordinator.link.preparation import Preparation
+from catseye.coordinator.link.ranger import LinkListeners, RangerLink
 from catseye.coordinator.link.settings import Address
-from catseye.coordinator.parts import PlannedShot, ticks_now
+from catseye.coordinator.parts import Environment, PlannedShot, ticks_now
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.line import Request
@@ -114,15 +115,15 @@ class Served:
     def address(self):
         return Address(LOOPBACK, self.ports)
 
-    def link(self, **options):
-        options = {
-            "commands": COMMANDS,
-            "guard": Free(),
-            "clock": LoopClock(),
-            "tell": self.happenings.append,
-            "network": network(),
-        } | options
-        return RangerLink(self.name, options.pop("address", self.address), **options)
+    def link(self, *, address=None, commands=COMMANDS, tell=None, heard=None, **options):
+        return RangerLink(
+            self.name,
+            address or self.address,
+            preparation=Preparation.of(commands),
+            environment=Environment(LoopClock(), network()),
+            listeners=LinkListeners(tell or self.happenings.append, heard),
+            **{"guard": Free()} | options,
+        )
 
     def kinds(self):
         return [h.kind for h in self.happenings]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play, posture_of, weather_of
-from catseye.coordinator.parts import ticks_now
+from catseye.coordinator.parts import Environment, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.line import Reply, parse_reply, stamp_text
 from catseye.ranger.server import LOOPBACK
@@ -47,12 +47,11 @@ class Fed:
         self.client = FeedClient(
             LOOPBACK,
             self.port,
-            clock=LoopClock(),
+            environment=Environment(LoopClock(), network()),
             tell=self.happenings.append,
             weather=self.weather.append,
             posture=self.postures.append,
             stations=("WX1", "WX2"),
-            network=network(),
             **self.options,
         )
         self.task = asyncio.ensure_future(self.client.run())

@@ -7,7 +7,7 @@ import pytest
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.intake import Intake
-from catseye.coordinator.parts import NotDurable
+from catseye.coordinator.journal.protocol import NotDurable
 from catseye.records.night.live import Happening, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from catseye.coordinator.feed import MotionScript
-from catseye.coordinator.parts import Round, ticks_now
-from catseye.coordinator.ziy import Coordinator
+from catseye.coordinator.parts import Environment, Round, ticks_now
+from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import read_site
 from coordinator.link_scene import COMMANDS, Free, LoopClock, MemoryJournal, Served, network, planned, until
@@ -127,14 +127,10 @@ class Site:
         self.ziy = Coordinator(
             gbt(),
             addresses={name: served.address for name, served in self.served.items()},
-            live=self.live,
-            planner=self.planner,
-            guard=self.guard,
-            journal=self.journal,
-            clock=LoopClock(),
+            parts=CoordinatorParts(self.live, self.planner, self.guard, self.journal),
+            environment=Environment(LoopClock(), network()),
             feed=self.feed,
             commands=lambda ranger: COMMANDS,
-            network=network(),
             **self.options,
         )
         self.ziy.listeners.append(self.published.append)

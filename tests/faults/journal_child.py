@@ -3,7 +3,7 @@
 import sys
 import threading
 
-from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import scene_answer, scene_run
 
@@ -11,7 +11,12 @@ AT_ONCE = 12  # appends under way
 
 
 def main(place: str, first: int) -> None:
-    journal = Journal.open(place, run=scene_run(), clock=ManualClock(52889.125), group=0.001, compress=first % 2 == 1)
+    journal = Journal.open(
+        place,
+        run=scene_run(),
+        clock=ManualClock(52889.125),
+        settings=JournalSettings(group=0.001, compress=first % 2 == 1),
+    )
     free, out = threading.Semaphore(AT_ONCE), threading.Lock()
     said(f"run {journal.run}")
     number = first

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 import pytest
 
 from catseye.coordinator.journal import writer as journal_module
+from catseye.coordinator.journal.protocol import NotDurable
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.coordinator.journal.writer import Journal
-from catseye.coordinator.parts import NotDurable
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.records.night.live import Happening
 from catseye.simulator.clock.world_clock import ManualClock
@@ -37,7 +37,7 @@ class Told:
 
 
 def opened(place, told, **more):
-    settings = {"run": scene_run(), "clock": ManualClock(START / 1e8), "patience": 0.05}
+    settings = {"run": scene_run(), "clock": ManualClock(START / 1e8), "settings": JournalSettings(patience=0.05)}
     return Journal.open(place, **{**settings, **more}, on_alarm=told.alarm, on_recovery=told.recovery)
 
 
@@ -162,7 +162,7 @@ def test_a_file_that_another_process_holds_is_waited_for(tmp_path, monkeypatch):
     """A person with a database tool: the writer says so after its patience, `durable` gives up, and all goes on."""
     monkeypatch.setattr(journal_module, "LONGEST_DURABLE", 0.2)
     told = Told()
-    with opened(tmp_path / "j.db", told, patience=0.05) as journal:
+    with opened(tmp_path / "j.db", told) as journal:
         journal.append().result(MOST_WAIT)
         other = sqlite3.connect(tmp_path / "j.db", isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")

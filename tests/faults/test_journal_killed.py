@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.simulator.clock.world_clock import ManualClock
 from draws import draws
 from journal_scene import MOST_WAIT, PostgresServer, plainly, scene_answer, scene_run
@@ -108,8 +108,7 @@ def server_killed(server, name, times, seed):
         url,
         run=scene_run(),
         clock=ManualClock(52889.125),
-        group=0.001,
-        patience=MOST_WAIT,
+        settings=JournalSettings(group=0.001, patience=MOST_WAIT),
         on_alarm=lambda text: told.append(("alarm", text)),
         on_recovery=lambda text: told.append(("back", text)),
     )
@@ -163,7 +162,11 @@ def test_a_killed_backend_costs_nothing(server):
     url = server.database("backend")
     told = []
     with Journal.open(
-        url, run=scene_run(), clock=ManualClock(52889.125), patience=MOST_WAIT, on_alarm=told.append
+        url,
+        run=scene_run(),
+        clock=ManualClock(52889.125),
+        settings=JournalSettings(patience=MOST_WAIT),
+        on_alarm=told.append,
     ) as journal:
         for k in range(3):
             journal.append(scene_answer(2 * k)).result(MOST_WAIT)

@@ -14,7 +14,8 @@ from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.journal.entries import AnsweredShot, Run
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
-from catseye.coordinator.ziy import Coordinator
+from catseye.coordinator.parts import Environment
+from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.reduction.live.live import Live
 from catseye.service.solver import SolverProcess
 from catseye.service.warm import initialising_commands
@@ -34,15 +35,13 @@ async def once_a_second(child, site, place, seconds):
     ziy = Coordinator(
         site,
         addresses=child.addresses,
-        live=live,
-        planner=EverySecond(site, live, seconds=round(ROUND)),
-        guard=SafetyGuard(site),
-        journal=journal,
-        clock=child.clock,
+        parts=CoordinatorParts(
+            live, EverySecond(site, live, seconds=round(ROUND)), SafetyGuard(site), journal, solver.solve
+        ),
+        environment=Environment(child.clock),
         feed=child.feed,
         mode="hold",
         commands=initialising_commands(site),
-        solver=solver.solve,
     )
     ziy.listeners.append(lambda entry: acknowledged.extend(told(entry)))
     task = asyncio.create_task(ziy.run())

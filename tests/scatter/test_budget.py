@@ -17,7 +17,7 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import places_of
 from catseye.simulator.night.air import AirConditions
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
 DRAWS = 100_000  # a u from so many is good to 0.22 %
 AGREED = 0.02  # the issue's
@@ -218,7 +218,7 @@ def any_night(seed):
         pressure_hpa=rng.uniform(910.0, 950.0),
     )
     azimuth, elevation = rng.uniform(0.0, 360.0), rng.uniform(10.0, 85.0)
-    return simulate_night(seed, azimuth_deg=azimuth, elevation_deg=elevation, conditions=conditions)
+    return simulate_night(seed, telescope=SimulatedTelescope(azimuth, elevation), conditions=conditions)
 
 
 def squares_of_night(seed, directory, count=12):

@@ -11,7 +11,7 @@ from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.air import AirConditions
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
 SIX = range(2101, 2107)
 MANY = range(2201, 2265)
@@ -29,7 +29,7 @@ def any_night(seed):
         pressure_hpa=rng.uniform(910.0, 950.0),
     )
     azimuth, elevation = rng.uniform(0.0, 360.0), rng.uniform(10.0, 85.0)
-    return simulate_night(seed, azimuth_deg=azimuth, elevation_deg=elevation, conditions=conditions)
+    return simulate_night(seed, telescope=SimulatedTelescope(azimuth, elevation), conditions=conditions)
 
 
 def kind_of(name, campaign):

@@ -20,7 +20,7 @@ def shots(world, seconds):
 
 
 def solution(world, x, covariance, *, at=5.0, number=1, names=NAMES, count=3, pose=None):
-    told = world.told(world.ticks(at))
+    told = world.live_posture(world.ticks(at))
     answer = {
         "number": number,
         "ticks": world.ticks(at),

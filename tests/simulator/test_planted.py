@@ -10,7 +10,7 @@ from catseye.simulator.night.air import SUMMER_DAY, WINTER
 from catseye.simulator.night.faults import EFFECTS, Faults, Planted
 from catseye.simulator.night.schedule import Schedule
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
 
 def changed_shots(night, other):
@@ -61,18 +61,18 @@ def test_without_obliquity_only_prisms_change(night):
     assert all(name.startswith("DP") or name[-2:] in ("-L", "-R") for name in changed)
 
 
-SMALL = {"dish_prisms": 12, "triplets": 4}
+SMALL = SimulatedTelescope(dish_prisms=12, triplets=4)
 
 
 @pytest.fixture(scope="module")
 def small_night():
     """A night of some prisms and triplets: every effect has something to act on."""
-    return simulate_night(11, **SMALL)
+    return simulate_night(11, telescope=SMALL)
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_each_effect_can_be_left_out_and_it_matters(small_night, effect):
-    night, other = small_night, simulate_night(11, **SMALL, planted=Planted(ignore=[effect]))
+    night, other = small_night, simulate_night(11, telescope=SMALL, planted=Planted(ignore=[effect]))
     same_words = [(s.ranger, s.target, s.seconds) for s in night.shots] == [
         (s.ranger, s.target, s.seconds) for s in other.shots
     ]
@@ -108,7 +108,7 @@ def test_a_lying_thermometer_and_a_wrong_position_change_the_words_only(night):
 @pytest.mark.parametrize("elevation", [5.0, 10.0, 45.0, 85.0])
 @pytest.mark.parametrize("azimuth", [0.0, 237.0])
 def test_any_posture_makes_a_night(azimuth, elevation):
-    night = simulate_night(20, azimuth_deg=azimuth, elevation_deg=elevation)
+    night = simulate_night(20, telescope=SimulatedTelescope(azimuth, elevation))
     assert 700 < len(night.shots) < 800
     balls = {s.target for s in night.shots if s.target.endswith("-B")}
     assert len(balls) >= 8  # near the horizon the upper rim looks away from the ground
@@ -130,17 +130,19 @@ def test_any_weather_makes_a_night(conditions, refractivity):
 
 
 def test_small_and_large_networks_are_made_too():
-    small = simulate_night(22, dish_prisms=0, triplets=0)
+    small = simulate_night(22, telescope=SimulatedTelescope(dish_prisms=0, triplets=0))
     assert small.truth.paraboloid is None
     assert not any(s.target.startswith(("DP", "TR")) for s in small.shots)
-    large = simulate_night(22, dish_prisms=90, triplets=12, schedule=Schedule(interval_s=10.0))
+    large = simulate_night(
+        22, telescope=SimulatedTelescope(dish_prisms=90, triplets=12), schedule=Schedule(interval_s=10.0)
+    )
     assert large.truth.paraboloid is not None
     assert {f"TR{i:02d}" for i in range(1, 13)} == {t.name for t in large.telescope.triplets}
 
 
 def test_what_cannot_be_is_refused_in_one_line():
     with pytest.raises(ValidityError, match="elevation 3 deg is outside"):
-        simulate_night(1, elevation_deg=3)
+        SimulatedTelescope(elevation_deg=3)
     with pytest.raises(InputError, match="unknown effect 'gravity'"):
         Planted(ignore={"gravity"})
     with pytest.raises(InputError, match="no such point"):

@@ -9,7 +9,7 @@ from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.air import SUMMER_DAY, WINTER
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
 SEED = 815
 WORDS = re.compile(r"\b(ZY|ZP|TR|DP|ZBM|ZEG|ZAG|WX)(\d+[A-Z]*)\b")
@@ -32,7 +32,7 @@ def renamed(text):
 
 @pytest.fixture(scope="module")
 def summer(tmp_path_factory):
-    night = simulate_night(SEED, azimuth_deg=12.0, elevation_deg=71.0, conditions=SUMMER_DAY)
+    night = simulate_night(SEED, telescope=SimulatedTelescope(12.0, 71.0), conditions=SUMMER_DAY)
     directory = write_night(night, tmp_path_factory.mktemp("summer") / "night")
     return night, directory, reduce_epoch(read_campaign(directory))
 
@@ -78,7 +78,7 @@ def test_nothing_depends_on_names(summer, tmp_path):
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(200.0, 90.0), (359.9, 6.0)], ids=["zenith", "near the horizon"])
 def test_extreme_postures_reduce_as_well(written, azimuth, elevation):
-    night = simulate_night(SEED + 1, azimuth_deg=azimuth, elevation_deg=elevation, conditions=WINTER)
+    night = simulate_night(SEED + 1, telescope=SimulatedTelescope(azimuth, elevation), conditions=WINTER)
     reduction = reduce_epoch(written(night))
     good(night, reduction)
     axis = np.array(reduction.surface.pose()["axis"])

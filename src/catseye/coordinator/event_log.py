@@ -48,12 +48,12 @@ class EventLog:
         details   for programs; `unsaid` counts those of the same kind that were kept back before
         """
         now = ticks_now(self._clock)
-        said = self._said.get((kind, about))
-        if said is not None and not always and 0 <= now - said.ticks < self._quiet:
-            said.unsaid += 1
+        before = self._said.get((kind, about))
+        if before is not None and not always and 0 <= now - before.ticks < self._quiet:
+            before.unsaid += 1
             return
-        if said is not None and said.unsaid:
-            details["unsaid"] = float(said.unsaid)
+        if before is not None and before.unsaid:
+            details["unsaid"] = float(before.unsaid)
         self._said.pop((kind, about), None)
         self._said[kind, about] = _Said(now)
         if len(self._said) > MOST_KINDS:

@@ -17,14 +17,13 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.event_log import EventLog
-from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Environment, Tell, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import Reply
@@ -63,20 +62,19 @@ class FeedClient:
         host: str,
         port: int,
         *,
-        clock: Clock,
+        environment: Environment,
         tell: Tell,
         weather: Callable[[LiveWeather], None],
         posture: Callable[[LivePosture], None],
         stations: tuple[str, ...] = (),
         settings: FeedSettings | None = None,
-        seed: int = 0,
-        network: Any = None,
     ):
         self.host, self.port, self._settings = host, port, settings or FeedSettings()
+        clock = environment.clock
         self._clock, self._weather, self._posture = clock, weather, posture
         self._tell, self._event_log = tell, EventLog("feed", clock, tell)
-        self._rng = random.Random(f"{seed} feed")
-        self._network = {} if network is None else {"network": network}
+        self._rng = random.Random(f"{environment.seed} feed")
+        self._network = environment.network
         self._stations = {name: EventLog(name, clock, tell) for name in stations}
         self._telescope = EventLog("telescope", clock, tell)
         self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
@@ -104,7 +102,7 @@ class FeedClient:
                             self.port,
                             heard=self.hear,
                             clock=asyncio.get_running_loop().time,
-                            **self._network,
+                            network=self._network,
                         )
                 except InputError as problem:
                     why = str(problem).replace("no ranger", "no feed")
@@ -245,7 +243,7 @@ class MotionScript:
 
     @staticmethod
     def of_table(table: str, name: str) -> "MotionScript":
-        """From the text of a table. Raises InputError with its line."""
+        """The motion that a table's text tells. Raises InputError with its line."""
         rows = list(csv.reader(io.StringIO(table)))
         if not rows or tuple(word.strip() for word in rows[0]) != COLUMNS:
             raise InputError(f"{name} line 1: expected {','.join(COLUMNS)}")

@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -143,7 +142,7 @@ class Firing:
         idle = (busy is None or busy.done()) and link.ready
         return idle and ranger not in self.dropped and not self.suspensions.resting(ranger, "", now)
 
-    def _start(self, ranger: str, work: Coroutine[Any, Any, None]) -> None:
+    def _start(self, ranger: str, work: Coroutine[object, None, None]) -> None:
         task = asyncio.get_running_loop().create_task(work, name=f"shots {ranger}")
         task.add_done_callback(self._ended)
         self._tasks[ranger] = task
@@ -170,7 +169,7 @@ class Firing:
                 return
 
     async def _stream(self, ranger: str, target: str, late: float) -> None:
-        """One target again and again, first in so many s."""
+        """Measure one target again and again, first in so many s."""
         await asyncio.sleep(late)
         while self.streams.get(ranger) == target and self._may_go_on(ranger):
             try:

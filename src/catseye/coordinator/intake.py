@@ -10,21 +10,21 @@ from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from catseye.coordinator.event_log import EventLog
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution, SentCommand
-from catseye.coordinator.parts import JournalWriter, NotDurable
+from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Entry, EpochSolution, SentCommand
+from catseye.coordinator.journal.protocol import JournalWriter, NotDurable
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.reduction.epoch.reason import ShotStatus
-from catseye.reduction.live.live import EpochJob, Live
+from catseye.reduction.live.epoch import Epoch
+from catseye.reduction.live.live import EpochAnswer, EpochJob, Live
 
 TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
 RETRY = 0.5  # s between two looks whether the journal is back
 MOST_HELD = 2000  # happenings kept while the journal is away
-Solver = Callable[[EpochJob], Awaitable[Any]]
-Entry = Any  # AnsweredShot | LiveWeather | LivePosture | Happening | Solution | ...
+Solver = Callable[[EpochJob], Awaitable[Epoch | str]]  # the epoch, or why there is none
+Incoming = LiveShot | LiveWeather | LivePosture | Happening | SentCommand
 
 
 class Intake:
@@ -32,7 +32,7 @@ class Intake:
 
     judged     called with each shot and what the reduction said of it, at once
     publish    called with each entry when it is durable
-    event_log     says what goes wrong with the journal; that itself is journalled when it can be
+    event_log  says what goes wrong with the journal; that itself is journalled when it can be
     doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
     solver     solves an epoch beside the loop; None: in a thread
 
@@ -54,7 +54,7 @@ class Intake:
         self.broken: asyncio.Future[None] | None = None
         self._live, self._journal, self._event_log = live, journal, event_log
         self._judged, self._publish, self._doubted = judged, publish, doubted
-        self._arrived: list[Entry] = []
+        self._arrived: list[Incoming] = []
         self._timer: asyncio.TimerHandle | None = None
         self._last: dict[str, int] = {}  # stamp of each ranger's last shot
         self._held: deque[tuple[Entry, ...]] = deque()  # given to the reduction, and not yet taken by the journal
@@ -70,8 +70,8 @@ class Intake:
             return self._journal.trouble
         return "what was measured is not durable yet" if self._held or self._late else None
 
-    def take(self, item: LiveShot | LiveWeather | LivePosture | Happening | SentCommand) -> None:
-        """Something has come; what comes within 2 ms is handled together."""
+    def take(self, item: Incoming) -> None:
+        """Something has come; what comes within `TOGETHER` is handled together."""
         if self.trouble is not None:
             self._see_to_journal()
             if isinstance(item, LiveWeather | LivePosture) or (
@@ -103,7 +103,7 @@ class Intake:
             if entries:
                 self._write(tuple(entries))
 
-    async def solve(self, ticks: int) -> Any | None:
+    async def solve(self, ticks: int) -> EpochAnswer | None:
         """An epoch of all shots since the last, solved beside the loop; None where there is none.
 
         The journal has both instants, when its shots were taken out and when its answer was taken in: shots that are
@@ -119,17 +119,17 @@ class Intake:
         self._fresh, self._solving = 0, True
         self._write((Document(ticks, EPOCH_BEGUN, ""),))
         try:
-            found = await self._solver(job)
+            epoch = await self._solver(job)
         finally:
             self._solving = False
         self.flush()
-        answer = self._live.take_in(job, found)
+        answer = self._live.take_in(job, epoch)
         self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
             self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
         return answer
 
-    def _fed(self, item: Any) -> Entry | None:
+    def _fed(self, item: Incoming) -> Entry | None:
         """The reduction has it now; what the journal is to have."""
         if isinstance(item, LiveWeather):
             self._doubted(item, self._live.weather(item) or "")
@@ -172,7 +172,7 @@ class Intake:
             loop = asyncio.get_running_loop()
             future.add_done_callback(partial(_later, loop, partial(self._settled, entries)))
 
-    def _settled(self, entries: tuple[Entry, ...], done: "Future[Any]") -> None:
+    def _settled(self, entries: tuple[Entry, ...], done: "Future[int]") -> None:
         """The journal has made entries durable, or not."""
         problem = done.exception()
         if problem is None:
@@ -214,7 +214,7 @@ class Intake:
         loop = asyncio.get_running_loop()
         future.add_done_callback(partial(_later, loop, self._retried))
 
-    def _retried(self, done: "Future[Any]") -> None:
+    def _retried(self, done: "Future[int]") -> None:
         if done.exception() is not None or self._journal.trouble is not None:
             self._see_to_journal()
             return
@@ -226,11 +226,11 @@ class Intake:
             self._see_to_journal()
 
 
-async def _in_a_thread(job: EpochJob) -> Any:
+async def _in_a_thread(job: EpochJob) -> Epoch | str:
     return await asyncio.get_running_loop().run_in_executor(None, job.solve)
 
 
-def _later(loop: asyncio.AbstractEventLoop, call: Callable[..., None], *given: Any) -> None:
-    """From the journal's thread into the loop, which may be closed by now."""
+def _later(loop: asyncio.AbstractEventLoop, call: Callable[["Future[int]"], None], done: "Future[int]") -> None:
+    """Call from the journal's thread into the loop, which may be closed by now."""
     if not loop.is_closed():
-        loop.call_soon_threadsafe(call, *given)
+        loop.call_soon_threadsafe(call, done)

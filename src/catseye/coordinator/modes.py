@@ -41,7 +41,7 @@ class Suspensions:
         self._records: dict[tuple[str, str], _Record] = {}
 
     def failed(self, ranger: str, target: str, now_ticks: int) -> float | None:
-        """One more failure; s of rest where it begins now."""
+        """Count a failure; s of rest where it begins now."""
         record = self._records.setdefault((ranger, target), _Record())
         record.failures += 1
         if record.failures < PATIENCE or now_ticks < record.until:

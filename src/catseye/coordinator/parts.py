@@ -1,15 +1,15 @@
 """What the coordinator's parts hand to each other, and what it needs of those that others write."""
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import SECONDS_PER_DAY
-from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request
+from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture
 from catseye.simulator.clock.world_clock import Clock
 
@@ -34,8 +34,8 @@ class PlannedShot:
     target: str
     begin_ticks: int
     duration: float
-    at_begin: NDArray[Any]
-    at_end: NDArray[Any]
+    at_begin: NDArray[np.float64]
+    at_end: NDArray[np.float64]
     fixed: bool
     reason: str
     via: tuple[tuple[float, float], ...] = ()
@@ -70,8 +70,8 @@ class SiteState:
     counts: dict[str, tuple[float, float]]
     suspended: frozenset[tuple[str, str]]
     since_reference: dict[str, float]
-    place: Callable[[str, ArrayLike], NDArray[Any]]
-    u: dict[str, NDArray[Any]]
+    place: Callable[[str, ArrayLike], NDArray[np.float64]]
+    u: dict[str, NDArray[np.float64]]
 
 
 class Planner(Protocol):
@@ -113,23 +113,21 @@ class RequestGuard(Protocol):
         ...
 
 
-class NotDurable(InputError):
-    """Entries that are not on the disk yet: they stay in line, and are written when that is possible."""
-
-
-class JournalWriter(Protocol):
-    """What was given is durable when its future is done, in the order given; a full queue raises InputError."""
-
-    @property
-    def trouble(self) -> str | None:
-        """Why nothing is durable at present; None where all is well."""
-        ...
-
-    def append(self, *items: Any) -> "Future[Any]": ...
-    def close(self) -> None: ...
-
-
 Tell = Callable[[Happening], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """Time, network and chance of a coordinator: the world's, or a test's.
+
+    clock     UTC
+    network   where connections are made; None: TCP
+    seed      of the jitter of waits
+    """
+
+    clock: Clock
+    network: ConnectionMaker | None = None
+    seed: int = 0
 
 
 def ticks_now(clock: Clock) -> int:

@@ -5,24 +5,25 @@ planned and begun, and then the epoch is solved while the mirrors turn.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
 from catseye.coordinator.guard.watchdog import BeamWatchdog
-from catseye.coordinator.intake import Entry, Intake, Solver
+from catseye.coordinator.intake import Intake, Solver
+from catseye.coordinator.journal.entries import Entry
+from catseye.coordinator.journal.protocol import JournalWriter
 from catseye.coordinator.link.decode import measurement_of, shot_of
-from catseye.coordinator.link.ranger import RangerLink
+from catseye.coordinator.link.preparation import Preparation
+from catseye.coordinator.link.ranger import LinkListeners, RangerLink
 from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.modes import Mode
 from catseye.coordinator.parts import (
     TICKS_PER_SECOND,
-    Clock,
-    JournalWriter,
+    Environment,
     Planner,
     RequestGuard,
     Round,
@@ -34,7 +35,7 @@ from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.live.live import Live
+from catseye.reduction.live.live import EpochAnswer, Live
 
 WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 
@@ -48,6 +49,7 @@ class ZiySettings:
     epoch_every     between two epochs where no round is planned: streams alone, passive mode
     grace           past a round's end, for shots under way, before the next is planned without their rangers
     leave           for lasers to be switched off at the end
+    links, feed     of the connections to rangers and feed
     """
 
     posture_every: float = 0.1
@@ -55,6 +57,26 @@ class ZiySettings:
     epoch_every: float = 10.0
     grace: float = 0.4
     leave: float = 3.0
+    links: LinkSettings = field(default_factory=LinkSettings)
+    feed: FeedSettings = field(default_factory=FeedSettings)
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinatorParts:
+    """Who thinks, who refuses, who remembers.
+
+    live      the reduction
+    planner   chooses what is shot
+    guard     has the last word before each request
+    journal   keeps what happened
+    solver    solves epochs beside the loop; None: in a thread
+    """
+
+    live: Live
+    planner: Planner
+    guard: RequestGuard
+    journal: JournalWriter
+    solver: Solver | None = None
 
 
 class Coordinator:
@@ -63,7 +85,6 @@ class Coordinator:
     addresses     of the rangers
     feed          host and port of the site's feed, a script of a known motion, or None: no posture is ever known
     mode          active: plans and fires; passive: hears what another client has measured; hold: connected, no more
-    solver        solves epochs beside the loop; None: in a thread
     commands      what initialises a ranger; None: from the site's records
     """
 
@@ -72,87 +93,82 @@ class Coordinator:
         site: SiteFolder,
         *,
         addresses: Mapping[str, Address],
-        live: Live,
-        planner: Planner,
-        guard: RequestGuard,
-        journal: JournalWriter,
-        clock: Clock,
+        parts: CoordinatorParts,
+        environment: Environment,
         feed: tuple[str, int] | MotionScript | None = None,
         mode: Mode = "active",
         commands: Callable[[str], Sequence[Request]] | None = None,
         settings: ZiySettings | None = None,
-        links: LinkSettings | None = None,
-        feeds: FeedSettings | None = None,
-        seed: int = 0,
-        network: Any = None,
-        solver: Solver | None = None,
     ):
-        self.site, self.clock, self.mode, self.settings = site, clock, mode, settings or ZiySettings()
-        self._live, self._planner, self._journal = live, planner, journal
-        self._guard = guard
+        self.site, self.mode, self.settings = site, mode, settings or ZiySettings()
+        self.clock = clock = environment.clock
+        self._live, self._planner, self._guard, self._journal = parts.live, parts.planner, parts.guard, parts.journal
         self.listeners: list[Callable[[Entry], None]] = []
         self._event_log = EventLog("coordinator", clock, self._happened)
         self._stations: dict[str, EventLog] = {}
         self.intake = Intake(
-            live,
-            journal,
+            parts.live,
+            parts.journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
             event_log=EventLog("journal", clock, self._happened),
             doubted=self._doubted,
-            solver=solver,
+            solver=parts.solver,
         )
-        asked = commands or (lambda ranger: commands_of_ranger(site, ranger))
-        later = [t.name for t in site.targets.values() if t.type == "prism" and t.frame == "reflector"]
-        self.links = {
-            name: RangerLink(
-                name,
-                address,
-                commands=asked(name),
-                later=later,
-                guard=guard,
-                clock=clock,
-                tell=self._happened,
-                wanted=WANTED[mode],
-                heard=self._overheard,
-                commanded=self.intake.take,
-                settings=links,
-                seed=seed,
-                network=network,
-            )
-            for name, address in sorted(addresses.items())
-        }
+        self.links = self._linked(addresses, commands, environment)
         self.firing = Firing(
             site,
             self.links,
             intake=self.intake,
-            live=live,
+            live=parts.live,
             event_log=self._event_log,
             clock=clock,
             allowed=lambda: self.mode == "active" and self.intake.trouble is None,
             telescope_known=lambda: self.telescope_known,
         )
         self._script = feed if isinstance(feed, MotionScript) else None
-        self.feed = (
-            FeedClient(
-                *feed,
-                clock=clock,
-                tell=self._happened,
-                weather=self.intake.take,
-                posture=self._posed,
-                stations=tuple(station.name for station in site.site.weather_station),
-                settings=feeds,
-                seed=seed,
-                network=network,
-            )
-            if isinstance(feed, tuple)
-            else None
-        )
+        self.feed = self._listening(*feed, environment) if isinstance(feed, tuple) else None
         self.posture: LivePosture | None = None
         self.round_number = 0
-        self.answer: Any = None
+        self.answer: EpochAnswer | None = None
         self._solving: asyncio.Task[None] | None = None
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def _linked(
+        self,
+        addresses: Mapping[str, Address],
+        commands: Callable[[str], Sequence[Request]] | None,
+        environment: Environment,
+    ) -> dict[str, RangerLink]:
+        """A link to each ranger; of the dish's thousand prisms it is told before their first shots only."""
+        asked = commands or (lambda ranger: commands_of_ranger(self.site, ranger))
+        later = [t.name for t in self.site.targets.values() if t.type == "prism" and t.frame == "reflector"]
+        return {
+            name: RangerLink(
+                name,
+                address,
+                preparation=Preparation.of(asked(name), later),
+                guard=self._guard,
+                environment=environment,
+                listeners=LinkListeners(self._happened, self._overheard, self.intake.take),
+                wanted=WANTED[self.mode],
+                settings=self.settings.links,
+            )
+            for name, address in sorted(addresses.items())
+        }
+
+    def _listening(self, host: str, port: int, environment: Environment) -> FeedClient:
+        """A client of the site's feed."""
+        return FeedClient(
+            host,
+            port,
+            environment=environment,
+            tell=self._happened,
+            weather=self.intake.take,
+            posture=self._posed,
+            stations=tuple(station.name for station in self.site.site.weather_station),
+            settings=self.settings.feed,
+        )
 
     # Life -----------------------------------------------------------------------------------------------------------
 
@@ -180,7 +196,7 @@ class Coordinator:
         finally:
             await self._end()
 
-    def _spawn(self, work: Any, name: str) -> asyncio.Task[Any]:
+    def _spawn(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         task = asyncio.get_running_loop().create_task(work, name=name)
         self._tasks.add(task)
         return task
@@ -286,8 +302,12 @@ class Coordinator:
         if self.mode != "passive" or reply.ok is not True:
             return
         try:
-            found = measurement_of(reply)
-            self.intake.take(shot_of(link.ranger, link.names.get(found.cube, found.name), found, None, link.sampling))
+            measurement = measurement_of(reply)
+            self.intake.take(
+                shot_of(
+                    link.ranger, link.names.get(measurement.cube, measurement.name), measurement, None, link.sampling
+                )
+            )
         except InputError as problem:
             self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 

@@ -72,9 +72,9 @@ class ZyClient(asyncio.Protocol):
 
         Raises InputError where nobody listens there.
         """
-        made = partial(cls, first_tid=first_tid, heard=heard, clock=clock)
+        factory = partial(cls, first_tid=first_tid, heard=heard, clock=clock)
         try:
-            return await (network or Sockets()).connect(made, host, port)
+            return await (network or Sockets()).connect(factory, host, port)
         except OSError as problem:
             raise InputError(f"no ranger answers at {host} port {port}: {problem.strerror or problem}") from problem
 
@@ -174,8 +174,8 @@ class ZyClient(asyncio.Protocol):
 
     def _answer(self, reply: Reply) -> None:
         command, future, then = self._outstanding.get(reply.tid, ("", None, None))
-        mine = reply.command in (command, "UNKNOWN") or (command == "STM" and reply.command in STREAMED)
-        if future is None or not mine:
+        expected = reply.command in (command, "UNKNOWN") or (command == "STM" and reply.command in STREAMED)
+        if future is None or not expected:
             if self._heard is not None:
                 self._heard(reply)
             return

@@ -92,7 +92,7 @@ class Cubes:
         self._counts = {0: self._counts[0]}
 
     def set_geometry(self, name: str, values: tuple[float, ...]) -> None:
-        """One of `GEOMETRY`; every encoder value but ZRG's is dropped."""
+        """Set one of `GEOMETRY`; every encoder value but ZRG's is dropped."""
         self.geometry[name] = values
         self._station = None
         self._counts = {0: self._counts[0]}
@@ -145,8 +145,8 @@ class Cubes:
         if None in kept:
             if cube.number == 0:
                 raise InputError("encoder values of ZRG are not set (expected AZM 0, e and ELV 0, e first)")
-            found = self.look(cube.place_mm)
-            kept[:] = [old if old is not None else new for old, new in zip(kept, found.tolist(), strict=True)]
+            looked = self.look(cube.place_mm)
+            kept[:] = [old if old is not None else new for old, new in zip(kept, looked.tolist(), strict=True)]
         return float(kept[0] or 0.0), float(kept[1] or 0.0)
 
     def set_counts(self, cube: Cube, axis: int, value: float) -> None:
@@ -167,8 +167,8 @@ class Cubes:
         Raises InputError: neither is allowed. Source: [PARKER04] eq. 2.12 to 2.26, section 2.4.
         """
         self.computed += 1
-        found = aim(self.station, np.array(place_mm) * MILLIMETRE)
-        direct = np.array([found.azimuth_counts, found.elevation_counts])
+        pointing = aim(self.station, np.array(place_mm) * MILLIMETRE)
+        direct = np.array([pointing.azimuth_counts, pointing.elevation_counts])
         prime = np.array(prime_counts(direct[0], direct[1], self.station.zeros[1]))
         taken = choice(direct, prime, low=self.limits[0], high=self.limits[1], current=current)
         if not taken.allowed:

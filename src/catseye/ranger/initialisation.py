@@ -109,16 +109,16 @@ def cubes_commands(
     numbers, places = cube_numbers(site), places or places_of(site)
     at = _in_own_frame(site, ranger, places)
     certified = {b.target: b.certified_distance_mm for b in site.benchmarks if b.ranger == ranger}
-    told = [_command("INI", len(numbers) - 1)]
+    commands = [_command("INI", len(numbers) - 1)]
     for name in sorted(at) if targets is None else [t for t in targets if t not in (REFERENCE, ranger)]:
         if name not in at:
             raise InputError(f"target {name} is not at this site (expected one of its {len(at)} targets)")
-        told.append(_command("COO", numbers[name], *(f"{v:.3f}" for v in at[name]), name))
+        commands.append(_command("COO", numbers[name], *(f"{v:.3f}" for v in at[name]), name))
         if name in certified:
-            told.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
+            commands.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
         elif places[name].constant != 0.0:
-            told.append(_command("KND", numbers[name], "S", f"{places[name].constant / MILLIMETRE:.4f}"))
-    return told
+            commands.append(_command("KND", numbers[name], "S", f"{places[name].constant / MILLIMETRE:.4f}"))
+    return commands
 
 
 def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
@@ -198,12 +198,12 @@ def _motion(mirror: Mirror, axis: int) -> list[Request]:
 
 
 def _feed_arm_record(site: SiteFolder, ranger: str) -> FeedArmRanger:
-    found = next((record for record in site.feedarm.ranger if record.name == ranger), None)
-    if found is None:
+    ranger_record = next((record for record in site.feedarm.ranger if record.name == ranger), None)
+    if ranger_record is None:
         raise InputError(
             f"{ranger} is no ranger of {site.site.campaign.name} (expected one of {', '.join(site.rangers)})"
         )
-    return found
+    return ranger_record
 
 
 def _command(name: str, *values: object) -> Request:

@@ -227,15 +227,15 @@ def commands_of_file(text: str, name: str) -> list[tuple[int, Request]]:
     >>> commands_of_file("; cubes\\nINI 40 ; places\\n\\nD0 181.2\\n", "CUBES.INI")[1]
     (4, Request(command='D0', parameters=('181.2',), tid=0, ticks=None))
     """
-    found = []
+    commands = []
     for number, line in enumerate(text.splitlines(), 1):
         try:
             request = parse_request(line.partition(";")[0].strip())
         except InputError as problem:
             raise InputError(f"{name} line {number}: {problem}") from problem
         if request is not None:
-            found.append((number, request))
-    return found
+            commands.append((number, request))
+    return commands
 
 
 def next_tid(tid: int) -> int:

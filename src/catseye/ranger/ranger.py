@@ -70,12 +70,12 @@ class Ranger(RangerState):
 
     def greeting(self, port: int) -> list[Outgoing]:
         """What a new connection hears: HELLO, CONNECT, STW."""
-        told = [
+        greetings = [
             Reply("HELLO", None, (f"This is {self.name} ver. {VERSION}",)),
             Reply("CONNECT", True, (str(port),)),
             Reply("STW", True, (word_text(self.status()),)),
         ]
-        return [Outgoing(replace(reply, ticks=self.now_ticks())) for reply in told]
+        return [Outgoing(replace(reply, ticks=self.now_ticks())) for reply in greetings]
 
     def receive(self, client: int, line: str) -> list[Outgoing]:
         """A line of a connection: queued, or refused at once; an empty one asks nothing."""
@@ -99,25 +99,25 @@ class Ranger(RangerState):
 
     def turn(self) -> list[Outgoing]:
         """One pass of the loop; what is to be sent."""
-        told: list[Outgoing] = []
+        outgoing: list[Outgoing] = []
         if self._running is None and self._waiting:
-            told += self._begin(*self._waiting.popleft())
+            outgoing += self._begin(*self._waiting.popleft())
         elif self._running is not None:
-            told += self._go_on()
+            outgoing += self._go_on()
         if self._running is None and not self.scanning and self.scheduler.entries:
             entry = self.scheduler.take(self.now_ns())
             if entry is not None:
-                told += self._begin(entry.client, replace(entry.request, ticks=None))
-        told += self._scan_step()
-        told += self._stream_step()
-        told += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
-        told += self._updates()
+                outgoing += self._begin(entry.client, replace(entry.request, ticks=None))
+        outgoing += self._scan_step()
+        outgoing += self._stream_step()
+        outgoing += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
+        outgoing += self._updates()
         word = self.status()
         if word != self._word:
             if self._word is not None:
-                told.append(Outgoing(self._reply(Request("STW"), True, (word_text(word),))))
+                outgoing.append(Outgoing(self._reply(Request("STW"), True, (word_text(word),))))
             self._word = word
-        return told
+        return outgoing
 
     def rest(self, *, heard: bool = True) -> float:
         """How long, s, nothing can be due if no line comes.
@@ -185,24 +185,24 @@ class Ranger(RangerState):
         if self._running is None:
             return []
         client, request, work = self._running
-        told: list[Outgoing] = []
+        outgoing: list[Outgoing] = []
         for _ in range(REPLIES_A_TURN):
             try:
                 values = next(work)
             except StopIteration as end:
                 self._running = None
-                return told if end.value is None else [*told, self._answer(client, request, end.value)]
+                return outgoing if end.value is None else [*outgoing, self._answer(client, request, end.value)]
             except CatseyeError as problem:
                 self._running = None
-                return [*told, self._refused(request, str(problem))]
+                return [*outgoing, self._refused(request, str(problem))]
             if values is None or isinstance(values, int):
                 self._ask_at["command"] = values
-                return told
+                return outgoing
             if isinstance(values, Reply):  # of a command that this one runs
-                told.append(Outgoing(replace(values, tid=request.tid, ticks=self._stamp(values))))
+                outgoing.append(Outgoing(replace(values, tid=request.tid, ticks=self._stamp(values))))
             else:
-                told.append(self._answer(client, request, values))
-        return told
+                outgoing.append(self._answer(client, request, values))
+        return outgoing
 
     def _answer(self, client: int, request: Request, values: Values) -> Outgoing:
         private = request.command in ("BUF", "BYE")
@@ -241,14 +241,14 @@ class Ranger(RangerState):
             return []
         if self._stream_work is None:
             self._stream_work = stream_shots(self, self.stream)
-        told: list[Outgoing] = []
+        outgoing: list[Outgoing] = []
         for each in self._stream_work:
             if not isinstance(each, Outgoing):
                 self._ask_at["stream"] = each
-                return told
-            told.append(replace(each, reply=replace(each.reply, ticks=self._stamp(each.reply))))
+                return outgoing
+            outgoing.append(replace(each, reply=replace(each.reply, ticks=self._stamp(each.reply))))
         self.end_stream()
-        return told
+        return outgoing
 
     def _updates(self) -> list[Outgoing]:
         if not self.updates:
@@ -257,7 +257,7 @@ class Ranger(RangerState):
         if 0 < self._next_update - now <= UPDATE_NS:  # further off: the clock was set back
             return []
         self._next_update = now + UPDATE_NS
-        told = []
+        outgoing = []
         for name, *rest in WATCHED:
             request = Request(name, tuple(rest))
             try:
@@ -266,8 +266,8 @@ class Ranger(RangerState):
                 continue  # not known now: there is nothing to push
             if isinstance(values, tuple) and self._pushed.get((name, *rest)) != values:
                 self._pushed[name, *rest] = values
-                told.append(Outgoing(self._reply(request, True, values)))
-        return told
+                outgoing.append(Outgoing(self._reply(request, True, values)))
+        return outgoing
 
 
 def _plain(text: str) -> str:

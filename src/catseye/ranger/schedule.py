@@ -27,7 +27,7 @@ class Scheduler:
         self.entries: list[ScheduledCommand] = []
 
     def add(self, client: int, request: Request, due_ns: int, repeats: int = 1, interval: float = 0.0) -> None:
-        """One more; `interval` in s.
+        """Add a command; `interval` in s, between its repeats.
 
         Raises InputError: the connection has too many.
         """
@@ -36,7 +36,7 @@ class Scheduler:
         self.entries.append(ScheduledCommand(client, request, due_ns, repeats, round(interval * PER_SECOND)))
 
     def take(self, now_ns: int) -> ScheduledCommand | None:
-        """The next that is due, which goes to the back of the row; None where none is.
+        """The next command that is due, which goes to the back of the row; None where none is.
 
         A repeated command keeps its times: one that comes late does not move those after it.
         """
@@ -54,11 +54,11 @@ class Scheduler:
 
     @property
     def due_ns(self) -> int | None:
-        """When the next is due, nanoseconds since MJD 0; None without one."""
+        """When the next command is due, nanoseconds since MJD 0; None without one."""
         return min((e.due_ns for e in self.entries), default=None)
 
     def clear(self, client: int) -> int:
-        """Drop a connection's; how many they were."""
+        """Drop a connection's commands; how many they were."""
         before = len(self.entries)
         self.entries = [e for e in self.entries if e.client != client]
         return before - len(self.entries)

@@ -176,9 +176,9 @@ class ZyServer:
             for connection in list(self.connections.values()):
                 connection.write(b"\n")
 
-    def send(self, told: list[Outgoing]) -> None:
+    def send(self, outgoing: list[Outgoing]) -> None:
         """Give replies to those they are for."""
-        for out in told:
+        for out in outgoing:
             reply = out.reply
             if reply.command == "BYE" and reply.ok and out.client is not None:
                 reply = replace(reply, values=(str(self.ports[out.client]), *reply.values))

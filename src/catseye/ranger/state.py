@@ -194,14 +194,14 @@ class RangerState:
     def refuse_sun(self, end: ArrayLike, start: ArrayLike | None = None) -> None:
         """Raises InputError where a move, from here unless told, could look into the Sun; the status word says so."""
         if self.turning and not 0 <= self.now_ns() - self.sun_told_ns <= SUN_AGE * PER_SECOND:
-            said: str | None = (
+            reason: str | None = (
                 f"where the Sun is was not told for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
             )
         else:
-            said = refusal(self.cubes.station, self.here if start is None else start, end, self.suns())
-        self.sun_refused = said is not None
-        if said is not None:
-            raise InputError(said)
+            reason = refusal(self.cubes.station, self.here if start is None else start, end, self.suns())
+        self.sun_refused = reason is not None
+        if reason is not None:
+            raise InputError(reason)
 
     def work_of(self, client: int, request: Request) -> Values | Work:
         """What a command's handler gives.

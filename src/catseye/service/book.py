@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from catseye.coordinator.firing import GOOD
-from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, StoredAnswer
 from catseye.records.night.live import Happening, LivePosture
 from catseye.reduction.epoch.reason import status_of
 from catseye.service.comparison import EpochComparison, TwinComparison
@@ -55,7 +55,7 @@ class LiveBook:
         self.troubles = Troubles()
         self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, points, used, rejected
         self.comparisons: dict[int, EpochComparison] = {}
-        self.answer: dict[str, Any] = {}  # of the last epoch
+        self.answer: StoredAnswer = {}  # of the last epoch
 
     def entry(self, entry: Any) -> None:
         """Take in one entry of the journal."""
@@ -97,7 +97,12 @@ class LiveBook:
         self.answer = answer
         if compared is not None:
             self.comparisons[compared.number] = compared
-        counts = {key: len(answer.get(key, ())) for key in ("names", "used", "rejected")}
+        lists = {
+            "names": answer.get("names", ()),
+            "used": answer.get("used", ()),
+            "rejected": answer.get("rejected", ()),
+        }
+        counts = {key: len(each) for key, each in lists.items()}
         self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
         for reason in (answer.get("rejected") or {}).values():
             self.left_out[str(status_of(reason) or UNKNOWN)] += 1

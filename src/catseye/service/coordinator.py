@@ -16,13 +16,13 @@ from catseye.coordinator.clients.server import ZiyServer
 from catseye.coordinator.feed import MotionScript
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.journal.entries import Run
-from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.modes import Mode
-from catseye.coordinator.parts import Clock
+from catseye.coordinator.parts import Clock, Environment
 from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
 from catseye.coordinator.visibility.surroundings import KeepClear
-from catseye.coordinator.ziy import Coordinator
+from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.network import ConnectionMaker
@@ -149,17 +149,17 @@ class LiveCoordinator:
         self.ziy = Coordinator(
             site,
             addresses=addresses,
-            live=self.live,
-            planner=self.planner,
-            guard=self.guard,
-            journal=self._journal,
-            clock=clock,
+            parts=CoordinatorParts(
+                self.live,
+                self.planner,
+                self.guard,
+                self._journal,
+                None if self._solver is None else self._solver.solve,
+            ),
+            environment=Environment(clock, network, seed or 0),
             feed=feed,
             mode=orders.mode,
             commands=initialising_commands(site),
-            seed=seed or 0,
-            network=network,
-            solver=None if self._solver is None else self._solver.solve,
         )
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
@@ -175,8 +175,7 @@ class LiveCoordinator:
             self.orders.journal,
             run=Run(self.site, settings=settings_object(self.settings), seed=seed),
             clock=clock,
-            group=0.0 if virtual else GROUP,
-            keep_buffers=self.orders.keep_buffers,
+            settings=JournalSettings(group=0.0 if virtual else GROUP, keep_buffers=self.orders.keep_buffers),
             on_alarm=lambda text: tell(text, True),
             on_recovery=lambda text: tell(text, False),
         )

@@ -9,7 +9,7 @@ from catseye.records.site.folder import SiteFolder
 from catseye.simulator.clock.world_clock import Clock, SystemClock
 from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.head import TwinHead
+from catseye.simulator.twin.head import HeadBuild, TwinHead
 from catseye.simulator.twin.mirror import MirrorTuning, travel_of
 from catseye.simulator.twin.motion import AxisMotion
 from catseye.simulator.twin.site import Twin
@@ -88,7 +88,7 @@ def twin_heads(twin: Twin, rangers: tuple[str, ...], clock: Clock) -> dict[str, 
         pace = pace_by(mirror)
         tuning = MirrorTuning(velocity=min(pace.velocity), acceleration=min(pace.acceleration))
         heads[name] = TwinHead(
-            name, twin, clock, seed=twin.seed, faults=twin.faults, tuning=tuning, travel=travel_of(mirror)
+            name, twin, clock, seed=twin.seed, faults=twin.faults, tuning=tuning, build=HeadBuild(travel_of(mirror))
         )
     return heads
 

@@ -11,7 +11,7 @@ import pytest
 
 from catseye.coordinator.journal import reader as journal_reader
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, plainly, scene_answer, scene_entries, scene_run
@@ -97,7 +97,7 @@ def test_a_killed_writers_journal_is_read_without_a_writer(tmp_path):
 
 
 def test_a_torn_file_gives_what_is_whole_and_then_one_line(tmp_path):
-    whole = written(tmp_path / "whole.db", scene_entries(400), keep_buffers=False)
+    whole = written(tmp_path / "whole.db", scene_entries(400), settings=JournalSettings(keep_buffers=False))
     size, told = whole.stat().st_size, []
     for part in (0.03, 0.2, 0.4, 0.6, 0.8, 0.97):
         torn = tmp_path / f"{part}.db"
@@ -116,7 +116,7 @@ def test_a_torn_file_gives_what_is_whole_and_then_one_line(tmp_path):
 
 def test_samples_that_changed_on_the_disk_are_told(tmp_path):
     path = written(tmp_path / "j.db", [scene_answer(k) for k in range(5)])
-    packed = written(tmp_path / "p.db", [scene_answer(k) for k in range(5)], compress=True)
+    packed = written(tmp_path / "p.db", [scene_answer(k) for k in range(5)], settings=JournalSettings(compress=True))
     for where in (path, packed):
         with sqlite3.connect(where) as connection:
             (blob,) = connection.execute("SELECT samples FROM buffers WHERE seq = 3").fetchone()

@@ -15,7 +15,7 @@ from sqlalchemy.exc import OperationalError
 
 from catseye.coordinator.journal.place import place_of, reading_engine
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.coordinator.journal.writer import MOST_WAITING, Journal
+from catseye.coordinator.journal.writer import MOST_WAITING, Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.records.night.live import Happening, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
@@ -64,7 +64,7 @@ def stored(place, run=None, **more):
 @pytest.mark.parametrize("compress", [False, True])
 def test_everything_comes_back_in_order_and_to_the_last_bit(place, compress):
     entries = scene_entries(40)
-    with opened(place, compress=compress) as journal:
+    with opened(place, settings=JournalSettings(compress=compress)) as journal:
         futures = [journal.append(entry) for entry in entries]
         assert [future.result(MOST_WAIT) for future in futures] == list(range(1, len(entries) + 1))
     found = stored(place)
@@ -146,7 +146,7 @@ def test_a_second_run_goes_into_the_same_journal(place):
 
 
 def test_samples_can_be_left_out(tmp_path):
-    with opened(tmp_path / "j.db", keep_buffers=False) as journal:
+    with opened(tmp_path / "j.db", settings=JournalSettings(keep_buffers=False)) as journal:
         journal.append(scene_shot(3)).result(MOST_WAIT)
     ((_, taken),) = stored(tmp_path / "j.db")
     assert (taken.shot.samples, taken.shot.amplitude, taken.shot.phase) == (None, 1.5, 0.30000000000000004)
@@ -196,7 +196,7 @@ def test_an_append_of_nothing_waits_for_all_before(tmp_path):
 def test_what_comes_together_is_committed_together(tmp_path):
     """150 appends at once in at most a few transactions, not 150: the group waits a second, or until it is full."""
     commits = []
-    with opened(tmp_path / "j.db", group=0.2, keep_buffers=False) as journal:
+    with opened(tmp_path / "j.db", settings=JournalSettings(group=0.2, keep_buffers=False)) as journal:
         event.listen(journal._engine, "commit", commits.append)
         wait([journal.append(scene_shot(k)) for k in range(150)], MOST_WAIT)
         together = len(commits)
@@ -223,7 +223,7 @@ def test_it_is_read_while_it_is_written(place):
 
 def test_a_shot_that_is_there_already_is_refused_and_costs_the_others_nothing(place):
     """The same ranger, time and target twice, in the middle of a group that is written at once."""
-    with opened(place, group=0.2) as journal:
+    with opened(place, settings=JournalSettings(group=0.2)) as journal:
         futures = [journal.append(scene_shot(k)) for k in range(5)]
         twice = journal.append(scene_shot(2, seed=1))
         futures += [journal.append(scene_shot(k)) for k in range(5, 10)]
@@ -246,7 +246,7 @@ def test_a_commit_whose_reply_was_lost_is_kept_once(place, monkeypatch):
 
     monkeypatch.setattr(Journal, "_store", losing)
     entries = scene_entries(10)
-    with opened(place, patience=MOST_WAIT) as journal:
+    with opened(place, settings=JournalSettings(patience=MOST_WAIT)) as journal:
         futures = [journal.append(entry) for entry in entries]
         assert [future.result(MOST_WAIT) for future in futures] == list(range(1, len(entries) + 1))
     assert len(lost) == 2
@@ -268,7 +268,7 @@ def test_what_no_journal_holds_is_refused_at_once(tmp_path):
 
 def test_a_full_line_refuses_and_recovers(tmp_path):
     """While another process holds the file, nothing is written; the line is bounded, and what it took is kept."""
-    with opened(tmp_path / "j.db", patience=MOST_WAIT) as journal:
+    with opened(tmp_path / "j.db", settings=JournalSettings(patience=MOST_WAIT)) as journal:
         other = sqlite3.connect(tmp_path / "j.db", isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")
         reads = [LiveWeather("WX1", START + k, 1.0, 2.0, 3.0) for k in range(1000)]

@@ -9,7 +9,7 @@ import pytest
 
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Run, SentCommand
 from catseye.coordinator.journal.reader import JournalReader
-from catseye.coordinator.journal.writer import Journal
+from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.export import FORMAT, TABLES, export_tables, stamp
@@ -323,7 +323,9 @@ def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_0
     """Every sample and reading of the example night; times to the half of a tick that a ZY's stamp has."""
     night, adc = night_01, night_01.site.adc
     shots = night.shots
-    with Journal.open(tmp_path / "j.db", run=Run(night), clock=ManualClock(52889.125), compress=True) as journal:
+    with Journal.open(
+        tmp_path / "j.db", run=Run(night), clock=ManualClock(52889.125), settings=JournalSettings(compress=True)
+    ) as journal:
         weather = zip(
             night.weather.mjd_utc,
             night.weather.station,

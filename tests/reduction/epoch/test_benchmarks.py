@@ -12,10 +12,10 @@ from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.faults import Faults
 from catseye.simulator.night.sheets import write_night
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import LineWarmth, SimulatedTelescope, simulate_night
 
 CLEAR = {"fraction_blocked": 0.0, "fraction_reflected": 0.0, "weak_ranger": None, "wrong_position_mm": 0.0}
-SMALL = {"dish_prisms": 8, "triplets": 3}
+SMALL = SimulatedTelescope(dish_prisms=8, triplets=3)
 LIE = 1.5  # °C
 POINT = "ZEG41040L"
 
@@ -23,7 +23,7 @@ POINT = "ZEG41040L"
 @pytest.fixture(scope="module")
 def lied(tmp_path_factory):
     """A night whose lower station reads 1.5 °C too high, its campaign, and the reduction of both kinds."""
-    night = simulate_night(21, faults=Faults(**CLEAR, lying_thermometer_c=LIE, lying_station="WX1"), **SMALL)
+    night = simulate_night(21, faults=Faults(**CLEAR, lying_thermometer_c=LIE, lying_station="WX1"), telescope=SMALL)
     campaign = read_campaign(write_night(night, tmp_path_factory.mktemp("lied") / "night"))
     without = dataclasses.replace(campaign, benchmarks=())
     return night, reduce_epoch(campaign), reduce_epoch(without)
@@ -87,7 +87,7 @@ def warmed(tmp_path_factory):
     root, made = tmp_path_factory.mktemp("warmed"), {}
     lines = {(f"ZY{k}", POINT): 4.0 for k in range(101, 112, 2)}
     for name, u in (("deaf", None), ("hearing", 0.1)):
-        night = simulate_night(7, faults=Faults(**CLEAR), warm_lines=lines, u_sound_c=u, **SMALL)
+        night = simulate_night(7, faults=Faults(**CLEAR), warmth=LineWarmth(lines, u), telescope=SMALL)
         made[name] = night, reduce_epoch(read_campaign(write_night(night, root / name)))
     return made
 
@@ -169,7 +169,7 @@ HEADER = "mjd_utc,ranger,target,temperature_c,u_temperature_c"
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
     """A small campaign's directory, to which files are added."""
-    night = simulate_night(22, faults=Faults(**CLEAR), dish_prisms=2, triplets=1)
+    night = simulate_night(22, faults=Faults(**CLEAR), telescope=SimulatedTelescope(dish_prisms=2, triplets=1))
     return write_night(night, tmp_path_factory.mktemp("sounded") / "night")
 
 

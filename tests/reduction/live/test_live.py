@@ -86,7 +86,7 @@ def test_two_lives_fed_alike_answer_alike_bit_for_bit_whatever_the_order_of_equa
         before.into(live)
         order = sorted(shots, key=lambda s: (s.ticks, -s.number if backwards else s.number))
         for s in np.arange(-1.0, 10.0, 0.1):
-            live.posture(night.world.told(night.world.ticks(s)))
+            live.posture(night.world.live_posture(night.world.ticks(s)))
         said = {s.number: live.shot(s) for s in order}
         answers.append((live.solve(night.ticks(0)), said))
     (a, said_a), (b, said_b) = answers
@@ -261,12 +261,12 @@ def test_the_uncertainty_of_one_range_is_the_scatter_of_many():
     squares = []
     for ranger, target in (("ZY102", None), ("ZY106", None), ("ZY110", None)):
         target = sights(world, 0.0, rangers=(ranger,))[ranger][0]
-        live.posture(world.told(world.ticks(0.0)))
+        live.posture(world.live_posture(world.ticks(0.0)))
         rows = []
         for k in range(60):
             if k % 10 == 0:
                 live.shot(world.shot(ranger, REFERENCE, 2.0 * k))
-            live.posture(world.told(world.ticks(2.0 * k + 1.0)))
+            live.posture(world.live_posture(world.ticks(2.0 * k + 1.0)))
             said = live.shot(world.shot(ranger, target, 2.0 * k + 1.0))
             rows.append((said.range_, said.u_range))
         found, u = np.array(rows).T

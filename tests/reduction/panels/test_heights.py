@@ -15,7 +15,7 @@ from catseye.reduction.panels.heights import conformity, meetings, reduce_panels
 from catseye.reduction.panels.job import verdicts
 from catseye.reduction.panels.maps import fitted_map
 from catseye.reduction.panels.model import panel_model, used_layout
-from catseye.simulator.laboratory.panels import Crew, screwed, solid_panels, taken
+from catseye.simulator.laboratory.panels import CornerTour, Crew, panel_readings, screwed, solid_panels
 from panel_scene import dish, patch, read, standing_by_chance, survey, tool
 
 
@@ -47,7 +47,7 @@ def test_without_noise_the_heights_are_those_of_the_solid_panels(tmp_path, sheet
     rng = np.random.default_rng(1)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = taken(solid, sheet, calm(rng), turns=(0, 1, 2, 3))
+    rows, stands = panel_readings(solid, sheet, calm(rng), CornerTour(turns=(0, 1, 2, 3)))
     found = reduce_panels(
         read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet, survey=survey(stands, 1e-7, rng)
     )
@@ -62,7 +62,7 @@ def test_forgetting_the_curvature_would_be_seen(tmp_path, sheet):
     rng = np.random.default_rng(2)
     layout = patch()
     solid = solid_panels(layout, rng, piston=0.0, slope=0.0, twist=0.0)
-    rows, stands = taken(solid, sheet, calm(rng), shafts=np.zeros(len(layout.corners)))
+    rows, stands = panel_readings(solid, sheet, calm(rng), shafts=np.zeros(len(layout.corners)))
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     model = panel_model(readings, layout, sheet)
     inside = np.isin(readings.corner[model.tips.row], np.flatnonzero(np.bincount(layout.quad.ravel()) == 4))
@@ -79,7 +79,7 @@ def test_the_answer_is_that_of_another_solver(tmp_path, sheet):
     rng = np.random.default_rng(3)
     layout = patch(("T20", "T21"), 1)
     solid = standing_by_chance(layout, sheet, rng)
-    rows, _ = taken(solid, sheet, Crew(rng))
+    rows, _ = panel_readings(solid, sheet, Crew(rng))
     found = reduce_panels(read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet)
     n = found.model.columns.size
     a, b = [], []
@@ -111,7 +111,7 @@ def test_the_tool_alone_leaves_shapes_of_the_surface_unseen(tmp_path, sheet):
     """
     rng = np.random.default_rng(4)
     layout = patch()
-    rows, _ = taken(standing_by_chance(layout, sheet, rng), sheet, Crew(rng))
+    rows, _ = panel_readings(standing_by_chance(layout, sheet, rng), sheet, Crew(rng))
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     model = panel_model(readings, layout, sheet)
     known = [g for g in model.groups if g.name.startswith("readings") or g.name == "warps"]
@@ -132,7 +132,7 @@ def test_a_survey_makes_the_whole_surface_known(tmp_path, sheet):
     rng = np.random.default_rng(5)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = taken(solid, sheet, Crew(rng))
+    rows, stands = panel_readings(solid, sheet, Crew(rng))
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     alone = reduce_panels(readings, layout, sheet)
     known = reduce_panels(readings, layout, sheet, survey=survey(stands, 50e-6, rng))
@@ -146,7 +146,7 @@ def test_a_wrong_reading_is_found_by_name_and_left_out(tmp_path, sheet):
     rng = np.random.default_rng(6)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = taken(solid, sheet, Crew(rng), turns=(0, 1, 2), members=("Ada",))
+    rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(turns=(0, 1, 2), members=("Ada",)))
     at = next(k for k, row in enumerate(rows) if row.startswith("DP21P01,1,"))
     cells = rows[at].split(",")
     cells[6] = f"{float(cells[6]) + 0.08:.3f}"
@@ -170,7 +170,7 @@ def test_of_two_placements_nothing_tells_which_is_wrong_and_both_are_left_out(tm
     sheet = sheet.model_copy(update={"panel": sheet.panel.model_copy(update={"u_twist_um": 200.0})})
     rng = np.random.default_rng(7)
     layout = patch()
-    rows, stands = taken(standing_by_chance(layout, sheet, rng), sheet, Crew(rng))
+    rows, stands = panel_readings(standing_by_chance(layout, sheet, rng), sheet, Crew(rng))
     at = next(k for k, row in enumerate(rows) if row.startswith("DP21P01,2,"))
     cells = rows[at].split(",")
     cells[4] = f"{float(cells[4]) + 0.15:.3f}"
@@ -190,7 +190,7 @@ def test_turns_of_screws_bring_corners_together(tmp_path, sheet):
     rng = np.random.default_rng(8)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = taken(solid, sheet, Crew(rng), turns=(0, 1, 2, 3))
+    rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(turns=(0, 1, 2, 3)))
     known = survey(stands, 50e-6, rng)
     found = reduce_panels(read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet, survey=known)
     moved = screwed(solid, 0.9 * np.where(found.known, found.turns, 0.0) * 1.27e-3)
@@ -198,7 +198,7 @@ def test_turns_of_screws_bring_corners_together(tmp_path, sheet):
     assert standing(found).rms > 150e-6
     left_over = 0.1 * found.relative[found.known]
     assert np.abs((true[found.known] - left_over) / found.u_relative[found.known]).max() < 4.0
-    rows, _ = taken(moved, sheet, Crew(rng), turns=(0, 1, 2, 3), shafts=stands)
+    rows, _ = panel_readings(moved, sheet, Crew(rng), CornerTour(turns=(0, 1, 2, 3)), shafts=stands)
     left = reduce_panels(read(rows, tmp_path / "l.csv", layout, sheet), layout, sheet, survey=known)
     done = setting(found, left)
     assert done.gain == pytest.approx(0.9, abs=4.0 * done.u_gain + 0.001)
@@ -216,7 +216,7 @@ def test_maps_lay_the_best_fit_on_the_design(tmp_path, sheet):
     bumpy = solid_panels(layout, rng, piston=0.0, slope=0.0, twist=0.0, bump=60e-6)
     solid = replace(calm_panels, bumps=bumpy.bumps, bump_k=bumpy.bump_k, bump_phase=bumpy.bump_phase)
     maps = {name: fitted_map(_map_of(solid, p, rng)) for p, name in enumerate(layout.panels)}
-    rows, stands = taken(solid, tool(), Crew(rng), turns=(0, 1, 2, 3))
+    rows, stands = panel_readings(solid, tool(), Crew(rng), CornerTour(turns=(0, 1, 2, 3)))
     known = survey(stands, 20e-6, rng)
     readings = read(rows, tmp_path / "r.csv", layout, tool())
     with_maps = reduce_panels(readings, layout, tool(), survey=known, maps=maps)
@@ -292,7 +292,9 @@ def test_offsets_by_design_are_no_departures(tmp_path, sheet):
     rng = np.random.default_rng(11)
     layout = patch()
     offset = rng.uniform(-1e-4, 1e-4, (len(layout.panels), 1)) * np.ones(4)
-    rows, stands = taken(screwed(solid_panels(layout, rng, piston=0.0, slope=0.0, twist=0.0), offset), sheet, Crew(rng))
+    rows, stands = panel_readings(
+        screwed(solid_panels(layout, rng, piston=0.0, slope=0.0, twist=0.0), offset), sheet, Crew(rng)
+    )
     readings, known = read(rows, tmp_path / "r.csv", layout, sheet), survey(stands, 80e-6, rng)
     made = reduce_panels(readings, replace(layout, offset=offset), sheet, survey=known)
     assert np.nanmax(np.abs(made.relative) / made.u_relative) < 4.0
@@ -306,11 +308,11 @@ def test_a_careless_member_and_a_drifting_session_stand_out(tmp_path, sheet):
     layout = patch(side=5)
     solid = standing_by_chance(layout, sheet, rng)
     half = len(layout.corners) // 2
-    good, stands = taken(solid, sheet, Crew(rng), corners=np.arange(half), members=("Ada",), turns=(0, 1, 2))
-    bad, _ = taken(
-        solid, sheet, Crew(rng, gauge=9e-6), corners=np.arange(half, len(layout.corners)), members=("Ben",),
-        turns=(0, 1, 2), shafts=stands,
-    )  # fmt: skip
+    good, stands = panel_readings(
+        solid, sheet, Crew(rng), CornerTour(corners=np.arange(half), members=("Ada",), turns=(0, 1, 2))
+    )
+    rest = CornerTour(corners=np.arange(half, len(layout.corners)), members=("Ben",), turns=(0, 1, 2))
+    bad, _ = panel_readings(solid, sheet, Crew(rng, gauge=9e-6), rest, shafts=stands)
     rows = good + [row.replace(",day", ",late") for row in bad[1:]]
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     found = reduce_panels(readings, layout, sheet, survey=survey(stands, 80e-6, rng))
@@ -328,7 +330,7 @@ def test_a_careless_member_and_a_drifting_session_stand_out(tmp_path, sheet):
 def test_a_gauge_over_no_panel_and_a_corner_without_its_panels_are_refused(tmp_path, sheet):
     rng = np.random.default_rng(13)
     layout = patch()
-    rows, _ = taken(solid_panels(layout, rng), sheet, Crew(rng))
+    rows, _ = panel_readings(solid_panels(layout, rng), sheet, Crew(rng))
     edge = next(k for k, row in enumerate(rows) if row.startswith("DP20N03,0,"))
     cells = rows[edge].split(",")
     cells[4:8] = ["0.1"] * 4
@@ -346,7 +348,7 @@ def test_a_gauge_over_no_panel_and_a_corner_without_its_panels_are_refused(tmp_p
 def test_a_shift_and_a_tilt_of_the_whole_dish_do_not_count(tmp_path, sheet):
     rng = np.random.default_rng(14)
     layout = patch(("T20", "T30"), 10)
-    rows, _ = taken(solid_panels(layout, rng), sheet, Crew(rng))
+    rows, _ = panel_readings(solid_panels(layout, rng), sheet, Crew(rng))
     found = reduce_panels(read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet)
     xy = layout.xy[layout.quad]
     slope = xy / 120.0
@@ -362,7 +364,7 @@ def test_the_whole_dish_takes_seconds(tmp_path):
 
     rng = np.random.default_rng(15)
     layout, sheet = dish(), tool()
-    rows, stands = taken(solid_panels(layout, rng), sheet, Crew(rng))
+    rows, stands = panel_readings(solid_panels(layout, rng), sheet, Crew(rng))
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     reduce_panels(readings, layout, sheet)  # compiles
     start = perf_counter()

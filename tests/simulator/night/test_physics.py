@@ -13,7 +13,7 @@ from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
 from catseye.simulator.night.head import electronic_phase
 from catseye.simulator.night.paraboloid import normal_deviation
 from catseye.simulator.night.posture import TruePosture
-from catseye.simulator.night.simulate import simulate_night
+from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 from catseye.simulator.night.world import kelvin_from_ground
 
 HALF_WAVE = SPEED_OF_LIGHT / 2 / 1.5e9  # in vacuum, m
@@ -212,7 +212,7 @@ def test_the_stations_read_the_air_with_their_offsets(night):
 def test_sheets_differ_from_the_truth_by_their_uncertainties_over_many_sites():
     scatter = {"d0": [], "fixed": [], "certificate": [], "height": [], "lateral": [], "d12": [], "h_corr": []}
     for seed in range(8):
-        night = simulate_night(100 + seed, dish_prisms=12)
+        night = simulate_night(100 + seed, telescope=SimulatedTelescope(dish_prisms=12))
         points = night.truth.points
         for h in night.heads.values():
             scatter["d0"].append((h.true_d0 * 1e3 - h.d0_mm) / 0.010)

@@ -17,7 +17,7 @@ from catseye.records.site.mirror import MirrorGeometry
 from catseye.simulator.clock.world_clock import ManualClock
 from catseye.simulator.twin.converter import Converter
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.head import TwinHead
+from catseye.simulator.twin.head import HeadBuild, TwinHead
 from catseye.simulator.twin.mirror import travel_of
 from ranger.head_conformance import HeadConformance
 from ranger.ranger_scene import CUBES, GEOMETRY
@@ -116,7 +116,7 @@ def test_the_world_is_asked_along_the_buffer_for_the_mirror_s_true_counts():
 @pytest.mark.parametrize("late", [0.0, 1e-4, 2e-4, 3e-4])  # within a sample of the motion chip
 def test_the_phase_of_a_buffer_on_the_move_is_the_mean_of_its_way(late):
     world = World(rate=40.0)  # less than a turn in a buffer
-    head, clock = homed(world=world, converter=Converter(0.1, 1e-6))
+    head, clock = homed(world=world, build=HeadBuild(converter=Converter(0.1, 1e-6)))
     begin = head.now().after(0.5)
     head.follow((np.array([100.0, 50.0]), np.array([300.0, 0.0])), (begin, begin.after(2.0)))
     clock.advance(1.5 + late)
@@ -170,7 +170,7 @@ def test_stops_are_those_of_the_mirror_s_record():
     assert low < record.az_low_limit < record.az_high_limit < high
     assert least < record.ne0 - 25_000
     assert most > record.ne0 + 25_000
-    head, clock = homed(travel=travel_of(record))
+    head, clock = homed(build=HeadBuild(travel_of(record)))
     head.set_error_limit(0, 300)
     head.start(0, round(high) + 3000, velocity=VELOCITY, acceleration=ACCELERATION)
     clock.advance(20.0)
@@ -195,12 +195,12 @@ def test_a_locked_clock_is_off_by_half_a_millisecond_at_most():
         assert head.clock_locked()
     assert 0.0 < max(np.abs(offs)) <= 5e-4
     assert len(set(offs)) == 8
-    head, clock = made(clock_error=0.0)
+    head, clock = made(build=HeadBuild(clock_error=0.0))
     assert off(head, clock) == 0.0
 
 
 def test_a_drifting_clock_runs_away_says_so_and_can_be_set():
-    head, clock = made(Fault("drifting-clock", "ZY101", 100.0, 1000.0, 2e-3), clock_error=0.0)
+    head, clock = made(Fault("drifting-clock", "ZY101", 100.0, 1000.0, 2e-3), build=HeadBuild(clock_error=0.0))
     clock.advance(99.0)
     assert head.clock_locked()
     clock.advance(201.0)
@@ -222,7 +222,7 @@ def test_a_drifting_clock_runs_away_says_so_and_can_be_set():
 
 
 def test_a_buffer_s_stamp_and_a_track_s_times_are_of_the_head_s_clock():
-    head, clock = homed(Fault("drifting-clock", "ZY101", 0.0, 1e9, 0.01), clock_error=0.0)
+    head, clock = homed(Fault("drifting-clock", "ZY101", 0.0, 1e9, 0.01), build=HeadBuild(clock_error=0.0))
     assert off(head, clock) == pytest.approx(0.2)
     asked = head.now()
     assert (shot(head, clock).triggered - asked).item() == 0

@@ -319,7 +319,7 @@ def test_time_is_kept_in_ticks_and_nanoseconds():
     assert made.seconds(ticks * 864_000) == made.seconds_of_ticks(ticks)
     assert made.ticks(made.seconds_of_ticks(ticks)) == ticks
     assert made.seconds(round(START * 86_400e9)) == pytest.approx(0.0, abs=1e-6)
-    told = twin("track 145 40").told(ticks)
+    told = twin("track 145 40").live_posture(ticks)
     assert isinstance(told, LivePosture)
     assert told.azimuth == pytest.approx(twin("track 145 40").posture(made.seconds_of_ticks(ticks)).azimuth[0])
 

@@ -1,7 +1,6 @@
 """What the coordinator's clients can ask and set: a function for each command, rows of plain values back."""
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from catseye.coordinator.clients.parameters import ClientParameter, Parameters
 from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers, plain
@@ -39,21 +38,21 @@ class Board:
         self._ziy = coordinator
         self.samplers = Samplers()
         self.parameters = Parameters((*_own(coordinator), *parameters))
-        self._asked: dict[str, tuple[tuple[int, ...], Callable[..., Rows]]] = {
-            "STATUS": ((0,), self._status),
-            "RANGERS": ((0,), self._rangers),
-            "PARAMETERS": ((0,), self._parameters),
-            "SET": ((2,), lambda name, text: [(plain(name.lower()), plain(self.parameters.set(name, text)))]),
-            "PREPARE": ((0,), lambda: [(str(self.parameters.prepare()),)]),
-            "START": ((0,), lambda: [(str(self.parameters.start()),)]),
-            "SAMPLERS": ((0,), self._samplers),
-            "SAMPLER": ((1, 2), self._sampler),
-            "MODE": ((0, 1), self._mode),
-            "DROP": ((1,), lambda ranger: self._done(coordinator.drop, ranger)),
-            "TAKE": ((1,), lambda ranger: self._done(coordinator.take, ranger)),
-            "STREAM": ((1, 2), self._stream),
-            "VER": ((0,), lambda: [("ZIY", VERSION)]),
-            "HLP": ((0, 1), self._help),
+        self._commands: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
+            "STATUS": ((0,), lambda _: self._status()),
+            "RANGERS": ((0,), lambda _: self._rangers()),
+            "PARAMETERS": ((0,), lambda _: self._parameters()),
+            "SET": ((2,), lambda words: self._set(*words)),
+            "PREPARE": ((0,), lambda _: [(str(self.parameters.prepare()),)]),
+            "START": ((0,), lambda _: [(str(self.parameters.start()),)]),
+            "SAMPLERS": ((0,), lambda _: self._samplers()),
+            "SAMPLER": ((1, 2), lambda words: self._sampler(*words)),
+            "MODE": ((0, 1), lambda words: self._mode(*words)),
+            "DROP": ((1,), lambda words: self._done(coordinator.drop, *words)),
+            "TAKE": ((1,), lambda words: self._done(coordinator.take, *words)),
+            "STREAM": ((1, 2), lambda words: self._stream(*words)),
+            "VER": ((0,), lambda _: [("ZIY", VERSION)]),
+            "HLP": ((0, 1), lambda words: self._help(*words)),
         }
 
     def rows(self, request: Request) -> Rows | None:
@@ -61,13 +60,13 @@ class Board:
 
         Raises InputError: parameters that do not fit, or what was asked cannot be.
         """
-        found = self._asked.get(request.command)
-        if found is None:
+        command = self._commands.get(request.command)
+        if command is None:
             return None
-        counts, handler = found
+        counts, handler = command
         if len(request.parameters) not in counts:
             raise InputError(f"{len(request.parameters)} parameters do not fit (expected {HELP[request.command][0]})")
-        return handler(*request.parameters)
+        return handler(request.parameters)
 
     def _status(self) -> Rows:
         z = self._ziy
@@ -86,6 +85,9 @@ class Board:
 
     def _parameters(self) -> Rows:
         return [tuple(plain(word) for word in row) for row in self.parameters.rows()]
+
+    def _set(self, name: str, text: str) -> Rows:
+        return [(plain(name.lower()), plain(self.parameters.set(name, text)))]
 
     def _samplers(self) -> Rows:
         return [
@@ -136,7 +138,7 @@ def _own(z: Coordinator) -> tuple[ClientParameter, ...]:
             if (name in z.firing.dropped) != (name in names):
                 (z.drop if name in names else z.take)(name)
 
-    def set_mode(text: str) -> Any:
+    def set_mode(text: str) -> None:
         z.set_mode(mode_of(text))
 
     return (

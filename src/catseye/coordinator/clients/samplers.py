@@ -2,9 +2,8 @@
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any
 
-from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.ranger.line import stamp_text
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
@@ -26,7 +25,7 @@ class Samplers:
     def __init__(self, kept: int = KEPT):
         self._rings: dict[str, deque[Row]] = {name: deque(maxlen=kept) for name in COLUMNS}
 
-    def add(self, entry: Any) -> list[tuple[str, Row]]:
+    def add(self, entry: Entry) -> list[tuple[str, Row]]:
         """The rows of an entry, by sampler; they are kept."""
         rows = list(rows_of(entry))
         for name, row in rows:
@@ -43,7 +42,7 @@ class Samplers:
         return {name: len(ring) for name, ring in self._rings.items()}
 
 
-def rows_of(entry: Any) -> Iterable[tuple[str, Row]]:
+def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
     """What an entry of the journal means for the samplers."""
     if isinstance(entry, AnsweredShot):
         shot = entry.shot
@@ -62,11 +61,12 @@ def rows_of(entry: Any) -> Iterable[tuple[str, Row]]:
 
 
 def _of_solution(entry: EpochSolution) -> Iterable[tuple[str, Row]]:
-    """Of an epoch's answer as `reduction.live.live` gives it; what it does not have is `none`."""
+    """The rows of an epoch's answer; what it does not have is `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     names, places = answer.get("names") or [], answer.get("x") or []
     epoch = _number(answer.get("number"))
-    counted = [_number(len(answer[key])) if key in answer else "none" for key in ("names", "used", "rejected")]
+    lists = (answer.get("names"), answer.get("used"), answer.get("rejected"))
+    counted = ["none" if each is None else _number(len(each)) for each in lists]
     rest = [_number(answer.get(key)) for key in COLUMNS["EPOCHS"][4:]]
     yield "EPOCHS", (stamp, epoch, *counted, *rest)
     for name, place in zip(names, places, strict=False):
@@ -78,7 +78,7 @@ def plain(text: str) -> str:
     return "".join(c if " " <= c <= "~" else "?" for c in text.replace(",", ";"))[:300].strip(" ")
 
 
-def _number(value: Any) -> str:
+def _number(value: object) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value or abs(value) == float("inf"):
         return "none"
     return repr(value)

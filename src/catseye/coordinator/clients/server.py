@@ -8,10 +8,10 @@ import asyncio
 import logging
 from collections.abc import Iterable
 from functools import partial
-from typing import Any
 
 from catseye.coordinator.clients.board import VERSION, Board
 from catseye.coordinator.clients.samplers import plain
+from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
@@ -164,7 +164,7 @@ class ZiyServer:
         """Forget a connection that is over."""
         self.clients.discard(client)
 
-    def publish(self, entry: Any) -> None:
+    def publish(self, entry: Entry) -> None:
         """Something is durable: kept in the samplers, and pushed to those who want it."""
         for sampler, (stamp, *values) in self.board.samplers.add(entry):
             kind = PUSHED.get(sampler)

@@ -56,7 +56,7 @@ ALONG_THE_BEAM = (0.0, 0.0, 1.0)
 
 
 class SafetyGuard:
-    """Of all rangers of a site.
+    """The guard of all rangers of a site.
 
     site         its records
     keep_clear   Sun and boxes; the site's Sun without boxes if None
@@ -113,12 +113,12 @@ class SafetyGuard:
             if request.command == "COO" and len(request.parameters) >= 4:  # thousands of them
                 memory.take(request, ())
                 return None
-            said, values = self._judged(memory, request, now_ticks)
-            if said is None:
+            reason, values = self._judged(memory, request, now_ticks)
+            if reason is None:
                 memory.take(request, values)
         except (CatseyeError, ValueError) as problem:
             return str(problem)
-        return said
+        return reason
 
     def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
         """What SUN should tell a ranger: the unit vector to the Sun in its own frame.
@@ -181,21 +181,21 @@ class SafetyGuard:
             return f"{name} is not known to the safety guard (expected another command)", values
         since = max(now, request.ticks or now)
         until = later(since, LOOK) if name != "TRK" else max(later(since, LOOK), int(values[5]))
-        said = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
-        if said is None and name == "PS" and shines:
-            said = self._lights(memory, since, until)
-        if said is None and moves:
+        reason = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
+        if reason is None and name == "PS" and shines:
+            reason = self._lights(memory, since, until)
+        if reason is None and moves:
             if since > later(now, FARTHEST_STAMP):
                 return (
                     f"its start is {seconds_between(now, since):.0f} s away (expected at most {FARTHEST_STAMP:g})",
                     values,
                 )
-            said = (
+            reason = (
                 self._homing(memory, since, until) if name == "FHM" else self._move(memory, name, values, since, until)
             )
-            if said is None and name == "FHM":
+            if reason is None and name == "FHM":
                 memory.stand.lose(int(values[0]))
-        return said, values
+        return reason, values
 
     def _scheduled(self, memory: Memory, request: Request, now: int) -> str | None:
         start, repeats, interval, inner = schedule_of(request.parameters)
@@ -209,7 +209,7 @@ class SafetyGuard:
         return self._interlocked(memory.vantage.name, since, last, moves=False, shines=True)
 
     def _interlocked(self, ranger: str, since: int, until: int, *, moves: bool, shines: bool) -> str | None:
-        """The first interlock that forbids it, in words."""
+        """The first interlock that forbids it, in words; None where none does."""
         asked: list[Act] = [act for act, on in zip(ACTS, (shines, moves), strict=True) if on]
         for each in self.interlocks:
             acts = [act for act in asked if act in each.forbids]
@@ -234,19 +234,19 @@ class SafetyGuard:
         return None if not spans else max(0.0, (spans[0][0] - begin) * SECONDS_PER_DAY)
 
     def _lie(self, vantage: Vantage, values: tuple[Value, ...], now: int) -> str | None:
-        """A vector to the Sun that is none."""
+        """Why a vector told as the Sun's is wrong; None where it is right, or no Sun counts."""
         if not self.keep_clear.counts_at(self.keep_clear.sun(now)):
             return None
-        told = np.array([float(v) for v in values])
-        size = float(np.linalg.norm(told))
+        vector = np.array([float(v) for v in values])
+        size = float(np.linalg.norm(vector))
         true = np.array(self.sun_vector(vantage.name, now))
-        off = float(np.arctan2(np.linalg.norm(np.cross(told, true)), told @ true)) if size > 0.0 else np.pi
+        off = float(np.arctan2(np.linalg.norm(np.cross(vector, true)), vector @ true)) if size > 0.0 else np.pi
         if off <= LIE:
             return None
         return f"that is {off / DEGREE:.1f} deg from the Sun (limit {LIE / DEGREE:g}): ask the guard for its vector"
 
     def _lights(self, memory: Memory, since: int, until: int) -> str | None:
-        """A laser is not switched on into a box."""
+        """Why a laser may not be switched on, as onto a box; None where it may."""
         if not self.keep_clear.boxes:
             return None
         if not memory.stand.known:
@@ -257,7 +257,7 @@ class SafetyGuard:
         return None if box is None else f"the beam may be on {box} (expected the mirror elsewhere first)"
 
     def _homing(self, memory: Memory, since: int, until: int) -> str | None:
-        """The search for an index sweeps the beam anywhere."""
+        """Why an index may not be searched for, which sweeps the beam anywhere; None where it may."""
         if memory.laser_off:
             return None
         up = self.keep_clear.counts_at(self.keep_clear.sun(instants(since, until)))
@@ -266,7 +266,7 @@ class SafetyGuard:
         return "the search for an index sweeps the beam anywhere (expected PS 0 first)"
 
     def _move(self, memory: Memory, name: str, values: tuple[Value, ...], since: int, until: int) -> str | None:
-        """Whether the mirror may go where a command leads it; if so it is under way."""
+        """Why the mirror may not go where a command leads it; None where it may, and then it is under way."""
         if not memory.stand.known:
             return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
         goals = self._goals(memory, name, values)
@@ -284,11 +284,11 @@ class SafetyGuard:
         longest = trapezoid(np.stack([memory.stand.low, memory.stand.high]), np.stack([high, low]), memory.pace)
         seconds = float(np.max(longest.total)) + ARRIVED
         until = max(until, later(since, seconds + SHOT - ARRIVED))
-        said = self._swept(memory, name, (low, high), since, until)
-        if said is None:
+        reason = self._swept(memory, name, (low, high), since, until)
+        if reason is None:
             at = later(max(since, int(values[1]) if name == "TRK" else since), seconds)
             memory.stand.go(low, high, at if name != "SCN" else max(at, until), name)
-        return said
+        return reason
 
     def _goals(self, memory: Memory, name: str, values: tuple[Value, ...]) -> Array:
         """Counts (k, 2) to which a command leads. Raises InputError: it cannot be told."""
@@ -370,8 +370,8 @@ class SafetyGuard:
             self._suns = first, last, self.keep_clear.sun([first, last])
         first, last, suns = self._suns
         share = ((instants(since, until) - first) / (last - first))[:, None]
-        found = suns[0] + share * (suns[1] - suns[0])
-        return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+        directions = suns[0] + share * (suns[1] - suns[0])
+        return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
     def _fresh_posture(self, vantage: Vantage, ticks: int) -> LivePosture:
         posture = self._posture

@@ -46,7 +46,7 @@ class Stand:
         return bool(np.isfinite(self.low).all())
 
     def settle(self, now_ticks: int) -> None:
-        """At the goal, if it is time."""
+        """Note that the mirror stands at its goal, if it is time."""
         if self.goal is not None and self.arrives is not None and now_ticks >= self.arrives:
             self.arrive()
 
@@ -82,7 +82,7 @@ class Stand:
 
 
 class Memory:
-    """Of one ranger.
+    """The memory of one ranger.
 
     vantage   by the records, for its stops
     """
@@ -117,24 +117,24 @@ class Memory:
         return Pace(velocity, acceleration)
 
     def number(self, cube: Value) -> int:
-        """Of a cube by number or name. Raises InputError: it was not told."""
-        found = cube if isinstance(cube, int) else self._numbers.get(str(cube).upper())
-        if found is None or (found != 0 and found not in self._places):
+        """The number of a cube, by number or name. Raises InputError: it was not told."""
+        number = cube if isinstance(cube, int) else self._numbers.get(str(cube).upper())
+        if number is None or (number != 0 and number not in self._places):
             raise InputError(f"cube {cube} was not told to {self.vantage.name} (expected COO first)")
-        return found
+        return number
 
     def counts(self, cube: Value) -> Array:
-        """(2,) to which CIL or CMEAS of a cube leads. Raises InputError: unknown, beyond the stops, ZRG not set."""
+        """Counts (2,) to which CIL or CMEAS of a cube leads. Raises InputError: unknown, out of reach, ZRG not set."""
         number = self.number(cube)
         kept = self._counts.get(number, [None, None])
         looked = self.look(self._places[number]) if None in kept and number else np.full(2, np.nan)
-        found = np.array([v if k is None else k for k, v in zip(kept, looked, strict=True)], dtype=float)
-        if not np.isfinite(found).all():
+        counts = np.array([v if k is None else k for k, v in zip(kept, looked, strict=True)], dtype=float)
+        if not np.isfinite(counts).all():
             raise InputError(f"counts of ZRG were not told to {self.vantage.name} (expected AZM 0, c and ELV 0, c)")
-        return found
+        return counts
 
     def look(self, place_mm: tuple[float, ...]) -> Array:
-        """(2,) counts to which a point (mm, the ranger's own frame) leads. Raises InputError: beyond the stops."""
+        """Counts (2,) to which a point (mm, the ranger's own frame) leads. Raises InputError: beyond the stops."""
         return self._table.look(place_mm)
 
     def take(self, request: Request, values: tuple[Value, ...]) -> None:

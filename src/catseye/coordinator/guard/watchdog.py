@@ -16,7 +16,7 @@ ACT_WITHIN = 60.0  # s: what comes later is told, and the next shot will have mo
 
 
 class BeamWatchdog:
-    """Of all links; it acts only on those that measure, and never while a shot is under way."""
+    """The watch over all links' beams; it acts only on those that measure, and never while a shot is under way."""
 
     def __init__(self, links: Mapping[str, RangerLink], guard: RequestGuard, *, clock: Clock, event_log: EventLog):
         self._links, self._guard, self._clock, self._event_log = links, guard, clock, event_log
@@ -28,13 +28,13 @@ class BeamWatchdog:
     async def _suns(self) -> None:
         """Each ranger is told the Sun's direction; a slow one keeps no other waiting."""
         while True:
-            told = []
+            messages = []
             for name, link in self._links.items():
                 with suppress(InputError):  # of the feed arm, and no posture: it will refuse to move by itself
-                    told.append(link.tell_sun(self._guard.sun_vector(name, ticks_now(self._clock))))
+                    messages.append(link.tell_sun(self._guard.sun_vector(name, ticks_now(self._clock))))
             with suppress(TimeoutError):
                 async with asyncio.timeout(SUN_EVERY):
-                    await asyncio.gather(*told)
+                    await asyncio.gather(*messages)
             await asyncio.sleep(SUN_EVERY)
 
     async def _watch(self) -> None:

@@ -6,7 +6,7 @@ import math
 import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 NAN = float("nan")
 EPOCH_BEGUN = "epoch-begun"  # name of the document that says when an epoch's shots were taken out
+
+
+# JSON's own types; what is no finite number is None
+Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,21 +63,45 @@ class SentCommand:
     ok: bool | None = None
 
 
+class StoredAnswer(TypedDict, total=False):
+    """An epoch's answer as a journal holds it: `EpochAnswer` without its covariance, in JSON's types.
+
+    Empty where nothing was solved. What was no finite number is None; keys of dictionaries are text.
+    """
+
+    number: int
+    ticks: int
+    azimuth: float
+    elevation: float
+    names: list[str]
+    x: list[list[float]]
+    shots: list[int]
+    used: list[int]
+    rejected: dict[str, str]
+    variance_factor: float | None
+    degrees_of_freedom: float | None
+    refractivity_ppm: float | None
+    air: dict[str, list[float]]
+    zeros: dict[str, list[float]]
+    pose: dict[str, Json] | None
+    notes: list[str]
+
+
 @dataclass(frozen=True, eq=False)
 class EpochSolution:
     """What an epoch's solving gave, as plain values; one that gave nothing is kept too, since it used up its shots.
 
     ticks        the time that `Live.begin` was asked for
-    answer       JSON's own types, what is no finite number is None; empty where nothing was solved
+    answer       empty where nothing was solved
     covariance   (n, n), in the answer's units, or None
     """
 
     ticks: int
-    answer: dict[str, Any]
+    answer: StoredAnswer
     covariance: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, ticks: int, answer: Any) -> "EpochSolution":
+    def of(cls, ticks: int, answer: object) -> "EpochSolution":
         """An epoch answer, any dataclass or mapping, or None; its matrix `covariance` is kept apart, bit for bit.
 
         Raises InputError for a value that JSON cannot hold.
@@ -87,7 +115,7 @@ class EpochSolution:
             matrix = np.array(matrix, dtype=np.float64)
         else:
             matrix = None
-        return cls(ticks, plain(values, "answer"), matrix)
+        return cls(ticks, cast(StoredAnswer, plain(values, "answer")), matrix)
 
     @property
     def text(self) -> str:
@@ -131,7 +159,7 @@ class Run:
     """
 
     site: SiteFolder
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, object] = field(default_factory=dict)
     seed: int | None = None
     extra: Mapping[str, str] = field(default_factory=dict)
     uuid: str = field(default_factory=lambda: str(uuid.uuid4()))
@@ -148,14 +176,14 @@ class Run:
         return raw.decode("utf-8") if hashlib.sha256(raw).hexdigest() == self.site.hashes.get(path) else None
 
 
-def named_fields(value: Any) -> dict[str, Any]:
+def named_fields(value: object) -> dict[str, object]:
     """The fields of a dataclass by name, not copied."""
     if not is_dataclass(value) or isinstance(value, type):
         raise InputError(f"solution of type {type(value).__name__} (expected a dataclass or a mapping)")
     return {each.name: getattr(value, each.name) for each in fields(value)}
 
 
-def plain(value: Any, place: str) -> Any:
+def plain(value: object, place: str) -> Json:
     """A value in JSON's own types; what is no finite number becomes None.
 
     place   its name, for the refusal

@@ -4,14 +4,14 @@ import json
 import os
 import socket
 import sqlite3
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from sqlalchemy import Connection, Engine, NullPool, create_engine, event
 from sqlalchemy.engine import URL, make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 
 from catseye.errors import InputError
@@ -132,8 +132,8 @@ def _server_engine(url: URL) -> Engine:
         ) from None
 
     @event.listens_for(engine, "connect")
-    def durable(connection: Any, _: object) -> None:  # psycopg's, which need not be installed
-        with connection.cursor() as cursor:
+    def durable(connection: DBAPIConnection, _: object) -> None:
+        with closing(connection.cursor()) as cursor:
             if cursor.execute("SHOW synchronous_commit").fetchone()[0] == "off":
                 cursor.execute("SET synchronous_commit TO on")
         connection.commit()
@@ -142,7 +142,7 @@ def _server_engine(url: URL) -> Engine:
 
 
 def identity(place: JournalAddress) -> tuple[int, int] | None:
-    """Of a journal's file; None for a server, and where it is not there."""
+    """Device and inode of a journal's file; (0, 0) where it is not there, None for a server."""
     if place.path is None:
         return None
     try:

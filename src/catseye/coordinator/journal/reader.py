@@ -6,15 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Literal
 
-from sqlalchemy import Connection, Engine, Table, func, select
+from sqlalchemy import Connection, Engine, Select, func, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
-from catseye.coordinator.journal.rows import entry_of, unpack
-from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, version_of
+from catseye.coordinator.journal.rows import StoredRow, entry_of, unpack
+from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, JournalTable, version_of
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
@@ -40,7 +40,7 @@ class StoredRun:
     ended: int | None
     site: str
     seed: int | None
-    settings: dict[str, Any]
+    settings: dict[str, object]
     host: str
     pid: int
     versions: dict[str, str]
@@ -82,11 +82,11 @@ class JournalReader:
         Raises InputError where there is none, or are two.
         """
         runs = self.runs()
-        found = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
-        if len(found) != 1:
+        matching = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
+        if len(matching) != 1:
             held = f"runs 1 to {runs[-1].run}" if runs else "no runs"
-            raise InputError(f"journal {self.place}: run {which!r} names {len(found)} runs (it holds {held})")
-        return found[0]
+            raise InputError(f"journal {self.place}: run {which!r} names {len(matching)} runs (it holds {held})")
+        return matching[0]
 
     def events(
         self,
@@ -176,40 +176,40 @@ class JournalReader:
             raise refused(self._where, problem) from problem
 
     def _piece(
-        self, run: int, after: int, upto: int, tables: Sequence[Table], buffers: bool
+        self, run: int, after: int, upto: int, tables: Sequence[JournalTable], buffers: bool
     ) -> list[tuple[int, Entry]]:
         """The events after a seq and up to another, one state of the journal."""
-        found: list[tuple[int, Entry]] = []
+        events: list[tuple[int, Entry]] = []
         with self._reading() as connection:
-            samples: dict[int, Any] = {}
+            samples: dict[int, StoredRow] = {}
             if buffers and SHOTS in tables:
                 samples = {row.seq: row for row in connection.execute(_between(BUFFERS, run, after, upto))}
             for table in tables:
                 for row in connection.execute(_between(table, run, after, upto)):
                     buffer = samples.get(row.seq) if table is SHOTS else None
-                    taken = None
+                    unpacked = None
                     if buffer is not None:
                         place = f"journal {self.place}: run {run}, event {row.seq}"
-                        taken = unpack(buffer, max(1, row.samples_per_cycle), place)
-                    found.append((row.seq, entry_of(table.name, row, taken)))
-        found.sort(key=lambda pair: pair[0])
-        return found
+                        unpacked = unpack(buffer, max(1, row.samples_per_cycle), place)
+                    events.append((row.seq, entry_of(table.name, row, unpacked)))
+        events.sort(key=lambda pair: pair[0])
+        return events
 
 
-def _between(table: Table, run: int, after: int, upto: int) -> Any:
+def _between(table: JournalTable, run: int, after: int, upto: int) -> Select[tuple[object, ...]]:
     return select(table).where(table.c.run == run, table.c.seq > after, table.c.seq <= upto).order_by(table.c.seq)
 
 
 def _last(connection: Connection, run: int) -> int:
     highest = (connection.scalar(select(func.max(table.c.seq)).where(table.c.run == run)) for table in EVENTS)
-    return max(seq or 0 for seq in highest)
+    return max(seq if isinstance(seq, int) else 0 for seq in highest)
 
 
 def _is(run: StoredRun, which: int | str) -> bool:
     return run.run == which if isinstance(which, int) else run.uuid.startswith(which)
 
 
-def _stored(row: Any, files: dict[str, str]) -> StoredRun:
+def _stored(row: StoredRow, files: dict[str, str]) -> StoredRun:
     return StoredRun(
         run=row.run,
         uuid=row.uuid,

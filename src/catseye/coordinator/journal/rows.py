@@ -3,9 +3,9 @@
 import json
 import zlib
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
+import sqlalchemy
 from numpy.typing import NDArray
 
 from catseye.coordinator.journal.entries import AnsweredShot, Document, Entry, EpochSolution, Item, SentCommand
@@ -14,7 +14,10 @@ from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWea
 
 RAW, PACKED = 0, 1  # int16 little-endian as taken; or the differences from a cycle earlier, in two planes, deflated
 MOST_WHOLE = 2**63 - 1
-Row = dict[str, Any]
+Samples = NDArray[np.int16]
+Cell = None | bool | int | float | str | bytes | Samples
+Row = dict[str, Cell]  # by column, to be written
+StoredRow = sqlalchemy.Row[tuple[object, ...]]  # as it was read, with the table's columns as attributes
 Rows = list[tuple[str, Row]]  # table's name, row without run and seq
 
 
@@ -27,14 +30,30 @@ def rows_of(item: Item, buffers: bool) -> Rows:
     """
     if isinstance(item, LiveShot):
         item = AnsweredShot(item)
-    maker = MAKERS.get(type(item))
-    if maker is None:
-        raise InputError(f"a {type(item).__name__} cannot be journalled (expected a shot, reading, happening, ...)")
-    table, row = maker(item)
+    table, row = _row(item)
     if buffers and isinstance(item, AnsweredShot) and item.shot.samples is not None:
         samples = np.array(item.shot.samples, dtype="<i2")
-        return [(table, row), ("buffers", {"samples": samples, "lag": item.shot.samples_per_cycle})]
+        return [(table, row), ("buffers", {"samples": samples, "lag": int(item.shot.samples_per_cycle)})]
     return [(table, row)]
+
+
+def _row(item: object) -> tuple[str, Row]:
+    """Table and row of an entry, without a shot's samples. Raises InputError: not an entry."""
+    if isinstance(item, AnsweredShot):
+        return _shot(item)
+    if isinstance(item, LiveWeather):
+        return _weather(item)
+    if isinstance(item, LivePosture):
+        return _posture(item)
+    if isinstance(item, SentCommand):
+        return _command(item)
+    if isinstance(item, Happening):
+        return _happening(item)
+    if isinstance(item, EpochSolution):
+        return _solution(item)
+    if isinstance(item, Document):
+        return _document(item)
+    raise InputError(f"a {type(item).__name__} cannot be journalled (expected a shot, reading, happening, ...)")
 
 
 def _shot(item: AnsweredShot) -> tuple[str, Row]:
@@ -104,7 +123,7 @@ def _happening(item: Happening) -> tuple[str, Row]:
     }
 
 
-def _detail(value: Any) -> Any:
+def _detail(value: object) -> object:
     """JSON has no word for what is no finite number: it travels as text, which `float` reads."""
     plain = value.item() if isinstance(value, np.generic) else value
     return repr(plain) if isinstance(plain, float) and not np.isfinite(plain) else plain
@@ -128,26 +147,15 @@ def _document(item: Document) -> tuple[str, Row]:
     }
 
 
-MAKERS: Mapping[type, Callable[[Any], tuple[str, Row]]] = {
-    AnsweredShot: _shot,
-    LiveWeather: _weather,
-    LivePosture: _posture,
-    SentCommand: _command,
-    Happening: _happening,
-    EpochSolution: _solution,
-    Document: _document,
-}
-
-
-def entry_of(table: str, row: Any, samples: NDArray[np.int16] | None = None) -> Entry:
-    """The entry of a row, a named tuple with the table's columns.
+def entry_of(table: str, row: StoredRow, samples: Samples | None = None) -> Entry:
+    """The entry of a table's row.
 
     samples   of a shot, where they were kept
     """
     return READERS[table](row, samples)
 
 
-def _read_shot(row: Any, samples: NDArray[np.int16] | None) -> AnsweredShot:
+def _read_shot(row: StoredRow, samples: Samples | None) -> AnsweredShot:
     shot = LiveShot(
         row.ranger,
         row.target,
@@ -164,14 +172,14 @@ def _read_shot(row: Any, samples: NDArray[np.int16] | None) -> AnsweredShot:
     return AnsweredShot(shot, row.status, row.text, _back(row.range_m), _back(row.u_range_m), _back(row.misfit_m))
 
 
-def _read_solution(row: Any, _: object) -> EpochSolution:
+def _read_solution(row: StoredRow, _: object) -> EpochSolution:
     matrix = None
     if row.covariance is not None:
         matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, -1 if row.size else 0)
     return EpochSolution(row.ticks, json.loads(row.answer), matrix)
 
 
-READERS: Mapping[str, Callable[[Any, Any], Entry]] = {
+READERS: Mapping[str, Callable[[StoredRow, Samples | None], Entry]] = {
     "shots": _read_shot,
     "weather": lambda row, _: LiveWeather(
         row.station, row.ticks, _back(row.temperature_c), _back(row.pressure_hpa), _back(row.humidity_percent)
@@ -192,7 +200,7 @@ READERS: Mapping[str, Callable[[Any, Any], Entry]] = {
 }
 
 
-def pack(samples: NDArray[np.int16], lag: int, packing: int) -> Row:
+def pack(samples: Samples, lag: int, packing: int) -> Row:
     """A buffer's columns: how it is packed, the CRC-32 of the samples as taken, the bytes.
 
     samples   (n,) int16 little-endian
@@ -211,7 +219,7 @@ def pack(samples: NDArray[np.int16], lag: int, packing: int) -> Row:
     return {"packing": PACKED, "crc32": zlib.crc32(raw), "samples": zlib.compress(planes, 1)}
 
 
-def unpack(row: Any, lag: int, place: str) -> NDArray[np.int16]:
+def unpack(row: StoredRow, lag: int, place: str) -> Samples:
     """The samples (n,) of a row of `buffers`; InputError where they are not what was stored.
 
     lag     samples of a cycle

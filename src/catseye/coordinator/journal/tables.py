@@ -5,7 +5,7 @@ all tables. Times are ticks of 1e-8 day. NULL is a number that nobody knew.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from sqlalchemy import (
     BigInteger,
@@ -26,11 +26,16 @@ from sqlalchemy import (
     select,
 )
 from sqlalchemy.engine import Dialect
+from sqlalchemy.schema import SchemaItem
 from sqlalchemy.types import UserDefinedType
 
 from catseye import __version__
 from catseye.errors import InputError
 
+if TYPE_CHECKING:
+    from sqlalchemy.sql.base import ReadOnlyColumnCollection
+
+JournalTable: TypeAlias = "Table[ReadOnlyColumnCollection[str, Column[object]]]"
 FORMAT = "catseye-journal"
 VERSION = 1
 APPLICATION_ID = 0x43_41_54_53  # "CATS" in the header of an SQLite file
@@ -43,7 +48,7 @@ class Untyped(UserDefinedType[float]):
 
     cache_ok = True
 
-    def get_col_spec(self, **_: Any) -> str:
+    def get_col_spec(self, **_: object) -> str:
         return ""
 
 
@@ -59,7 +64,7 @@ def _whole(name: str) -> Column[int]:
     return Column(name, BigInteger, nullable=False)
 
 
-def _events(name: str, *columns: Any) -> Table:
+def _events(name: str, *columns: SchemaItem) -> "JournalTable":
     run = Column("run", Integer, ForeignKey("runs.run"), primary_key=True, autoincrement=False)
     seq = Column("seq", BigInteger, primary_key=True, autoincrement=False)
     return Table(name, METADATA, run, seq, *columns, sqlite_with_rowid=False)
@@ -202,7 +207,7 @@ def version_of(connection: Connection, place: str) -> int:
     return version
 
 
-def insertion(table: Table, dialect: Dialect) -> Executable:
+def insertion(table: JournalTable, dialect: Dialect) -> Executable:
     """An insert that leaves a row alone which is there already: what was sent twice is kept once."""
     if dialect.name == "postgresql":
         from sqlalchemy.dialects import postgresql

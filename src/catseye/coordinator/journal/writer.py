@@ -13,8 +13,8 @@ from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 from sqlalchemy import Connection, Engine, update
 from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 
@@ -29,10 +29,11 @@ from catseye.coordinator.journal.place import (
     refused,
     writing_engine,
 )
+from catseye.coordinator.journal.protocol import NotDurable
 from catseye.coordinator.journal.rows import PACKED, RAW, Row, Rows, pack, rows_of
 from catseye.coordinator.journal.run import begin
 from catseye.coordinator.journal.tables import METADATA, RUNS, insertion
-from catseye.coordinator.parts import Clock, NotDurable, ticks_now
+from catseye.coordinator.parts import Clock, ticks_now
 from catseye.errors import InputError
 
 MOST_ROWS = 512  # of one commit
@@ -45,6 +46,22 @@ LONGEST_DURABLE = 10.0  # s that `durable` waits: a server may hang without a wo
 Tell = Callable[[str], None]
 
 
+@dataclass(frozen=True)
+class JournalSettings:
+    """How a run is written.
+
+    group          s that a commit waits for more
+    keep_buffers   samples too: without them a replay has only what the rangers made of them
+    compress       samples in half the space for 0.2 ms each
+    patience       s of trouble after which the futures of what waits fail; it stays in line all the same
+    """
+
+    group: float = 0.005
+    keep_buffers: bool = True
+    compress: bool = False
+    patience: float = PATIENCE
+
+
 @dataclass(eq=False)
 class Batch:
     """What one append gave: rows, seq in them, of one transaction."""
@@ -52,6 +69,7 @@ class Batch:
     rows: Rows
     size: int  # bytes of samples
     future: "Future[int]" = field(default_factory=Future)
+    last: int = 0  # its last entry's seq
     since: float = field(default_factory=time.monotonic)
 
     def fail(self, problem: InputError) -> None:
@@ -70,16 +88,23 @@ class Journal:
     place    where it is, for people
     """
 
-    def __init__(self, place: JournalAddress, engine: Engine, lock: WriterLock, run: int, **settings: Any):
+    def __init__(
+        self,
+        place: JournalAddress,
+        engine: Engine,
+        lock: WriterLock,
+        run: int,
+        *,
+        clock: Clock,
+        settings: JournalSettings,
+        on_alarm: Tell | None,
+        on_recovery: Tell | None,
+    ):
         self.run, self.place = run, place.shown
         self._where, self._engine, self._lock = place, engine, lock
-        self._clock: Clock = settings["clock"]
-        self._group: float = settings["group"]
-        self._buffers: bool = settings["keep_buffers"]
-        self._packing = PACKED if settings["compress"] else RAW
-        self._on_alarm: Tell | None = settings["on_alarm"]
-        self._on_recovery: Tell | None = settings["on_recovery"]
-        self._patience: float = settings["patience"]
+        self._clock, self._settings = clock, settings
+        self._packing = PACKED if settings.compress else RAW
+        self._on_alarm, self._on_recovery = on_alarm, on_recovery
         self._wake = threading.Condition()
         self._queue: deque[Batch] = deque()
         self._waiting = self._bytes = self._seq = 0
@@ -100,31 +125,24 @@ class Journal:
         *,
         run: Run,
         clock: Clock,
-        group: float = 0.005,
-        keep_buffers: bool = True,
-        compress: bool = False,
+        settings: JournalSettings | None = None,
         on_alarm: Tell | None = None,
         on_recovery: Tell | None = None,
-        patience: float = PATIENCE,
     ) -> "Journal":
         """Create, or carry to this version, the journal at a place, and begin a run in it.
 
         url            a file, or postgresql://USER@HOST/DATABASE
-        group          s that a commit waits for more
-        keep_buffers   samples too: without them a replay has only what the rangers made of them
-        compress       samples in half the space for 0.2 ms each
         on_alarm       told once, from the journal's thread, that nothing is durable any more and why
         on_recovery    told when it is again
-        patience       s of trouble after which the futures of what waits fail; it stays in line all the same
 
         Raises InputError: a bad place, another's file or database, a newer journal, one that cannot be written, a file
         that has a writer.
         """
-        place = place_of(url)
+        place, settings = place_of(url), settings or JournalSettings()
         refuse_foreign(place, fresh=True)
         lock = WriterLock(place)
         try:
-            number = begin(place, run, clock, keep_buffers)
+            number = begin(place, run, clock, settings.keep_buffers)
             engine = writing_engine(place)
         except SQLAlchemyError as problem:
             lock.release()
@@ -138,19 +156,16 @@ class Journal:
             lock,
             number,
             clock=clock,
-            group=group,
-            keep_buffers=keep_buffers,
-            compress=compress,
+            settings=settings,
             on_alarm=on_alarm,
             on_recovery=on_recovery,
-            patience=patience,
         )
 
     @property
     def trouble(self) -> str | None:
         """Why nothing is durable at present; None where all is well. No shot should be fired meanwhile."""
         since = self._busy_since
-        if self._trouble is None and since is not None and time.monotonic() - since > self._patience:
+        if self._trouble is None and since is not None and time.monotonic() - since > self._settings.patience:
             return f"journal {self.place}: no answer for {time.monotonic() - since:.0f} s"
         return self._trouble
 
@@ -164,9 +179,9 @@ class Journal:
 
         Raises InputError: nothing a journal holds, a full line, a closed journal; then nothing was put in line.
         """
-        sets = [rows_of(item, self._buffers) for item in items]
-        size = sum(row["samples"].nbytes for rows in sets for table, row in rows if table == "buffers")
+        sets = [rows_of(item, self._settings.keep_buffers) for item in items]
         rows = [row for rows in sets for row in rows]
+        size = sum(samples.nbytes for _, row in rows if isinstance(samples := row.get("samples"), np.ndarray))
         batch = Batch(rows, size)
         batch.future.set_running_or_notify_cancel()  # from here on nobody can take it back
         with self._wake:
@@ -179,6 +194,7 @@ class Journal:
                 for _, row in entry:
                     row["run"], row["seq"] = self.run, seq
             self._seq += len(sets)
+            batch.last = self._seq
             self._waiting += len(rows)
             self._bytes += size
             self._queue.append(batch)
@@ -237,7 +253,7 @@ class Journal:
                 self._wake.wait()
             if not self._queue:
                 return []
-            full_at = self._queue[0].since + self._group
+            full_at = self._queue[0].since + self._settings.group
             while not self._closing and self._waiting < MOST_ROWS and (left := full_at - time.monotonic()) > 0.0:
                 self._wake.wait(left)
             batches: list[Batch] = []
@@ -264,7 +280,7 @@ class Journal:
                 self._in_trouble(str(why))
             else:
                 break
-            if time.monotonic() - began >= self._patience or self._closing:
+            if time.monotonic() - began >= self._settings.patience or self._closing:
                 self._fail_waiting(batches)
             if not self._paused(wait):
                 return
@@ -276,8 +292,9 @@ class Journal:
         rows: dict[str, list[Row]] = defaultdict(list)
         for batch in batches:
             for table, row in batch.rows:
-                if table == "buffers" and "lag" in row:
-                    row |= pack(row["samples"], max(1, row.pop("lag")), self._packing)
+                samples, lag = row.get("samples"), row.pop("lag", None)
+                if isinstance(samples, np.ndarray) and isinstance(lag, int):
+                    row |= pack(samples, max(1, lag), self._packing)
                 rows[table].append(row)
         if self._connection is None:
             self._connection = self._engine.connect()
@@ -304,7 +321,7 @@ class Journal:
             if self._on_recovery is not None:
                 self._on_recovery(f"journal {self.place}: is back, all that waited is written")
         for batch in batches:
-            batch.done(batch.rows[-1][1]["seq"] if batch.rows else self._seq)
+            batch.done(batch.last if batch.rows else self._seq)
 
     def _forget(self, batches: list[Batch]) -> None:
         with self._wake:

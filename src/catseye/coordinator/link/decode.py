@@ -5,7 +5,6 @@ import math
 import re
 import zlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +135,7 @@ def _whole(text: str, what: str) -> int:
     return int(text)
 
 
-def _real(text: Any, what: str, most: float) -> float:
+def _real(text: str, what: str, most: float) -> float:
     if not REAL.fullmatch(text) or not abs(float(text)) <= most or not math.isfinite(float(text)):
         raise InputError(f"{what}: {text[:20]!a} is no number within {most:g}")
     return float(text)

@@ -1,7 +1,7 @@
 """The three lines with which a ranger greets, HELLO, CONNECT, STW: whether it is the right one, and the port free."""
 
 import asyncio
-from typing import Any
+from typing import Literal
 
 from catseye.ranger.line import Reply
 
@@ -9,7 +9,7 @@ LINES = frozenset(["HELLO", "CONNECT", "STW"])
 
 
 class Handshake:
-    """Of one new connection; `stranger` where another ranger answered."""
+    """The greeting on one new connection; `stranger` where another ranger answered."""
 
     def __init__(self) -> None:
         self._replies: dict[str, Reply] = {}
@@ -47,7 +47,7 @@ class Handshake:
 async def first_of(closed: "asyncio.Future[str]", event: asyncio.Event, seconds: float) -> None:
     """Wait for the end of a connection, for an event, or so long."""
     waiting = asyncio.ensure_future(event.wait())
-    ends: list[asyncio.Future[Any]] = [closed, waiting]
+    ends: list[asyncio.Future[str] | asyncio.Future[Literal[True]]] = [closed, waiting]
     try:
         await asyncio.wait(ends, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
     finally:

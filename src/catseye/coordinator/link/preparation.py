@@ -97,11 +97,11 @@ class Preparation:
             if limit is None or not request.parameters:
                 continue
             try:
-                told = reals_of(replies[request.command], len(request.parameters))
+                held = reals_of(replies[request.command], len(request.parameters))
             except InputError:
                 return False
             wanted = [float(p) for p in request.parameters]
-            if any(abs(a - b) > limit for a, b in zip(told, wanted, strict=True)):
+            if any(abs(a - b) > limit for a, b in zip(held, wanted, strict=True)):
                 return False
         return True
 

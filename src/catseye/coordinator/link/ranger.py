@@ -6,10 +6,10 @@ wait has an end, and a connection that is gone is made again: after 0.2 s, then 
 
 import asyncio
 import random
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import SentCommand
@@ -20,7 +20,7 @@ from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.link.shooting import Shooter
 from catseye.coordinator.link.status_watch import StatusWatch
 from catseye.coordinator.link.wire import Sent
-from catseye.coordinator.parts import Clock, PlannedShot, RequestGuard, Tell, ticks_now
+from catseye.coordinator.parts import Environment, PlannedShot, RequestGuard, Tell, ticks_now
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
@@ -35,18 +35,27 @@ LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
 MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
 
 
+@dataclass(frozen=True)
+class LinkListeners:
+    """Who is called with what comes over a link.
+
+    tell         with happenings
+    heard        with what another client made the ranger say (CMEAS ...)
+    commanded    with each request that was sent and does something, and with what came of it
+    """
+
+    tell: Tell
+    heard: Callable[["RangerLink", Reply], None] | None = None
+    commanded: Callable[[SentCommand], None] | None = None
+
+
 class RangerLink:
     """A ranger behind its two ports.
 
     ranger       name, as it must greet
-    commands     that initialise it: geometry and cubes, from the site's records
-    later        names of cubes of which it is told before their first shot only
+    preparation  what initialises it: geometry and cubes, from the site's records
     wanted       "listen": ask and hear only, on the second port; "hold": connected, nothing sent that changes it;
                  "measure": made ready, and `fire` serves
-    heard        called with what another client made it say (CMEAS ...)
-    commanded    called with each request that was sent and does something, and with what came of it
-    seed         of the waits' jitter
-    network      where connections are made, as ZyClient's; None: TCP
     """
 
     def __init__(
@@ -54,20 +63,16 @@ class RangerLink:
         ranger: str,
         address: Address,
         *,
-        commands: Sequence[Request],
-        later: Collection[str] = (),
+        preparation: Preparation,
         guard: RequestGuard,
-        clock: Clock,
-        tell: Tell,
+        environment: Environment,
+        listeners: LinkListeners,
         wanted: Wanted = "measure",
-        heard: Callable[["RangerLink", Reply], None] | None = None,
-        commanded: Callable[[SentCommand], None] | None = None,
         settings: LinkSettings | None = None,
-        seed: int = 0,
-        network: Any = None,
     ):
+        clock = environment.clock
         self.ranger, self.address, self.wanted = ranger, address, wanted
-        self.preparation = Preparation.of(commands, later)
+        self.preparation = preparation
         self.told: set[int] = set()  # cubes that it was told of on demand
         self.names = {number: name for name, number in self.preparation.numbers.items()}
         self.state: State = "down"
@@ -75,14 +80,15 @@ class RangerLink:
         self.counts: tuple[float, float] | None = None
         self.busy, self.shots, self.failures = False, 0, 0  # failures in a row
         self.round_trip = float("nan")
-        self._guard, self._clock, self._heard_by, self._commanded = guard, clock, heard, commanded
+        self._guard, self._clock = guard, clock
+        self._heard_by, self._commanded = listeners.heard, listeners.commanded
         self.settings = settings or LinkSettings()
-        self._event_log = EventLog(ranger, clock, tell)
+        self._event_log = EventLog(ranger, clock, listeners.tell)
         self._shooter = Shooter(self, self._event_log, clock)
         self._status = StatusWatch(ranger, self._event_log, self._restarted)
         self._watch = ClockWatch(clock, self._event_log, self.settings.clock_limit)
-        self._rng = random.Random(f"{seed} {ranger}")
-        self._network = {} if network is None else {"network": network}
+        self._rng = random.Random(f"{environment.seed} {ranger}")
+        self._network = environment.network
         self._client: ZyClient | None = None
         self._handshake = Handshake()
         self._doubt = asyncio.Event()
@@ -133,10 +139,10 @@ class RangerLink:
         why = "no port"
         ports = list(enumerate(self.address.ports))
         for place, port in ports[::-1] if self.wanted == "listen" else ports:
-            said = await self._connect(port, SECOND_CLIENT_TID if place else FIRST_CLIENT_TID)
-            if said is None:
+            problem = await self._connect(port, SECOND_CLIENT_TID if place else FIRST_CLIENT_TID)
+            if problem is None:
                 break
-            why = said
+            why = problem
         client = self._client
         if client is None:
             return why
@@ -155,23 +161,28 @@ class RangerLink:
         try:
             async with asyncio.timeout(limit):
                 client = await ZyClient.connect(
-                    self.address.host, port, first_tid=first_tid, heard=self._hear, clock=loop.time, **self._network
+                    self.address.host,
+                    port,
+                    first_tid=first_tid,
+                    heard=self._hear,
+                    clock=loop.time,
+                    network=self._network,
                 )
         except InputError as problem:
             return str(problem)
         except TimeoutError:
             return f"{self.address.host} port {port} does not answer within {limit:g} s"
-        said: str | None = "given up"
+        wrong: str | None = "given up"
         try:
-            said = await self._handshake.verdict(self.ranger, port, client.closed, limit)
+            wrong = await self._handshake.verdict(self.ranger, port, client.closed, limit)
         finally:
-            if said is not None:
+            if wrong is not None:
                 client.close()
-        if said is None:
+        if wrong is None:
             self._client = client
         elif self._handshake.stranger:
-            self._event_log.tell("wrong-ranger", said, "alarm")
-        return said
+            self._event_log.tell("wrong-ranger", wrong, "alarm")
+        return wrong
 
     async def _supervise(self, client: ZyClient) -> str:
         """Watch a connection until it is over."""
@@ -190,7 +201,7 @@ class RangerLink:
 
     @property
     def _probe_timeout(self) -> float:
-        """Of VER, s; another client's moves may stand before it."""
+        """How long VER may take, s; another client's moves may stand before it."""
         return self.settings.probe_timeout if self.wanted == "measure" else self.settings.move_timeout
 
     async def _lives(self, *, idle: bool = False) -> bool:
@@ -262,9 +273,9 @@ class RangerLink:
             raise InputError("not connected")
         asks = COMMANDS[request.command].only_asks(request)
         if not asks:
-            said = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
-            if said is not None:
-                raise Refused("refused", f"{request.command}: {said}")
+            refusal = self._guard.refusal(self.ranger, request, ticks_now(self._clock))
+            if refusal is not None:
+                raise Refused("refused", f"{request.command}: {refusal}")
         tid, future = self._client.request(request.command, *request.parameters, ticks=request.ticks)
         if not asks and self._commanded is not None:
             future.add_done_callback(partial(self._done, tid, format_request(replace(request, tid=tid))))

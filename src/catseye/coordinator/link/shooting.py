@@ -103,10 +103,10 @@ class Shooter:
         link, came = self._link, 0
         try:
             while came < count:
-                found = self._own(await self._next("CMEAS", planned.duration), planned)
-                read = self._buffer(await self._next("BUF", 0.0), found.ticks, found.cube)
+                measurement = self._own(await self._next("CMEAS", planned.duration), planned)
+                read = self._buffer(await self._next("BUF", 0.0), measurement.ticks, measurement.cube)
                 came += 1
-                yield shot_of(link.ranger, planned.target, found, read, link.sampling)
+                yield shot_of(link.ranger, planned.target, measurement, read, link.sampling)
         finally:
             self._stream = None
             if came < count and link.connected:
@@ -138,16 +138,16 @@ class Shooter:
 
     def hears(self, reply: Reply) -> bool:
         """Whether a line is the stream's; then it is kept for it."""
-        mine = reply.tid == self._stream and reply.command in ("CMEAS", "BUF")
-        if mine:
+        streamed = reply.tid == self._stream and reply.command in ("CMEAS", "BUF")
+        if streamed:
             self._heard.put_nowait(reply)
-        return mine
+        return streamed
 
     def _own(self, reply: Reply, planned: PlannedShot) -> Measurement:
-        found = measurement_of(reply)
-        if self._link.names.get(found.cube) != planned.target:
-            raise InputError(f"CMEAS answers for cube {found.cube} (expected {planned.target})")
-        return found
+        measurement = measurement_of(reply)
+        if self._link.names.get(measurement.cube) != planned.target:
+            raise InputError(f"CMEAS answers for cube {measurement.cube} (expected {planned.target})")
+        return measurement
 
     def _number(self, target: str) -> int:
         number = self._link.preparation.numbers.get(target)
@@ -223,10 +223,10 @@ class Shooter:
         begin = trigger.begin
         ahead = 0.0 if begin is None else max(0, begin - ticks_now(self._clock)) / TICKS_PER_SECOND
         reply = await link.reply_of("CMEAS", trigger.measured, ahead + AHEAD * planned.duration + limit)
-        found = self._own(reply, planned)
+        measurement = self._own(reply, planned)
         buffer = link.send(Request("BUF")) if trigger.buffer is None else trigger.buffer
-        read = self._buffer(await link.reply_of("BUF", buffer, limit), found.ticks, found.cube)
-        return shot_of(link.ranger, planned.target, found, read, link.sampling)
+        read = self._buffer(await link.reply_of("BUF", buffer, limit), measurement.ticks, measurement.cube)
+        return shot_of(link.ranger, planned.target, measurement, read, link.sampling)
 
     def _buffer(self, reply: Reply, ticks: int, cube: int) -> BufferRead | None:
         """The samples; None where they did not come, and then the ranger's own amplitude and phase count.

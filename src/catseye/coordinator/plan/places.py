@@ -29,7 +29,7 @@ class ChosenTarget:
 
 
 class Places:
-    """Of one round.
+    """Where rangers and targets are during one round.
 
     site, vantages, retros   the records
     state                    whose `place` predicts
@@ -126,13 +126,13 @@ class Places:
         """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector in the ground frame, the posture's rates held."""
         posture, reflector = self.state.posture, self.site.site.frames.reflector
         since = (np.asarray(ticks, dtype=float) - posture.ticks) * TICK_SECONDS
-        found = ground_from_reflector_at(
+        ground_from_reflector = ground_from_reflector_at(
             posture.azimuth + posture.azimuth_rate * since,
             posture.elevation + posture.elevation_rate * since,
             elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
             reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
         )
-        return np.asarray(found.rotation), np.asarray(found.translation)
+        return np.asarray(ground_from_reflector.rotation), np.asarray(ground_from_reflector.translation)
 
     @staticmethod
     def _in_reflector(points: Array, rotation: Array, vertex: Array) -> Array:

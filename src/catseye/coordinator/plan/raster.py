@@ -94,8 +94,8 @@ class DishRaster:
     def _ahead(self, visited: set[str]) -> NDArray[np.int64]:
         """The next prisms, by index, that nobody has visited."""
         n = len(self.names)
-        found = [i for k in range(n) if self.names[i := (self.next + k) % n] not in visited]
-        return np.array(found[:WINDOW], dtype=np.int64)
+        ahead = [i for k in range(n) if self.names[i := (self.next + k) % n] not in visited]
+        return np.array(ahead[:WINDOW], dtype=np.int64)
 
     def begin(self, share: float) -> None:
         """Go on from a share 0 to 1 of the way."""

@@ -17,7 +17,7 @@ SIGMA = 30e-6  # m, of a range
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """Of some ranges: fall of the trace (m,), m^2; P e (m, 3); and s^2 + e'P e (m,)."""
+    """What some ranges are worth: fall of the trace (m,), m^2; P e (m, 3); and s^2 + e'P e (m,)."""
 
     gain: Array
     across: Array
@@ -37,7 +37,7 @@ class Knowledge:
         self.covariances = np.array(covariances, dtype=float).reshape(-1, 3, 3)
 
     def worth(self, points: NDArray[np.int64], units: Array, variance: Array) -> Worth:
-        """Of a range along each of units (m, 3), ground, to points (m,), by index, of variances (m,), m^2.
+        """The worth of a range along each of units (m, 3), ground, to points (m,), by index, of variances (m,), m^2.
 
         Source: rank-one update of a covariance, Sherman and Morrison 1950.
 

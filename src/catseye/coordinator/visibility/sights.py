@@ -67,7 +67,7 @@ class VisibleSights:
     def _pairs(
         self, vantages: Mapping[str, Vantage], retros: Mapping[str, SeenRetroreflector], posture: LivePosture | None
     ) -> Seen:
-        """Of rangers and retroreflectors; without a posture that of the record, where riders are asked."""
+        """Which rangers see which retroreflectors; without a posture in the record's, where riders are asked."""
         if not vantages or not retros:
             return Seen(dict.fromkeys(vantages, ()), {})
         stands = posture or nominal_posture(self.site)
@@ -80,17 +80,19 @@ class VisibleSights:
             np.array([to_ground[r.frame].directions(r.axis) for r in retros.values()]),
         )
         scan_points = {name: to_ground[v.frame].points(v.station.scan_point) for name, v in vantages.items()}
-        found = visibility(scan_points, table, self.solids, to_ground, limits=self.limits)
-        return Seen({name: _names(found, i) for i, name in enumerate(vantages)}, _reasons(found, posture is not None))
+        visible = visibility(scan_points, table, self.solids, to_ground, limits=self.limits)
+        return Seen(
+            {name: _names(visible, i) for i, name in enumerate(vantages)}, _reasons(visible, posture is not None)
+        )
 
 
-def _names(found: Visibility, ranger: int) -> tuple[str, ...]:
-    return tuple(found.targets[t] for t in np.flatnonzero(found.code[ranger] == Sight.SEEN))
+def _names(table: Visibility, ranger: int) -> tuple[str, ...]:
+    return tuple(table.targets[t] for t in np.flatnonzero(table.code[ranger] == Sight.SEEN))
 
 
-def _reasons(found: Visibility, wanted: bool) -> dict[tuple[str, str], str]:
+def _reasons(table: Visibility, wanted: bool) -> dict[tuple[str, str], str]:
     """Why pairs are not seen; of riders, who have thousands, nothing."""
     if not wanted:
         return {}
-    pairs = np.argwhere(found.code != Sight.SEEN).tolist()
-    return {(found.rangers[r], found.targets[t]): found.reason(r, t) for r, t in pairs}
+    pairs = np.argwhere(table.code != Sight.SEEN).tolist()
+    return {(table.rangers[r], table.targets[t]): table.reason(r, t) for r, t in pairs}

@@ -47,7 +47,7 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """For one ranger and a span of time.
+    """What one ranger must keep clear of in a span of time.
 
     vantage        the ranger
     suns           (k, 3) directions, own frame; none where the Sun is set
@@ -75,17 +75,17 @@ class Surroundings:
     def near_boxes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
         """Whether (...) a beam within rectangles of counts (..., 2) may come near a box."""
         a, b = np.broadcast_arrays(np.asarray(low, dtype=float), np.asarray(high, dtype=float))
-        found = np.zeros(a.shape[:-1], dtype=bool)
+        near_any = np.zeros(a.shape[:-1], dtype=bool)
         if self.pieces:
             stands = len(self.boxes.middles) // len(self.pieces)
             near = np.asarray(
                 self.boxes.inside(self.vantage, a, b).reshape(*a.shape[:-1], len(self.pieces), stands).any(axis=-1)
             )
             for k, pieces in enumerate(self.pieces):
-                asked = near[..., k] & ~found
+                asked = near[..., k] & ~near_any
                 if asked.any():
-                    found[asked] = pieces.inside(self.vantage, a[asked], b[asked]).any(axis=-1)
-        return found
+                    near_any[asked] = pieces.inside(self.vantage, a[asked], b[asked]).any(axis=-1)
+        return near_any
 
     def codes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.int8]:
         """FREE, SUN or PERHAPS (a box), (...), for rectangles of counts (..., 2)."""
@@ -96,9 +96,9 @@ class Surroundings:
         """The box into which a slew (2,) to (2,) counts leads, both axes starting together; None where it does not."""
         move = trapezoid(start, end, self.vantage.pace)
         for guard in self.guards:
-            found = guard.entries(0.0, move)
-            if int(found.status):
-                return self.names[int(found.zone) - 1]
+            entry = guard.entries(0.0, move)
+            if int(entry.status):
+                return self.names[int(entry.zone) - 1]
         return None
 
     def box_in(self, low: ArrayLike, high: ArrayLike, step: float = 100.0) -> str | None:
@@ -136,7 +136,7 @@ class KeepClear:
         self._standing: dict[tuple[str, float], Zones] = {}
 
     def guard(self, vantage: Vantage) -> Guard:
-        """Of a ranger, boxes only, as it stands in its own frame."""
+        """The guard of a ranger against boxes only, as it stands in its own frame."""
         if vantage.name not in self._guards:
             self._guards[vantage.name] = guard_of(
                 vantage.name,
@@ -166,7 +166,7 @@ class KeepClear:
         suns: Array | None = None,
         wider: float = 0.0,
     ) -> Surroundings:
-        """Of a ranger between two times.
+        """The Sun and boxes about a ranger between two times.
 
         posture   of the telescope, which a ranger on the feed arm needs; its rates are held
         suns      (NODES, 3) of `instants`, where they are known already
@@ -175,22 +175,22 @@ class KeepClear:
         Raises InputError where a ranger on the feed arm is asked about without a posture.
         """
         ticks = instants(since_ticks, until_ticks)
-        seen = self.sun(ticks) if suns is None else suns
+        suns_then = self.sun(ticks) if suns is None else suns
         guard = self.guard(vantage)
         if vantage.frame == "reflector" and posture is None:
             raise InputError(f"{vantage.name} rides on the telescope, whose posture is not known (expected one first)")
         if vantage.frame == "ground" or posture is None:
             frames = [Transform("ground", vantage.frame, np.eye(3), np.zeros(3))]
-            turned = seen
+            turned = suns_then
         else:
             every = _every(posture, seconds_between(since_ticks, until_ticks))
-            ticks, seen = ticks[::every], seen[::every]
+            ticks, suns_then = ticks[::every], suns_then[::every]
             frames = [reflector_at(self.site, posture, seconds_between(posture.ticks, t)) for t in ticks.tolist()]
-            turned = np.einsum("kji,kj->ki", np.stack([f.rotation for f in frames]), seen)
+            turned = np.einsum("kji,kj->ki", np.stack([f.rotation for f in frames]), suns_then)
         margin = guard.margin + wider + chords(turned)
         cone = self.keep_out.sun.half_angle_deg * DEGREE + margin
         boxes, pieces, guards = self._spheres(vantage, guard, frames, wider)
-        up = self.counts_at(seen)
+        up = self.counts_at(suns_then)
         return Surroundings(
             vantage, turned if up else turned[:0], cone, boxes, pieces, guards, tuple(b.name for b in self.boxes)
         )
@@ -215,10 +215,10 @@ class KeepClear:
             for f in frames
         )
         off = guard.margin + extra
-        found = whole.grown(off), tuple(spheres.grown(off) for spheres, _ in parts), guards
+        zones = whole.grown(off), tuple(spheres.grown(off) for spheres, _ in parts), guards
         if vantage.frame == "ground":
-            self._standing[key] = found
-        return found
+            self._standing[key] = zones
+        return zones
 
 
 def _every(posture: LivePosture, seconds: float) -> int:

@@ -123,7 +123,7 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
     Source: [GOLDMAN00] figure 10 for triplets: ball = mid-point + h_corr normal, which points to the prisms' side.
     """
     benches = {each.target for each in site.benchmarks}
-    found: dict[str, SeenRetroreflector] = {}
+    retros: dict[str, SeenRetroreflector] = {}
     for target in site.targets.values():
         part: Literal["dish", "structure", "benchmark"] = "structure"
         if target.name in benches:
@@ -132,7 +132,7 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
             part = "dish"
         axis = np.full(3, np.nan) if target.normal is None else np.array(target.normal)
         point = np.array(target.position_mm) * MILLIMETRE
-        found[target.name] = SeenRetroreflector(
+        retros[target.name] = SeenRetroreflector(
             target.name, target.type, target.frame, point, axis, _u(target.u_position_mm), part
         )
     for triplet in site.triplets.values():
@@ -141,10 +141,10 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
         half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
         left, right, own = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
         u, frame = _u(triplet.u_position_mm), triplet.frame
-        found[left] = SeenRetroreflector(left, "prism", frame, middle - half, normal, u, "triplet")
-        found[right] = SeenRetroreflector(right, "prism", frame, middle + half, normal, u, "triplet")
-        found[own] = SeenRetroreflector(own, "ball", frame, ball, -normal, u, "triplet")
-    return found
+        retros[left] = SeenRetroreflector(left, "prism", frame, middle - half, normal, u, "triplet")
+        retros[right] = SeenRetroreflector(right, "prism", frame, middle + half, normal, u, "triplet")
+        retros[own] = SeenRetroreflector(own, "ball", frame, ball, -normal, u, "triplet")
+    return retros
 
 
 def reflector_at(site: SiteFolder, posture: LivePosture, seconds: float = 0.0) -> Transform:

@@ -70,12 +70,11 @@ def _shot(entry: Any) -> Iterable[Cells]:
 
 def _solution(entry: EpochSolution) -> Iterable[Cells]:
     answer = entry.answer
-    names = ("number", "variance_factor", "degrees_of_freedom", "refractivity_ppm")
-    numbers = (float("nan") if answer.get(name) is None else answer[name] for name in names[1:])
+    numbers = (answer.get("variance_factor"), answer.get("degrees_of_freedom"), answer.get("refractivity_ppm"))
     pose = answer.get("pose")
     yield (
         answer.get("number") or 0,
-        *numbers,
+        *(float("nan") if number is None else number for number in numbers),
         len(answer.get("names") or ()),
         "" if pose is None else json.dumps(pose),
     )

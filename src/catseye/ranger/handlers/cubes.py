@@ -85,8 +85,8 @@ def _cil(z: RangerState, _: int, key: Value, *where: float) -> Work:
     if len(where) == 2:
         counts = (where[0], where[1])
     elif where:
-        found = z.cubes.look(where)
-        counts = (float(found[0]), float(found[1]))
+        looked = z.cubes.look(where)
+        counts = (float(looked[0]), float(looked[1]))
     else:
         counts = z.cubes.counts(cube)
     yield from illuminate(z, cube, counts)

@@ -50,10 +50,10 @@ def _fire(z: RangerState) -> None:
 
 def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
     """The buffer that was fired for, when it is whole."""
-    seconds, found = z.sampling.duration, z.head.buffer
+    seconds, buffer_now = z.sampling.duration, z.head.buffer
 
-    yield from wait_until(z, lambda: found() is not None, seconds + SLACK, "no buffer has come", earliest=seconds)
-    buffer = found()
+    yield from wait_until(z, lambda: buffer_now() is not None, seconds + SLACK, "no buffer has come", earliest=seconds)
+    buffer = buffer_now()
     if buffer is None:
         raise InputError("no buffer has come")
     return buffer
@@ -66,10 +66,10 @@ def _computed(z: RangerState) -> MeasuredBuffer:
         raise InputError("there is no buffer (expected TRG first)")
     if measured.phase is None:
         buffer = measured.buffer
-        found = complex(phasors(buffer.samples, buffer.sampling.samples, buffer.volts_per_code))
+        phasor = complex(phasors(buffer.samples, buffer.sampling.samples, buffer.volts_per_code))
         clipped = bool(buffer.samples.min() <= -CONVERTER_END - 1 or buffer.samples.max() >= CONVERTER_END)
         measured = replace(
-            measured, amplitude=abs(found), phase=float(fraction(cmath.phase(found), 0.0)), clipped=clipped
+            measured, amplitude=abs(phasor), phase=float(fraction(cmath.phase(phasor), 0.0)), clipped=clipped
         )
         z.measured = measured
     return measured

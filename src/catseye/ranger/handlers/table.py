@@ -49,9 +49,9 @@ def _rst(z: RangerState, _: int) -> Values:
 
 
 def _lst(z: RangerState, client: int) -> Values:
-    mine = [e for e in z.scheduler.entries if e.client == client]
-    return str(len(mine)), *(
-        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in mine[:24]
+    own = [e for e in z.scheduler.entries if e.client == client]
+    return str(len(own)), *(
+        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in own[:24]
     )
 
 
@@ -87,7 +87,7 @@ def _initzy(z: RangerState, client: int) -> Work:
             if isinstance(answer, tuple):
                 yield Reply(request.command, True, answer)
             else:
-                last = yield from _told(request.command, answer)
+                last = yield from _replies(request.command, answer)
                 if last is not None:
                     yield Reply(request.command, True, last)
         except CatseyeError as problem:
@@ -95,7 +95,7 @@ def _initzy(z: RangerState, client: int) -> Work:
     return ()
 
 
-def _told(command: str, work: Work) -> Work:
+def _replies(command: str, work: Work) -> Work:
     """The replies of another command, each with its name."""
     while True:
         try:

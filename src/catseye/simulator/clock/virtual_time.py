@@ -132,11 +132,11 @@ class MemoryNetwork:
 
     async def connect(self, factory: Callable[[], P], host: str, port: int) -> P:
         """Both ends, connected. Raises ConnectionRefusedError: nobody listens."""
-        made = self._listeners.get((host, port))
-        if made is None:
+        accepting = self._listeners.get((host, port))
+        if accepting is None:
             raise ConnectionRefusedError(111, "connection refused")
         loop = asyncio.get_running_loop()
-        near, far = factory(), made()
+        near, far = factory(), accepting()
         here, there = MemoryTransport(loop, near, self.latency), MemoryTransport(loop, far, self.latency)
         here.peer, there.peer = there, here
         near.connection_made(here)

@@ -65,7 +65,7 @@ class SoundPath:
     dispersion_ppm: float = 0.0
 
     def travel_times(self) -> tuple[float, float]:
-        """From A to B and from B to A, s, by Gauss-Legendre quadrature."""
+        """Travel times from A to B and from B to A, s, by Gauss-Legendre quadrature."""
         share = 0.5 * (NODES + 1.0)
         c = sound_speed(self.temperature_c(share), self.pressure_hpa, self.humidity_percent, self.co2_ppm)
         c = c * (1.0 + 1e-6 * self.dispersion_ppm)

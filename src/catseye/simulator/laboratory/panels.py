@@ -173,41 +173,53 @@ HEADER = (
 )
 
 
-def taken(
+@dataclass(frozen=True, eq=False)
+class CornerTour:
+    """Where a crew takes its tool.
+
+    turns          of the tool at each corner, quarter turns
+    corners        numbers; all if None, in sessions of `a_day`, each by the next of `members`
+    elevation_deg  of the telescope
+    """
+
+    turns: tuple[int, ...] = (0, 2)
+    corners: np.ndarray | None = None
+    members: tuple[str, ...] = ("first", "second")
+    a_day: int = 60
+    elevation_deg: float = 77.6
+
+
+def panel_readings(
     solid: SolidPanels,
     sheet: PanelInstrument,
     crew: Crew,
+    tour: CornerTour | None = None,
     *,
-    turns: tuple[int, ...] = (0, 2),
-    corners: np.ndarray | None = None,
-    members: tuple[str, ...] = ("first", "second"),
-    a_day: int = 60,
-    elevation_deg: float = 77.6,
     shafts: np.ndarray | None = None,
 ) -> tuple[list[str], np.ndarray]:
     """Rows of READINGS.csv with its header, and the heights (c,) of all shafts, m.
 
     solid      panels as they stand
     sheet      of the instrument: places, linearity, scale, temperature, sag of its gauges
-    turns      of the tool at each corner
-    corners    numbers; all if None, in sessions of `a_day`, each by the next of `members`
+    tour       of all corners if None
     shafts     heights, drawn if None
     """
+    tour = tour or CornerTour()
     layout, rng = solid.layout, crew.rng
-    chosen = np.arange(len(layout.corners)) if corners is None else corners
+    chosen = np.arange(len(layout.corners)) if tour.corners is None else tour.corners
     stands = rng.normal(0.0, crew.shaft, len(layout.corners)) if shafts is None else shafts
     lines, flat = [HEADER], rng.normal(0.0, crew.flat, 4)
-    for day in range(-(-len(chosen) // a_day)):
+    for day in range(-(-len(chosen) // tour.a_day)):
         zero, level = rng.normal(0.0, crew.zero, 4), rng.normal(0.0, crew.level, 2)
         warm = sheet.flat_temperature_c + rng.normal(0.0, 3.0)
-        place = (f"day{day + 1:02d}", members[day % len(members)])
+        place = (f"day{day + 1:02d}", tour.members[day % len(tour.members)])
         lines += [_on_flat(sheet, crew, place, zero + flat, warm)]
-        for corner in chosen[day * a_day : (day + 1) * a_day]:
+        for corner in chosen[day * tour.a_day : (day + 1) * tour.a_day]:
             lean = rng.normal(0.0, crew.lean, 2)
-            for turn in turns:
+            for turn in tour.turns:
                 lines.append(
                     _placement(solid, sheet, crew, (int(corner), turn), place, (zero, level, lean, warm),
-                               elevation_deg, stands[corner])
+                               tour.elevation_deg, stands[corner])
                 )  # fmt: skip
         lines += [_on_flat(sheet, crew, place, zero + flat, warm)]
     return lines, stands

@@ -112,7 +112,7 @@ def random_scenes(rng: np.random.Generator, cases: int, *, tilt: float = 1.5e-3,
     """
     m = cases
     paint = rng.uniform(0.05e-3, 0.15e-3, m)
-    made = rng.normal(0.0, 0.1e-3, (3, m))
+    deviations = rng.normal(0.0, 0.1e-3, (3, m))
     height = rng.uniform(37.85e-3, 38.35e-3, (2, m)) + 0.25e-3
     eta = 1.0 + rng.uniform(235e-6, 275e-6, m)
     turn = rng.uniform(0.0, 2.0 * np.pi, (3, m))
@@ -122,7 +122,7 @@ def random_scenes(rng: np.random.Generator, cases: int, *, tilt: float = 1.5e-3,
     return TripletScenes(
         height_1=height[0], height_2=height[1],
         radius_1=1.969 * INCH + rng.normal(0.0, 5e-6, m), radius_2=3.799 * INCH + rng.normal(0.0, 5e-6, m),
-        fiducial_1=made[0] - paint, fiducial_2=made[1] - paint, ball=made[2] - paint,
+        fiducial_1=deviations[0] - paint, fiducial_2=deviations[1] - paint, ball=deviations[2] - paint,
         spacing=0.635 + rng.uniform(-0.15e-3, 0.15e-3, m), ball_x=np.zeros(m), ball_y=np.zeros(m),
         lean_1=lean[0], lean_2=lean[1],
         depth=rng.uniform(17.9, 18.3, m), aside=across[0], above=across[1],
@@ -198,8 +198,8 @@ def _scan_point(scene: TripletScenes) -> Array:
     about_y = np.array([[cy, zero, sy], [zero, one, zero], [-sy, zero, cy]])
     about_x = np.array([[one, zero, zero], [zero, cp, -sp], [zero, sp, cp]])
     stops_from_lab = np.einsum("ijm,jkm->mik", about_x, about_y)
-    seen = np.einsum("mij,mj->mi", stops_from_lab, beam)
-    return seen + np.stack([scene.aside, scene.above, zero], axis=-1)
+    turned = np.einsum("mij,mj->mi", stops_from_lab, beam)
+    return turned + np.stack([scene.aside, scene.above, zero], axis=-1)
 
 
 def _into_prism(scan: Array, corner: Array, normal: Array, height: Array, eta: Array, ratio: Array) -> Array:

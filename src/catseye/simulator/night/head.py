@@ -110,12 +110,12 @@ def returns_of_ranger(
     volt = {name: usual_volt(name, streams(f"path/{head.ranger}/{name}").uniform()) for name in targets}
     weak = faults.weak_amplitude if head.ranger == faults.weak_ranger else 1.0
 
-    found = []
+    returns = []
     for i, shot in enumerate(shots):
         if shot.target == REFERENCE:
             wanted = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
             phasor = REFERENCE_VOLT * wanted + head.true_leakage
-            found.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
+            returns.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
             continue
         away = here - ends[i]
         distance = float(np.linalg.norm(away))
@@ -131,8 +131,8 @@ def returns_of_ranger(
             left, strange = foreign_return(amplitude, foreign[i])
         error = float(np.angle(left + strange)) if status == "reflected" else 0.0
         phasor = wanted * (left + strange) + head.true_leakage
-        found.append(Return(shot, complex(phasor), status, float(index[i]), distance, error))
-    return found
+        returns.append(Return(shot, complex(phasor), status, float(index[i]), distance, error))
+    return returns
 
 
 def sampled_frames(head: TrueHead, returns: list[Return], streams: Streams, planted: Planted) -> np.ndarray:

@@ -32,11 +32,11 @@ def best_paraboloid(points: dict[str, np.ndarray], pose: TruePosture) -> GroundP
     """Least squares of the normal deviations over two tilts and three shifts; None below six prisms."""
     if len(points) < MINIMUM_PRISMS:
         return None
-    seen = pose.reflector_from_nominal(np.array(list(points.values())))
+    prisms = pose.reflector_from_nominal(np.array(list(points.values())))
 
     def deviations(parameters):
         turned = Rotation.from_rotvec([parameters[0] / 100.0, parameters[1] / 100.0, 0.0])
-        return normal_deviation(turned.inv().apply(seen - parameters[2:]))
+        return normal_deviation(turned.inv().apply(prisms - parameters[2:]))
 
     fit = least_squares(deviations, np.zeros(5), xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale="jac", method="lm")
     turned = Rotation.from_rotvec([fit.x[0] / 100.0, fit.x[1] / 100.0, 0.0])

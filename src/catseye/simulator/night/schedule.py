@@ -57,16 +57,16 @@ def ground_targets(
     streams: Streams,
 ) -> dict[str, list[str]]:
     """What each ground ranger shoots, repeats included; seen from the design, so that no plant changes it."""
-    found: dict[str, list[str]] = {ranger: [] for ranger in GROUND_RANGERS}
+    lists: dict[str, list[str]] = {ranger: [] for ranger in GROUND_RANGERS}
     place = {r: m.fixed_point_mm / 1000.0 for r, m in monuments.items()}
     for unit_ in telescope.triplets:
         rng = streams(f"sight/{unit_.name}")
         ball, axis = telescope.design[f"{unit_.name}-B"], -pose.nominal_direction(unit(unit_.normal))
         cosine = {r: unit(p - ball) @ axis for r, p in place.items() if p[2] < ball[2]}
-        seen = [r for r, c in cosine.items() if c > np.cos(rule.ball_angle_deg * DEGREE)]
+        facing = [r for r, c in cosine.items() if c > np.cos(rule.ball_angle_deg * DEGREE)]
         fewer = int(rng.uniform() < 0.3)
-        for r in rng.permutation(seen)[: max(rule.ball_rangers - fewer, 3)]:
-            found[str(r)] += [f"{unit_.name}-B"] * rule.ground_repeats
+        for r in rng.permutation(facing)[: max(rule.ball_rangers - fewer, 3)]:
+            lists[str(r)] += [f"{unit_.name}-B"] * rule.ground_repeats
     for i, target in enumerate(telescope.structural):
         if target.frame == "reflector":  # on the feed arm, seen from all around: every other ranger
             chosen = list(GROUND_RANGERS[i % 2 :: 2])
@@ -74,12 +74,12 @@ def ground_targets(
             at = telescope.design[target.name]
             chosen = sorted(GROUND_RANGERS, key=lambda r: float(np.linalg.norm(place[r] - at)))[:5]
         for r in chosen:
-            found[r] += [target.name] * rule.ground_repeats
+            lists[r] += [target.name] * rule.ground_repeats
     for mark in marks:
-        found[mark.ranger] += [mark.name] * rule.certified_repeats
+        lists[mark.ranger] += [mark.name] * rule.certified_repeats
         if mark.neighbour:
-            found[mark.neighbour] += [mark.name] * rule.neighbour_repeats
-    return found
+            lists[mark.neighbour] += [mark.name] * rule.neighbour_repeats
+    return lists
 
 
 def feed_arm_targets(ranger: str, rule: Schedule, telescope: Structure, faults: Faults, streams: Streams) -> list[str]:

@@ -188,6 +188,14 @@ def _write_files(night: Night, directory: Path) -> None:
     """Write every file of the campaign into an existing, empty directory."""
     for folder in ("monuments", "mirrors", "triplets"):
         (directory / folder).mkdir()
+    for name, text in _texts(night).items():
+        (directory / name).write_text(text, encoding="utf-8")
+    _write_tables(night, directory)
+    np.save(directory / "frames.npy", night.frames)
+
+
+def _texts(night: Night) -> dict[str, str]:
+    """Read-me and sheets by relative path."""
     texts = {
         "README.md": README.format(
             name=night.name,
@@ -209,9 +217,11 @@ def _write_files(night: Night, directory: Path) -> None:
     texts |= {f"monuments/{name}.toml": monument_sheet(m) for name, m in night.monuments.items()}
     texts |= {f"mirrors/{h.zp}.toml": head_sheet(h) for h in night.heads.values()}
     texts |= {f"triplets/{t.name}.toml": triplet_sheet(t) for t in night.telescope.triplets}
-    for name, text in texts.items():
-        (directory / name).write_text(text, encoding="utf-8")
+    return texts
 
+
+def _write_tables(night: Night, directory: Path) -> None:
+    """Benchmarks, weather, path temperatures where sound was used, shots."""
     start = night.start_mjd_utc
     write_table(
         directory / "benchmarks.csv",
@@ -255,4 +265,3 @@ def _write_files(night: Night, directory: Path) -> None:
             for i, s in enumerate(night.shots)
         ),
     )
-    np.save(directory / "frames.npy", night.frames)

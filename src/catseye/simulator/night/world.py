@@ -120,7 +120,7 @@ def monument(ranger: str, head: TrueHead, streams: Streams, planted: Planted) ->
 
 def benchmarks(monuments: dict[str, TrueMonument], streams: Streams, planted: Planted) -> list[TrueBenchmark]:
     """Six benchmarks, 60 to 140 m along chords of the ring, each certified from its own ranger."""
-    found = []
+    marks = []
     for k in range(6):
         rng = streams(f"benchmark/{k}")
         ranger = GROUND_RANGERS[2 * k + 1]
@@ -134,5 +134,5 @@ def benchmarks(monuments: dict[str, TrueMonument], streams: Streams, planted: Pl
             0.0, U_BENCHMARK_MM
         )
         neighbour = GROUND_RANGERS[2 * k + 2] if k % 2 == 0 else None
-        found.append(TrueBenchmark(f"ZBM{k + 1:02d}", ranger, neighbour, round(float(certified), 3), point))
-    return found
+        marks.append(TrueBenchmark(f"ZBM{k + 1:02d}", ranger, neighbour, round(float(certified), 3), point))
+    return marks

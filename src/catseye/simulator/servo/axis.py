@@ -300,7 +300,7 @@ class ServoAxis:
         if not chip.stops_on_error:
             return Homing(False, "no position error limit is set: ERL first, or a stop would be pushed against", 0.0)
         end = begin + self._samples_of(timeout)
-        found = False
+        homed = False
         for sense in (direction, -direction):
             chip.find_index()
             self.abp(self.acp() + sense * turn)
@@ -310,25 +310,25 @@ class ServoAxis:
                 return Homing(False, text, (self.samples - begin) * self.motor.sample)
             while self.samples < end and not (chip.index_found or chip.trajectory_complete):
                 self._step()
-            found = chip.index_found
-            if found or not chip.motor_off:  # a whole turn without a pulse, or no time left
+            homed = chip.index_found
+            if homed or not chip.motor_off:  # a whole turn without a pulse, or no time left
                 break
         chip.seeking = False
-        if found:
+        if homed:
             self.abp(chip.index_position)
             for _ in range(2):  # braking beyond the index, it may meet a stop: the motor is off, and starts again
                 self.stt()
                 if self.wai((end - self.samples) * self.motor.sample).status != "motor off":
                     break
             left = (end - self.samples) * self.motor.sample
-            found = left > 0.0 and self.cwt(chip.index_position, Settling(tolerance=0, timeout=left)).success
-            text = "home" if found else f"the index at {chip.index_position} counts was seen but not settled on"
+            homed = left > 0.0 and self.cwt(chip.index_position, Settling(tolerance=0, timeout=left)).success
+            text = "home" if homed else f"the index at {chip.index_position} counts was seen but not settled on"
         else:
             text = f"no index pulse within a turn from {self.acp()} counts, or in {timeout:g} s"
-        if found:
+        if homed:
             chip.define_home()
             self.abp(0)
-        return Homing(found, text, (self.samples - begin) * self.motor.sample)
+        return Homing(homed, text, (self.samples - begin) * self.motor.sample)
 
     def follow(self, counts: Sequence[float], samples: int = TRACKING_SAMPLES) -> AxisTrace:
         """Track a moving target: the profile passes the given counts one after another, straight between them.

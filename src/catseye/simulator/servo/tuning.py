@@ -115,13 +115,13 @@ def ready_axis(
 
     Raises ValidityError for what a command does not accept.
     """
-    made = ServoAxis(chip or MotionChip(), Motor(design or AxisDesign(), angle))
-    made.axis(True)
-    made.flt(*filter_.values)
-    made.erl(error_limit)
-    made.abv(velocity)
-    made.aba(acceleration)
-    return made
+    axis = ServoAxis(chip or MotionChip(), Motor(design or AxisDesign(), angle))
+    axis.axis(True)
+    axis.flt(*filter_.values)
+    axis.erl(error_limit)
+    axis.abv(velocity)
+    axis.aba(acceleration)
+    return axis
 
 
 def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:

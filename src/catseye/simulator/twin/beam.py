@@ -33,7 +33,7 @@ class TracedDish:
 
     @classmethod
     def of(cls, record: ParaboloidRecord) -> "TracedDish":
-        """Of a site's paraboloid and aperture."""
+        """Rays over a site's paraboloid and aperture."""
         radius = record.aperture_radius_mm * MILLIMETRE
         nodes, weights = np.polynomial.legendre.leggauss(RINGS)
         r, angle = 0.5 * radius * (nodes + 1.0), 2.0 * np.pi * (np.arange(SPOKES) + 0.3) / SPOKES
@@ -54,11 +54,11 @@ class TracedDish:
         feed          (3,) m, where it is now
         """
         back = from_vector(np.asarray(turn, dtype=float))
-        seen = back.T @ (np.asarray(feed, dtype=float) - shift)  # the feed as the dish sees it
+        feed_in_dish = back.T @ (np.asarray(feed, dtype=float) - shift)  # the feed as the dish sees it
         points = np.column_stack([self.xy, np.sum(self.xy**2, axis=1) / (4.0 * self.focal_length)])
         normals = np.column_stack([-self.xy, np.full(len(self.xy), 2.0 * self.focal_length)])
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        ways = points - seen
+        ways = points - feed_in_dish
         ways /= np.linalg.norm(ways, axis=1)[:, None]
         out = ways - 2.0 * np.sum(ways * normals, axis=1)[:, None] * normals
         mean = back @ (self.weight @ out)

@@ -125,16 +125,16 @@ class SiteFeed:
             client.write(data)
 
     def _weather(self, ticks: int) -> list[bytes]:
-        told = []
+        lines = []
         for station in self.stations:
             read = self.world.weather(station, self.world.seconds(ticks * TICK_NS))
             values = (read.temperature_c, read.pressure_hpa, read.humidity_percent)
             if np.isfinite(values).any():
-                said = (
+                texts = (
                     f"{v:.{digits}f}" if np.isfinite(v) else "none" for v, digits in zip(values, (3, 3, 2), strict=True)
                 )
-                told.append(_line(Reply("WX", True, (station, *said), 0, ticks)))
-        return told
+                lines.append(_line(Reply("WX", True, (station, *texts), 0, ticks)))
+        return lines
 
     def _posture(self, ticks: int) -> bytes:
         """The place at exactly the stamp's time."""

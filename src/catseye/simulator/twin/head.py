@@ -6,6 +6,7 @@ rests, its past is not computed at all. A return is sampled along the beam's tru
 Five zeros as filter mean the head's own tuning: a ranger loads them at its boot, and they drive nothing.
 """
 
+from dataclasses import dataclass
 from math import ceil
 from typing import Protocol
 
@@ -46,8 +47,22 @@ class HeadWorld(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class HeadBuild:
+    """How one head is built.
+
+    travel        counts between the stops of azimuth and elevation: `mirror.travel_of(record)`
+    clock_error   s, the most that its clock is off while it follows its time signal
+    converter     its electronics; drawn by the head's seed if None
+    """
+
+    travel: tuple[tuple[float, float], tuple[float, float]] = TRAVEL
+    clock_error: float = LARGEST_CLOCK_ERROR
+    converter: Converter | None = None
+
+
 class TwinHead:
-    """A `ranger.head.RangerHead` of the twin.
+    """The `ranger.head.RangerHead` of the twin.
 
     ranger        whose it is
     world         the site's truth
@@ -55,9 +70,7 @@ class TwinHead:
     seed          of the twin: where the mirror stands at power on, offset, noise
     faults        of the twin: stuck-axis, lost-index, saturated-adc, drifting-clock are the head's
     tuning        how the mirror is driven where no command says it
-    travel        counts between the stops of azimuth and elevation: `mirror.travel_of(record)`
-    clock_error   s, the most that the head's clock is off while it follows its time signal
-    converter     its electronics; drawn by the seed if None
+    build         stops, clock, electronics
 
     Raises InputError: stops that leave the index out, or hold it twice.
     """
@@ -71,25 +84,24 @@ class TwinHead:
         seed: int,
         faults: FaultBoard | None = None,
         tuning: MirrorTuning | None = None,
-        travel: tuple[tuple[float, float], tuple[float, float]] = TRAVEL,
-        clock_error: float = LARGEST_CLOCK_ERROR,
-        converter: Converter | None = None,
+        build: HeadBuild | None = None,
     ):
+        build = build or HeadBuild()
         self.ranger, self._world, self._clock, self._seed = ranger, world, clock, seed
         self._faults = FaultBoard() if faults is None else faults
         rng = Streams(seed)(f"head/{ranger}")
         self._boot = clock.now_ns()
         self._mirror = TwinMirror(
             ranger,
-            np.array([rng.uniform(low + NEAR_STOP, high - NEAR_STOP) for low, high in travel]),
-            travel=travel,
+            np.array([rng.uniform(low + NEAR_STOP, high - NEAR_STOP) for low, high in build.travel]),
+            travel=build.travel,
             tuning=tuning,
             faults=self._faults,
             origin=world.seconds(self._boot),
         )
-        self._offset = round(rng.uniform(-clock_error, clock_error) * PER_SECOND)
+        self._offset = round(rng.uniform(-build.clock_error, build.clock_error) * PER_SECOND)
         self._set_at, self._latest = -float("inf"), 0
-        self._converter = converter or Converter.of(ranger, seed)
+        self._converter = build.converter or Converter.of(ranger, seed)
         self._supplies = {name: volt * (1.0 + 0.01 * rng.uniform(-1.0, 1.0)) for name, volt in SUPPLIES.items()}
         self._warmth = rng.uniform(24.0, 30.0), rng.uniform(1.0, 3.0), rng.uniform(0.0, TWO_PI)
         self._forget()

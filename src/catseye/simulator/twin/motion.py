@@ -98,12 +98,12 @@ class TelescopeSlew(AxisMotion):
         _refuse_elevation(self.end_deg[1], "slew")
 
     def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
-        found = []
+        axes = []
         for axis in (0, 1):
             begin = self.start_deg[axis] * DEGREE
             way = self.end_deg[axis] * DEGREE - begin
             if way == 0.0:
-                found.append((np.full_like(seconds, begin), np.zeros_like(seconds)))
+                axes.append((np.full_like(seconds, begin), np.zeros_like(seconds)))
                 continue
             speed = min(FASTEST[axis], np.sqrt(ACCELERATION * abs(way)))
             rise = speed / ACCELERATION
@@ -112,8 +112,8 @@ class TelescopeSlew(AxisMotion):
             end = whole - t
             passed = np.where(t < rise, 0.5 * ACCELERATION * t**2, speed * (t - 0.5 * rise))
             passed = np.where(end < rise, abs(way) - 0.5 * ACCELERATION * end**2, passed)
-            found.append((begin + np.sign(way) * passed, np.sign(way) * ACCELERATION * _least(t, end, rise)))
-        return AxisAngles(found[0][0], found[1][0], found[0][1], found[1][1])
+            axes.append((begin + np.sign(way) * passed, np.sign(way) * ACCELERATION * _least(t, end, rise)))
+        return AxisAngles(axes[0][0], axes[1][0], axes[0][1], axes[1][1])
 
 
 def _least(since: Array, until: Array, rise: float) -> Array:
@@ -152,7 +152,7 @@ class SkyTrack(AxisMotion):
         )
         sets = np.arccos(np.clip(lowest, -1.0, 1.0))  # hour angle; pi where it never does
 
-        def seen(hour: Array) -> tuple[Array, Array, Array, Array]:
+        def sky_angles(hour: Array) -> tuple[Array, Array, Array, Array]:
             """Azimuth off the meridian, elevation, and their derivatives by the hour angle."""
             cosine, sine = np.cos(hour)[:, None] * np.cos(declination), np.sin(hour)[:, None] * np.cos(declination)
             v = np.sin(declination) * pole + cosine * meridian - sine * EAST
@@ -167,15 +167,15 @@ class SkyTrack(AxisMotion):
         hours = first + speed * seconds
         transit = np.round(hours / TWO_PI)
         hour = hours - TWO_PI * transit
-        off, elevation, turn, climb = seen(hour)
+        off, elevation, turn, climb = sky_angles(hour)
         up = np.abs(hour) <= sets
         # below it waits: low, and azimuth goes evenly to where the object will rise
-        begin = float(seen(np.array([sets]))[0][0])
+        begin = float(sky_angles(np.array([sets]))[0][0])
         even = (round_trip - 2.0 * begin) / max(TWO_PI - 2.0 * sets, 1e-9)
         waits = begin + even * (np.where(hour > 0.0, hour, hour + TWO_PI) - sets)
         whole = round_trip * np.where(up | (hour > 0.0), transit, transit - 1.0)
         return AxisAngles(
-            a - float(seen(np.array([first]))[0][0]) + whole + np.where(up, off, waits),
+            a - float(sky_angles(np.array([first]))[0][0]) + whole + np.where(up, off, waits),
             np.where(up, elevation, LOWEST_DEG * DEGREE),
             speed * np.where(up, turn, even),
             speed * np.where(up, climb, 0.0),
@@ -236,16 +236,14 @@ class PostureTable(AxisMotion):
         span = at[k + 1] - at[k]
         s = (t - at[k]) / span
         moving = (seconds >= at[0]) & (seconds <= at[-1])
-        found = []
+        axes = []
         for y in (self.azimuth, self.elevation):
             slope = np.gradient(y, at)
             slope[0] = slope[-1] = 0.0
             left, right, rise = slope[k] * span, slope[k + 1] * span, y[k + 1] - y[k]
             c2, c3 = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
-            found.append(
-                (y[k] + s * (left + s * (c2 + s * c3)), (left + s * (2.0 * c2 + 3.0 * s * c3)) / span * moving)
-            )
-        return AxisAngles(found[0][0], found[1][0], found[0][1], found[1][1])
+            axes.append((y[k] + s * (left + s * (c2 + s * c3)), (left + s * (2.0 * c2 + 3.0 * s * c3)) / span * moving))
+        return AxisAngles(axes[0][0], axes[1][0], axes[0][1], axes[1][1])
 
 
 def read_table(path: Path) -> PostureTable:

@@ -92,10 +92,10 @@ class Returns:
             if np.any(off < CUBE_RADIUS):
                 return station.leakage + turned * self._reference(ranger, off, way, t, standing)
         beam = self.beam(ranger, counts, t, standing)
-        found = np.zeros(len(t), dtype=complex)
+        returned = np.zeros(len(t), dtype=complex)
         for name in self._near(beam, standing) if among is None else among:
-            found = found + self._return(ranger, name, beam, t, standing)
-        return station.leakage + turned * found
+            returned = returned + self._return(ranger, name, beam, t, standing)
+        return station.leakage + turned * returned
 
     def _near(self, beam: Beam, standing: TelescopeStanding) -> list[str]:
         """Names of what the beam may fall on at any of its times."""

@@ -99,19 +99,19 @@ class TwinPlaces:
     def points(self, names: Iterable[str], seconds: Array, standing: TelescopeStanding) -> Array:
         """True places (k, n, 3), m, ground frame; what rides on one body is done at once."""
         names = list(names)
-        found = np.empty((len(seconds), len(names), 3))
+        places = np.empty((len(seconds), len(names), 3))
         riding: dict[str, list[int]] = {}
         for i, name in enumerate(names):
             if self._known(name) in self.stations and self.stations[self._known(name)].body == "ground":
-                found[:, i] = self.point(name, seconds, standing)
+                places[:, i] = self.point(name, seconds, standing)
             else:
                 riding.setdefault(self.retros[name].body, []).append(i)
         for body, at in riding.items():
-            found[:, at] = self._ridden(body, [self._rows[names[i]] for i in at], standing)
+            places[:, at] = self._ridden(body, [self._rows[names[i]] for i in at], standing)
             for i in at:
                 if names[i] in self._shifts:
-                    found[:, i] += self._shifts[names[i]]
-        return found
+                    places[:, i] += self._shifts[names[i]]
+        return places
 
     def _ridden(self, body: str, rows: list[int], standing: TelescopeStanding) -> Array:
         """(k, m, 3) of rows of a body's crowd."""
@@ -153,12 +153,12 @@ class TwinPlaces:
 
     def near(self, beam: Beam, standing: TelescopeStanding, k: int) -> list[str]:
         """Names of what may lie in a beam at its k-th time: rests within `ASIDE` of it, nearest first."""
-        found: list[tuple[float, str]] = []
+        by_distance: list[tuple[float, str]] = []
         for body, crowd in self._crowds.items():
             turn, shift = standing.bodies[body].turn[k], standing.bodies[body].shift[k]
             sight = crowd.rest - (beam.origin[k] - shift) @ turn
             along = sight @ (beam.direction[k] @ turn)
             off = np.einsum("ij,ij->i", sight, sight) - along**2
             for i in np.flatnonzero((off < ASIDE**2) & (along > NEAREST)):
-                found.append((float(off[i]), crowd.names[i]))
-        return [name for _, name in sorted(found)]
+                by_distance.append((float(off[i]), crowd.names[i]))
+        return [name for _, name in sorted(by_distance)]

@@ -110,9 +110,9 @@ class Twin:
 
     def posture(self, seconds: ArrayLike) -> AxisAngles:
         """What the telescope's encoders tell: angles (k,), rad, and rates (k,), rad/s."""
-        return self.telescope.told(_times(seconds))
+        return self.telescope.encoder_angles(_times(seconds))
 
-    def told(self, ticks: int) -> LivePosture:
+    def live_posture(self, ticks: int) -> LivePosture:
         """The same at one instant, as the site's feed says it."""
         return LivePosture(ticks, *(float(values[0]) for values in self.posture(self.seconds_of_ticks(ticks))))
 

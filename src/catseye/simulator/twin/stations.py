@@ -137,7 +137,7 @@ def reference_cube(station: TrueStation) -> tuple[Array, float]:
 
 def stations(site: SiteFolder, draw: Drawing) -> dict[str, TrueStation]:
     """Every ranger of a site, by name, sorted."""
-    found = {}
+    drawn = {}
     arm = {ranger.name: ranger for ranger in site.feedarm.ranger}
     for name in draw.planted.d0_error_mm:
         if name not in site.rangers:
@@ -160,7 +160,7 @@ def stations(site: SiteFolder, draw: Drawing) -> dict[str, TrueStation]:
             # alpha1 turns about the mount's y, alpha2 about z, alpha3 about x
             u_turn = np.array([U_MOUNT if v is None else v for v in (m.u_alpha3_rad, m.u_alpha1_rad, m.u_alpha2_rad)])
         settle = draw.planted.gain("settling") * settle * np.array([[SINK], [SWAY], [LEAN]])
-        found[name] = _station(
+        drawn[name] = _station(
             name,
             mirror,
             rng,
@@ -170,7 +170,7 @@ def stations(site: SiteFolder, draw: Drawing) -> dict[str, TrueStation]:
             gamma=turning(gain * u_turn * turn) @ gamma,
             settle=settle,
         )
-    return found
+    return drawn
 
 
 def _station(
@@ -234,10 +234,10 @@ def _waves(mirror: Mirror) -> Array:
 def _cyclic(mirror: Mirror) -> Array:
     """(2, n) mm; a sheet that says an uncertainty alone means orders 1 and 2."""
     orders = len(mirror.cyclic_cosine_mm) or (2 if mirror.u_cyclic_mm is not None else 0)
-    found = np.zeros((2, orders))
+    waves = np.zeros((2, orders))
     if mirror.cyclic_cosine_mm:
-        found[:] = mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm
-    return found
+        waves[:] = mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm
+    return waves
 
 
 def arm_mount(ranger: FeedArmRanger, site: SiteFolder) -> Array:

@@ -111,17 +111,17 @@ def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Dr
 
     scan_points   true, ground frame, of the rangers from which benchmarks are certified
     """
-    found = {name: single(record, draw) for name, record in site.targets.items()}
+    drawn = {name: single(record, draw) for name, record in site.targets.items()}
     for record in site.triplets.values():
-        found |= triplet(record, draw)
+        drawn |= triplet(record, draw)
     gain = draw.planted.gain("calibration")
     for row in site.benchmarks:
-        if row.target in found and found[row.target].body == "ground" and row.ranger in scan_points:
-            station, old = scan_points[row.ranger], found[row.target]
+        if row.target in drawn and drawn[row.target].body == "ground" and row.ranger in scan_points:
+            station, old = scan_points[row.ranger], drawn[row.target]
             miss = gain * row.u_mm * draw.streams(f"benchmark/{row.target}").normal()
             rest = station + unit(old.rest - station) * (row.certified_distance_mm + miss) * MILLIMETRE
-            found[row.target] = BodyRetroreflector(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
-    return found
+            drawn[row.target] = BodyRetroreflector(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
+    return drawn
 
 
 def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:

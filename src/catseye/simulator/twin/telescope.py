@@ -39,12 +39,12 @@ def turning(vector: Array) -> Array:
     safe = np.where(angle > 0.0, angle, 1.0)
     first = np.where(angle > 0.0, np.sin(angle) / safe, 1.0)
     second = np.where(angle > 0.0, 2.0 * (np.sin(0.5 * angle) / safe) ** 2, 0.5)
-    found = np.empty((*angle.shape, 3, 3))
+    matrices = np.empty((*angle.shape, 3, 3))
     for i, j, k, u, v, w in ((0, 1, 2, x, y, z), (1, 2, 0, y, z, x), (2, 0, 1, z, x, y)):
-        found[..., i, i] = 1.0 - second * (v * v + w * w)
-        found[..., i, j] = second * u * v - first * w
-        found[..., i, k] = second * u * w + first * v
-    return found
+        matrices[..., i, i] = 1.0 - second * (v * v + w * w)
+        matrices[..., i, j] = second * u * v - first * w
+        matrices[..., i, k] = second * u * w + first * v
+    return matrices
 
 
 def low_orders(xy: Array, centre: Array, radius: float) -> Array:
@@ -106,16 +106,16 @@ class Telescope:
         """Where the axes truly are, at times (k,)."""
         return self.motion.angles(seconds, latitude=self.latitude, start_mjd=self.start_mjd)
 
-    def told(self, seconds: Array) -> AxisAngles:
+    def encoder_angles(self, seconds: Array) -> AxisAngles:
         """What the encoders tell, at times (k,)."""
-        true, told = self.angles(seconds), []
+        true, encoders = self.angles(seconds), []
         for axis in (0, 1):
             wave = ENCODER_ORDERS * true[axis][:, None]
             cosine, sine = self.encoder[:, axis]
             error = np.cos(wave) @ cosine + np.sin(wave) @ sine
             slope = np.cos(wave) @ (ENCODER_ORDERS * sine) - np.sin(wave) @ (ENCODER_ORDERS * cosine)
-            told.append((true[axis] + error, true[axis + 2] * (1.0 + slope)))
-        return AxisAngles(told[0][0], told[1][0], told[0][1], told[1][1])
+            encoders.append((true[axis] + error, true[axis + 2] * (1.0 + slope)))
+        return AxisAngles(encoders[0][0], encoders[1][0], encoders[0][1], encoders[1][1])
 
     def standing(self, seconds: Array) -> TelescopeStanding:
         """Where all stands at times (k,), s since the start."""
@@ -215,15 +215,15 @@ def _moved(turn: Array, vector: Array) -> Array:
 
 def _azimuth(angle: Array) -> Array:
     """Alidade to ground (k, 3, 3), clockwise from north. Source: [PARKER04] eq. 2.40."""
-    found = np.zeros((len(angle), 3, 3))
+    matrices = np.zeros((len(angle), 3, 3))
     c, s = np.cos(angle), np.sin(angle)
-    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1], found[:, 2, 2] = c, s, -s, c, 1.0
-    return found
+    matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 0], matrices[:, 1, 1], matrices[:, 2, 2] = c, s, -s, c, 1.0
+    return matrices
 
 
 def _elevation(angle: Array) -> Array:
     """Elevation structure to alidade (k, 3, 3), parallel at the zenith. Source: [PARKER04] eq. 2.41."""
-    found = np.zeros((len(angle), 3, 3))
+    matrices = np.zeros((len(angle), 3, 3))
     s, c = np.sin(angle), np.cos(angle)
-    found[:, 0, 0], found[:, 1, 1], found[:, 1, 2], found[:, 2, 1], found[:, 2, 2] = 1.0, s, c, -c, s
-    return found
+    matrices[:, 0, 0], matrices[:, 1, 1], matrices[:, 1, 2], matrices[:, 2, 1], matrices[:, 2, 2] = 1.0, s, c, -c, s
+    return matrices
