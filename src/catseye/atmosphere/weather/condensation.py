@@ -81,8 +81,8 @@ def condensation(
     Raises ValidityError outside these limits, for an uncertainty below zero, and for a covariance above u u.
     Source: [PARKER04] section 1.4.1 with eqs. 1.3, 1.4, 1.7; [JCGM100] eq. 13.
 
-    >>> found = condensation(5.0, 10.0, 933.0, 75.0, u_surface_c=0.5)
-    >>> round(float(found.margin_k), 2), str(found.deposit), round(float(found.probability), 2)
+    >>> risk = condensation(5.0, 10.0, 933.0, 75.0, u_surface_c=0.5)
+    >>> round(float(risk.margin_k), 2), str(risk.deposit), round(float(risk.probability), 2)
     (-0.78, 'dew', 0.94)
     """
     SURFACE.check(surface_c)
