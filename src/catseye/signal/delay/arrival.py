@@ -212,18 +212,18 @@ class DelayPlan:
         start, low = self._placed(centre, rows.shape[1])
         form = self._form(len(rows))
         step = max(1, BLOCK_SAMPLES // self.stretch)
-        found, status = np.empty((len(rows), 5)), np.empty(len(rows), np.int8)
+        arrivals, status = np.empty((len(rows), 5)), np.empty(len(rows), np.int8)
         with np.errstate(all="ignore"):  # a recording that is not finite, or silent, answers NaN
             for begin in range(0, len(rows), step):
                 part = slice(begin, begin + step)
                 piece = self._cut(rows[part], start[part])
-                found[part], status[part] = form(piece, low[part], self.search, self._ends(piece))
-        found[:, 0] = (found[:, 0] + start) / self.sampling_hz
-        found[:, 1] = np.sqrt(found[:, 1]) / self.sampling_hz
+                arrivals[part], status[part] = form(piece, low[part], self.search, self._ends(piece))
+        arrivals[:, 0] = (arrivals[:, 0] + start) / self.sampling_hz
+        arrivals[:, 1] = np.sqrt(arrivals[:, 1]) / self.sampling_hz
         if status.any():
-            found[status > ECHO, 1] = np.nan
-            found[status >= SILENT] = np.nan
-        delay, u, amplitude, snr, rival = (column.reshape(batch) for column in found.T)
+            arrivals[status > ECHO, 1] = np.nan
+            arrivals[status >= SILENT] = np.nan
+        delay, u, amplitude, snr, rival = (column.reshape(batch) for column in arrivals.T)
         return Delays(delay, u, amplitude, snr, rival, status.reshape(batch))
 
     def correlation(self, recording: ArrayLike, expected: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
