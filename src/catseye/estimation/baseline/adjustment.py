@@ -182,18 +182,18 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
     bounds = list(zip(low[active], high[active], strict=True))
     tries = [begin, begin + np.log([0.1, 10.0])[[0] * (len(begin) - 1) + [1]]]
     best = min((minimize(criterion, t, jac=True, method="L-BFGS-B", bounds=bounds) for t in tries), key=lambda r: r.fun)
-    found = all_of(best.x)
-    return Claim(*found), _component_covariance(model, y, a, found, active, repeats)
+    components = all_of(best.x)
+    return Claim(*components), _component_covariance(model, y, a, components, active, repeats)
 
 
-def _component_covariance(model, y, a, found, active, repeats):
+def _component_covariance(model, y, a, components, active, repeats):
     """From the expected information, half the trace of P Q P Q."""
     m = len(model.distance)
-    normal = Normal(y, a, model.variance(Claim(*found)), model.names)
+    normal = Normal(y, a, model.variance(Claim(*components)), model.names)
     cofactors = model.cofactors()
     information = 0.5 * cofactors @ normal.p[:m, :m] ** 2 @ cofactors.T
     if repeats:
-        information[0, 0] += 0.5 * repeats / found[0] ** 2
+        information[0, 0] += 0.5 * repeats / components[0] ** 2
     covariance = np.full((3, 3), np.nan)
     part = information[np.ix_(active, active)]
     size = 1.0 / np.sqrt(np.diag(part))
@@ -223,8 +223,8 @@ def _solution(model: BaselineModel, values, noise: Claim, u_noise: np.ndarray, n
     misclosure, _ = model.rows(values)
     py, diagonal = normal.p @ misclosure, np.diag(normal.p)
     p = normal.p[:m, :m]
-    seen = diagonal[:m] * np.diag(normal.v)[:m] > CONTROLLED
-    size = np.sqrt(np.where(seen, diagonal[:m], np.nan))
+    controlled = diagonal[:m] * np.diag(normal.v)[:m] > CONTROLLED
+    size = np.sqrt(np.where(controlled, diagonal[:m], np.nan))
     w_set = py[:m] / size
     repeats = len(sights) - m
     n = model.shots[sights.set]

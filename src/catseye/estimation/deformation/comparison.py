@@ -124,7 +124,7 @@ def compare(
         epochs = model.epochs(np.arange(len(names)))
         deformation = moved_points(epochs, **options)
         plain = differences(epochs, held.datum, deformation.stable)
-        difference, covariance = _blocks_of(*_seen(plain, deformation.stable))
+        difference, covariance = _blocks_of(*_plain_differences(plain, deformation.stable))
     done = PointMovements(
         first=first,
         second=second,
@@ -231,9 +231,9 @@ def _beside_frame(
     """
     level, factor = options["level"], options["variance_factor"]
     epochs = model.epochs(inside)
-    found = moved_points(epochs, **{**options, "level": 0.5 * level})
-    between = differences(epochs, options["datum"], found.stable)
-    stable = replace(between, used=between.used & np.repeat(found.stable, 3))
+    congruence = moved_points(epochs, **{**options, "level": 0.5 * level})
+    between = differences(epochs, options["datum"], congruence.stable)
+    stable = replace(between, used=between.used & np.repeat(congruence.stable, 3))
     used = np.flatnonzero(stable.used)
     others = np.setdiff1d(np.arange(len(model.names)), inside)
     motions = motion_columns(model.x[others], between.pivot) @ between.combination
@@ -253,7 +253,7 @@ def _beside_frame(
 
     if np.linalg.matrix_rank(between.motions[used]) < between.motions.shape[1]:
         raise EstimationError(
-            f"the {int(found.stable.sum())} stable points of the frame do not hold the datum; add more"
+            f"the {int(congruence.stable.sum())} stable points of the frame do not hold the datum; add more"
         )
     fit = stable.fit()
     displacement, covariance = foretold(motions @ fit.gain + across[:, used] @ fit.weight)
@@ -269,28 +269,28 @@ def _beside_frame(
     def joined(frame: np.ndarray, rest: np.ndarray) -> np.ndarray:
         return np.concatenate([frame, rest])[at]
 
-    text = f"frame {found.status}; of the {len(others)} other points "
+    text = f"frame {congruence.status}; of the {len(others)} other points "
     text += f"moved: {listed([model.names[i] for i in others[moved]])}" if moved.any() else "none moved"
     deformation = replace(
-        found,
+        congruence,
         names=model.names,
-        displacement=joined(found.displacement, displacement),
-        covariance=joined(found.covariance, covariance * factor.value),
-        statistic=joined(found.statistic, statistic / factor.value),
-        p=joined(found.p, p),
-        p_adjusted=joined(found.p_adjusted, np.minimum(1.0, p * count)),
-        moved=joined(found.moved, moved),
-        held=joined(found.held, np.zeros(len(others), dtype=bool)),
-        stable=joined(found.stable, ~moved),
-        detectable=joined(found.detectable, np.sqrt(needed * worst)),
+        displacement=joined(congruence.displacement, displacement),
+        covariance=joined(congruence.covariance, covariance * factor.value),
+        statistic=joined(congruence.statistic, statistic / factor.value),
+        p=joined(congruence.p, p),
+        p_adjusted=joined(congruence.p_adjusted, np.minimum(1.0, p * count)),
+        moved=joined(congruence.moved, moved),
+        held=joined(congruence.held, np.zeros(len(others), dtype=bool)),
+        stable=joined(congruence.stable, ~moved),
+        detectable=joined(congruence.detectable, np.sqrt(needed * worst)),
         level=level,
         status=text,
     )
-    frame_plain = _blocks_of(*_seen(between, found.stable))
+    frame_plain = _blocks_of(*_plain_differences(between, congruence.stable))
     return deformation, (joined(frame_plain[0], plain[0]), joined(frame_plain[1], plain[1]))
 
 
-def _seen(between: Differences, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _plain_differences(between: Differences, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Plain differences in the datum of stable points; nan where too few of them are left to hold it."""
     held = between.motions[np.repeat(stable, 3) & between.used]
     if np.linalg.matrix_rank(held) < held.shape[1]:

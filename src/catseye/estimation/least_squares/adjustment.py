@@ -238,18 +238,18 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
     if not tests:
         return fit
     wide = rows.spread(jacobian)
-    seen = np.where(on[:, None], wide, 0.0)
-    weighted, pv, own = rows.weigh(seen), rows.weigh(v), rows.own_weight()
+    design = np.where(on[:, None], wide, 0.0)
+    weighted, pv, own = rows.weigh(design), rows.weigh(v), rows.own_weight()
     spread = rows.products(q, weighted)
     visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
-    redundancy[:] = 1.0 - np.sum(spread * seen, axis=1)
+    redundancy[:] = 1.0 - np.sum(spread * design, axis=1)
     standardised[:] = pv / np.sqrt(visible)
     error[:] = pv / visible
     detectable[:] = NONCENTRALITY / np.sqrt(visible)
     out = np.flatnonzero(~on)
     if len(out):
         gain, expected = rows.prediction(out)
-        rest = wide[out] - gain @ seen if gain is not None else wide[out]
+        rest = wide[out] - gain @ design if gain is not None else wide[out]
         surprise = residual[out] - gain @ v if gain is not None else residual[out]
         expected = expected + np.sum(rows.products(q, rest, out) * rest, axis=1)
         redundancy[out] = 1.0

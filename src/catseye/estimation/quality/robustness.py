@@ -426,7 +426,7 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
     without = np.square(np.where(out, 0.0, _tests(rows, out)))
     w, errors = rows.of("standardised"), rows.of("estimated_error")
     undecided = np.zeros(len(out), dtype=bool)
-    found = []
+    rejections = []
     for row in sorted(np.flatnonzero(out), key=lambda i: -abs(w[i])):
         margin, rival = np.nan, None
         if weigh:
@@ -442,8 +442,8 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
             alike = explains & (margins < DECISIVE)
             alike[row] = alike.any()
             undecided |= alike
-        found.append(Rejection(*rows.place(int(row)), float(w[row]), float(errors[row]), margin, rival))
-    return tuple(found), undecided
+        rejections.append(Rejection(*rows.place(int(row)), float(w[row]), float(errors[row]), margin, rival))
+    return tuple(rejections), undecided
 
 
 def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) -> str:

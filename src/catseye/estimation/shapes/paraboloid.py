@@ -105,9 +105,9 @@ def fit_paraboloid(
     free = ordered(free)
     k, count = len(points), sum(PARAMETERS[name] for name in free)
     weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
-    if (seen := int(np.count_nonzero(weights))) < count:
+    if (given := int(np.count_nonzero(weights))) < count:
         what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
-        raise EstimationError(f"{what} needs {count} points, {seen} given")
+        raise EstimationError(f"{what} needs {count} points, {given} given")
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
     root = np.sqrt(weights)[:, None]
     translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
@@ -247,15 +247,15 @@ def _design(
 
 def _expansion(free: tuple[str, ...], tilts: np.ndarray) -> np.ndarray:
     """(6, p): translation and rotation vector in the outer frame from the parameters."""
-    made = np.zeros((6, sum(PARAMETERS[name] for name in free)))
+    expansion = np.zeros((6, sum(PARAMETERS[name] for name in free)))
     at = 0
     for name in free:
         if name == "vertex":
-            made[:3, at : at + 3] = np.eye(3)
+            expansion[:3, at : at + 3] = np.eye(3)
         elif name == "axis":
-            made[3:, at : at + 2] = tilts
+            expansion[3:, at : at + 2] = tilts
         at += PARAMETERS[name]
-    return made
+    return expansion
 
 
 def _deviation(

@@ -227,11 +227,11 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
         motion = problem.fit(extra)
         return [_fit(problem.linear(motion, extra), motion, problem.spread(motion.matrix), sigma)]
 
-    found = estimate_robustly(solve, [len(sigma)], method=method, start="l1", limit=limit)
-    if found.status != CONVERGED:
-        raise EstimationError(f"the robust pose did not settle: {found.status}")
-    statistic = np.abs(np.nan_to_num(found.statistic[0])).reshape(-1, 3).max(axis=1)
-    keep = np.asarray(~np.any(found.rejected[0].reshape(-1, 3), axis=1))
+    estimate = estimate_robustly(solve, [len(sigma)], method=method, start="l1", limit=limit)
+    if estimate.status != CONVERGED:
+        raise EstimationError(f"the robust pose did not settle: {estimate.status}")
+    statistic = np.abs(np.nan_to_num(estimate.statistic[0])).reshape(-1, 3).max(axis=1)
+    keep = np.asarray(~np.any(estimate.rejected[0].reshape(-1, 3), axis=1))
     if int(keep.sum()) < POINTS["rigid"]:
         raise EstimationError(
             f"a robust pose of {len(keep)} points would leave {int(keep.sum())} (expected 3 or more): the group does "

@@ -83,32 +83,32 @@ def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, tr
     size = float(np.ptp(places, axis=0).max())
     # error contrasts: what the trend cannot touch
     contrast = np.linalg.qr(trend, mode="complete")[0][:, q:]
-    seen, blur = contrast.T @ values, contrast.T @ noise @ contrast
-    spread = max(float(np.std(seen)), LEAST)
+    contrasts, contrast_noise = contrast.T @ values, contrast.T @ noise @ contrast
+    spread = max(float(np.std(contrasts)), LEAST)
     least, most = np.log(LEAST / spread), np.log(1e3)
     shortest = size / (2.0 * np.sqrt(len(places)))
     span = (np.log(shortest / size), np.log(LONGEST))
 
     def cost(parameters: np.ndarray) -> float:
         guess = _roughness(parameters, spread, size)
-        matrix = contrast.T @ guess.covariance(places, places) @ contrast + blur
+        matrix = contrast.T @ guess.covariance(places, places) @ contrast + contrast_noise
         matrix[np.diag_indices_from(matrix)] += guess.own**2 + LEAST**2
         try:
             factor = np.linalg.cholesky(matrix / spread**2)
         except np.linalg.LinAlgError:
             return 1e12
-        white = solve_triangular(factor, seen / spread, lower=True)
+        white = solve_triangular(factor, contrasts / spread, lower=True)
         return float(np.sum(np.log(np.diag(factor))) + 0.5 * white @ white)
 
     starts = [(np.log(0.7), np.log(share), np.log(0.7)) for share in (0.1, 0.5)]
-    found = [
+    minima = [
         minimize(
             cost, start, method="L-BFGS-B", bounds=((least, most), span, (least, most)),
             options={"maxfun": EVALUATIONS},
         )
         for start in starts
     ]  # fmt: skip
-    return _roughness(min(found, key=lambda f: float(f.fun)).x, spread, size)
+    return _roughness(min(minima, key=lambda f: float(f.fun)).x, spread, size)
 
 
 def _roughness(parameters: np.ndarray, spread: float, size: float) -> Roughness:

@@ -64,7 +64,7 @@ def _pass(local, weights, variance, six, columns, focal, squared, what, deviatio
 
     The points that were seen.
     """
-    p, seen = len(columns), 0
+    p, count = len(columns), 0
     f = focal + six[5]
     r = _turned(six[3], six[4])
     half, quarter = 0.5 / f, 0.25 / f
@@ -90,7 +90,7 @@ def _pass(local, weights, variance, six, columns, focal, squared, what, deviatio
         w = weights[i]
         if w == 0.0:
             continue
-        seen += 1
+        count += 1
         gx, gy = -x * half * cos, -y * half * cos
         nx = r[0, 0] * gx + r[0, 1] * gy + r[0, 2] * cos
         ny = r[1, 0] * gx + r[1, 1] * gy + r[1, 2] * cos
@@ -111,7 +111,7 @@ def _pass(local, weights, variance, six, columns, focal, squared, what, deviatio
             for a in range(p):
                 for b in range(a + 1):
                     spread[a, b] += noise * chosen[a] * chosen[b]
-    return seen
+    return count
 
 
 @njit(cache=True, error_model="numpy")

@@ -496,7 +496,7 @@ def _felt(slots, ends, order, distance, root, points, own, width, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _seen(row, step, width, total):
+def _add_along(row, step, width, total):
     """Add a (g . step) of one slot to the sums of its targets."""
     sx, sy, sz = -step[0], -step[1], -step[2]
     s3, s4 = (step[3], step[4]) if width > 3 else (0.0, 0.0)
@@ -519,7 +519,7 @@ def _back(slots, ends, order, distance, root, points, inverse, own, step, width,
         for k in range(ends[b], ends[b + 1]):
             s = slots[k]
             _directions(x, stations[s], zero[s], scale[s], distance[k], root[k], row)
-            _seen(row, step[s * width : (s + 1) * width], width, total)
+            _add_along(row, step[s * width : (s + 1) * width], width, total)
         for lane in range(min(LANES, len(order) - b * LANES)):
             t = order[b * LANES + lane]
             for i in range(3):
