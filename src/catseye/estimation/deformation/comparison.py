@@ -238,12 +238,8 @@ def _beside_frame(
     others = np.setdiff1d(np.arange(len(model.names)), inside)
     motions = motion_columns(model.x[others], between.pivot) @ between.combination
     step = model.y[others] @ between.turned.T + between.shifted - model.x[others]
-    rows = (3 * others[:, None] + np.arange(3)).ravel()
-    q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
-    turn = between.turned
-    q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
-    across = q1 - ahead + turned_covariance(q2 - back, turn, columns=False)
-    own = model.of_points(others, turn)
+    across = _across(model, others, inside, between.turned)
+    own = model.of_points(others, between.turned)
 
     def foretold(gain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         g, c = gain.reshape(-1, 3, len(used)), across[:, used].reshape(-1, 3, len(used))
@@ -288,6 +284,14 @@ def _beside_frame(
     )
     frame_plain = _blocks_of(*_plain_differences(between, congruence.stable))
     return deformation, (joined(frame_plain[0], plain[0]), joined(frame_plain[1], plain[1]))
+
+
+def _across(model: EpochModel, others: np.ndarray, inside: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Covariance (3k, 3f) of the differences of other points and of those inside, the second epoch turned."""
+    rows = (3 * others[:, None] + np.arange(3)).ravel()
+    q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
+    q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
+    return q1 - ahead + turned_covariance(q2 - back, turn, columns=False)
 
 
 def _plain_differences(between: Differences, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

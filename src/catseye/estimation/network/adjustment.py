@@ -207,26 +207,18 @@ class _Problem:
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
-        larger, added = _padded(inflation[0], self.groups, 1.0), None
-        if larger is not None and inflation[1]:
-            finite = [np.where(np.isfinite(f), f, 1.0) for f in larger]
-            larger, added = None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
+        larger, added = self._inflated(*inflation)
         rows = [ActiveRows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
         x, taken = self.x0, 0
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: LeastSquaresSolution | None = None
         settled = False
         for _ in range(PASSES):
-            try:
-                floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
-            except np.linalg.LinAlgError:
-                floating = Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+            floating = self._motions(rows, x)
             conditions, loose = datum_conditions(floating, datum, points.xyz)
             if loose.shape[1]:
-                apart = unconnected(self.network)
                 text = WEAK_DATUM if datum.any() else NO_DATUM
-                status = apart or text.format(motions=floating.words(loose))
-                return self.unanswered(status, x)
+                return self.unanswered(unconnected(self.network) or text.format(motions=floating.words(loose)), x)
             held = self.free.copy()
             held[minimal_coordinates(conditions)] = False
             solution = adjust(
@@ -252,15 +244,11 @@ class _Problem:
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
             x = x + moved
-            size = float(np.ptp(x[:n].reshape(-1, 3), axis=0).max())
-            limit = SETTLED * size
-            if tests:  # what a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties
-                u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0))
-                limit = max(limit, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
-            settled = bool(np.abs(moved[:n]).max() <= limit)
+            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if tests else np.zeros(0)
+            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), u))
+            if settled and tests:
+                solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
-                if tests:
-                    solution = replace(solution, q=transformed(solution.q, t, conditions))
                 break
         assert solution is not None
         solution = replace(solution, x=x, iterations=taken)
@@ -269,10 +257,27 @@ class _Problem:
         if len(solution.floating):
             status = unconnected(self.network) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
-        answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
+        answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
+
+    def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
+        """Motions at x that nothing holds; none where the start is too poor to tell them."""
+        try:
+            return floating_motions(rows, x, x[: 3 * len(self.network.points.names)].reshape(-1, 3), self.free)
+        except np.linalg.LinAlgError:
+            return Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+
+    def _inflated(
+        self, inflation: Sequence[np.ndarray] | None, alone: bool
+    ) -> tuple[list[np.ndarray] | None, list[np.ndarray] | None]:
+        """Factors on standard uncertainties, one array a group; or, `alone`, variances to add instead."""
+        factors = _padded(inflation, self.groups, 1.0)
+        if factors is None or not alone:
+            return factors, None
+        finite = [np.where(np.isfinite(f), f, 1.0) for f in factors]
+        return None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points
@@ -319,6 +324,15 @@ class _Problem:
             variance_factor=float("nan"),
             degrees_of_freedom=float("nan"),
         )
+
+
+def _motion_limit(points: np.ndarray, u: np.ndarray) -> float:
+    """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
+
+    What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
+    """
+    size = float(np.ptp(points, axis=0).max())
+    return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
 
 
 def _padded(

@@ -117,16 +117,9 @@ def fit_paraboloid(
         scaled = root * (cos[:, None] if measure == "half-path" else 1.0)
         gain = _gain(design, scaled, k)
         step = gain @ deviation
-        at = 0
-        for name in free:
-            part = step[at : at + PARAMETERS[name]]
-            at += len(part)
-            if name == "vertex":
-                translation = translation + part
-            elif name == "axis":
-                turn = turn + part
-            else:
-                focal = focal + float(part[0])
+        parts = _parts(step, free)
+        translation, turn = translation + parts.get("vertex", 0.0), turn + parts.get("axis", 0.0)
+        focal = focal + float(parts["focal-length"][0]) if "focal-length" in free else focal
         if not 0.0 < focal < np.inf:
             raise EstimationError(f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer")
         if count == 0 or np.max(np.abs(step)) < CONVERGED_STEP:
@@ -137,16 +130,12 @@ def fit_paraboloid(
     along = covariance_along(covariance, normal)
     carried = _expansion(free, tilts) @ gain
     parameters = gain @ along @ gain.T
+    rotation = from_vector(tilts @ turn) @ nominal.rotation
     return ParaboloidFit(
         translation=translation,
         rotation=tilts @ turn,
         covariance=carried @ along @ carried.T,
-        frame=Transform(
-            nominal.to,
-            nominal.from_,
-            from_vector(tilts @ turn) @ nominal.rotation,
-            nominal.translation + translation,
-        ),
+        frame=Transform(nominal.to, nominal.from_, rotation, nominal.translation + translation),
         local=local,
         deviation=deviation,
         deviation_covariance=without(along, design, gain),
@@ -159,6 +148,12 @@ def fit_paraboloid(
         gain=gain,
         along=along,
     )
+
+
+def _parts(step: np.ndarray, free: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """A step of the parameters by what is free."""
+    ends = np.cumsum([PARAMETERS[name] for name in free])
+    return {name: step[end - PARAMETERS[name] : end] for name, end in zip(free, ends.tolist(), strict=True)}
 
 
 def ordered(free: Sequence[str]) -> tuple[str, ...]:

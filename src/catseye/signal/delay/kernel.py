@@ -42,7 +42,8 @@ def find(piece, low, search: PeakSearch, ends):
         weights = search.weight[None]
         _weigh(spectrum, search.template, search.weight, padded, search.first)
     correlation = np.fft.irfft(padded, search.stretch)
-    _rows(piece, ends[0], ends[1], spectrum, padded, correlation, low, weights, search, scale, arrivals, status)
+    spectra = spectrum, padded, correlation, weights
+    _rows(piece, (ends[0], ends[1]), spectra, low, search, scale, (arrivals, status))
     return arrivals, status
 
 
@@ -188,7 +189,9 @@ def _strongest_other(c, own, start, height):
 
 
 @_compiled
-def _rows(piece, bottom, top, spectrum, padded, correlation, low, weights, search, scale, arrivals, status):
+def _rows(piece, ends, spectra, low, search, scale, out):
+    spectrum, padded, correlation, weights = spectra
+    arrivals, status = out
     omega, step, lines = (
         search.omega[0],
         search.omega[1] - search.omega[0],
@@ -215,7 +218,7 @@ def _rows(piece, bottom, top, spectrum, padded, correlation, low, weights, searc
             rho = _own(own, second_at + low[b] - inside)
             apart = np.sqrt(snr) * (1.0 - second) / np.sqrt(2.0 * max(1.0 - rho, 1e-12))
         other = _strongest_other(c, own, low[b] - inside, height)
-        damage = _damage(piece[b], bottom, top)
+        damage = _damage(piece[b], ends[0], ends[1])
         status[b] = max(damage, _judged(lag, snr, apart, other, search.least_snr))
         rival = second if apart < TOLD_APART and second > other else other
         arrivals[b, 0], arrivals[b, 1], arrivals[b, 2], arrivals[b, 3], arrivals[b, 4] = (

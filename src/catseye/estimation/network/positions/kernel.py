@@ -207,8 +207,12 @@ def _normal_last(m, figure):
 
 
 @_inlined
-def _own_figure(ranges, spread, root, stations, count, flat, figure, m, z, clear):
-    """As `_whole_figure`, each target with the frame of what it sees; not clear where that is a line, or too few."""
+def _own_figure(block, stations, count, flat, figure, m, z, clear):
+    """As `_whole_figure`, each target with the frame of what it sees; not clear where that is a line, or too few.
+
+    `block` are ranges, their spread and the roots of their weights.
+    """
+    ranges, spread, root = block
     _moments(ranges, root, stations, count, figure, m)
     _principal_axes(m, figure)
     _normal_last(m, figure)
@@ -346,7 +350,7 @@ def locate(measured, site, limits, answers):
         if whole:
             _whole_figure(ranges, spread, site, figure, z)
         else:
-            _own_figure(ranges, spread, root, site.stations, count, limits.flat, figure, m, z, clear)
+            _own_figure((ranges, spread, root), site.stations, count, limits.flat, figure, m, z, clear)
         _closed_start(figure, z, count, near, limits.significant, at, clear)
         for j in range(lanes):
             answers.good[first + j], answers.ranges[first + j] = False, int(count[j])
