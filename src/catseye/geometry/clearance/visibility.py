@@ -62,8 +62,8 @@ def first_obstruction(
 
     Source: `solids`. Exact.
 
-    >>> from catseye.geometry.clearance.solids import Sphere
-    >>> index, at = first_obstruction([[0.0, 0.0, 0.0]], [[10.0, 0.0, 0.0]], [Sphere((5.0, 0.0, 0.0), 1.0)])
+    >>> from catseye.geometry.clearance.solids import SolidSphere
+    >>> index, at = first_obstruction([[0.0, 0.0, 0.0]], [[10.0, 0.0, 0.0]], [SolidSphere((5.0, 0.0, 0.0), 1.0)])
     >>> index.tolist(), at.tolist()
     ([[0]], [[4.0]])
     """
