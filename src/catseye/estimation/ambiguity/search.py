@@ -81,6 +81,22 @@ class Located:
         )
 
 
+@dataclass(frozen=True)
+class AmbiguityLimits:
+    """What `locate` allows for.
+
+    wrong   probability that a range is wrong altogether, light from elsewhere: any length of a period is then as
+            likely. 0 trusts them all; else any one may be left out
+    most    candidates to try before giving up
+    """
+
+    wrong: float = 0.0
+    most: int = 2_000_000
+
+
+ALL_TRUSTED = AmbiguityLimits()
+
+
 def locate(
     start: np.ndarray,
     prior_covariance: np.ndarray,
@@ -90,8 +106,7 @@ def locate(
     period: np.ndarray | float,
     covariance: np.ndarray,
     station_covariance: np.ndarray | None = None,
-    wrong: float = 0.0,
-    most: int = 2_000_000,
+    limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> Located:
     """The point and the whole cycles that fit a prior position and ranges modulo a half wavelength.
 
@@ -102,9 +117,7 @@ def locate(
     period               (r,) or one, m: the half wavelength in the air of each path
     covariance           (r, r) m^2 of the lengths, or (r,) variances: noise, constants, what stations have in common
     station_covariance   (r, 3, 3) m^2 or (3r, 3r) jointly; None if known or already in `covariance`
-    wrong                probability that a range is wrong altogether, light from elsewhere: any length of a period is
-                         then as likely. 0 trusts them all; else any one may be left out
-    most                 candidates to try before giving up
+    limits               whether a range may be wrong, and when to give up
 
     FOUND means: it fits (chi-square passes at 5.7e-7), and all the others together are less probable than 5.7e-7, every
     set of whole cycles being as likely beforehand as its position in the prior. With `wrong` those count too that fit
@@ -124,9 +137,9 @@ def locate(
     ranged = _ranged(start, prior_covariance, stations, lengths, period, covariance, station_covariance)
     if ranged is None:
         return _nothing(len(np.atleast_1d(lengths)), AmbiguityStatus.REFUSED)
-    if not 0.0 <= wrong < 0.5:
-        raise ValidityError(f"wrong = {wrong}: a probability of 0 to 0.5 is expected")
-    explanations = _explanations(ranged, wrong, most)
+    if not 0.0 <= limits.wrong < 0.5:
+        raise ValidityError(f"wrong = {limits.wrong}: a probability of 0 to 0.5 is expected")
+    explanations = _explanations(ranged, limits.wrong, limits.most)
     if explanations is None:
         return _nothing(len(ranged.lengths), AmbiguityStatus.TOO_MANY)
     return _judged(ranged, explanations)
@@ -141,8 +154,7 @@ def locate_all(
     period: np.ndarray | float,
     covariance: np.ndarray,
     seen: np.ndarray | None = None,
-    wrong: float = 0.0,
-    most: int = 2_000_000,
+    limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> list[Located]:
     """`locate` for many points that were ranged from the same stations.
 
@@ -153,7 +165,7 @@ def locate_all(
     period             (p, r), (r,) or one, m
     covariance         (p, r, r) or (r, r) m^2; or variances (p, r)
     seen               (p, r) bool, which ranges there are; all if None
-    wrong, most        as for `locate`
+    limits             as for `locate`
 
     A point's cycles are those of its own ranges, in the stations' order.
 
@@ -177,8 +189,7 @@ def locate_all(
                 lengths[i, used],
                 period=periods[i, used],
                 covariance=own,
-                wrong=wrong,
-                most=most,
+                limits=limits,
             )
         )
     return answers

@@ -95,6 +95,23 @@ class BaselineSolution:
         return np.array(rows, int), self.covariance[np.ix_(at, at)]
 
 
+@dataclass(frozen=True, eq=False)
+class BaselineNoise:
+    """What is known of the noise before a baseline is adjusted.
+
+    noise        variances to use as they are; None estimates them
+    claim        variances to use where the data leave too little to estimate them from
+    u_centring   of instrument and target across the line, for directions only, m
+    """
+
+    noise: Claim | None = None
+    claim: Claim | None = None
+    u_centring: float = 2e-4
+
+
+ESTIMATED = BaselineNoise()
+
+
 def adjust_baseline(
     sights: BaselineSights,
     x,
@@ -103,9 +120,7 @@ def adjust_baseline(
     known: KnownPlaces | None = None,
     scale: bool = False,
     extra: Extra | None = None,
-    u_centring: float = 2e-4,
-    noise: Claim | None = None,
-    claim: Claim | None = None,
+    before: BaselineNoise = ESTIMATED,
 ) -> BaselineSolution:
     """Pillars and instrument by least squares, with variance components of the noise.
 
@@ -114,15 +129,14 @@ def adjust_baseline(
     known        places known before; else the pillar of least x holds x and y, the one of largest x its y
     scale        True: the instrument's scale is unknown, for which `known` is needed
     extra        further terms
-    u_centring   of instrument and target across the line, for directions only, m
-    noise        variances to use as they are; None estimates them
-    claim        variances to use where the data leave too little to estimate them from
+    before       what is known of the noise; else it is estimated
 
     Raises EstimationError where the shots do not determine the parameters, or nothing tells the noise.
     Source: least squares with correlated observations; restricted likelihood of the components, [PATTERSON71].
     """
     x, y = np.array(x, float), np.array(y, float)
-    model = BaselineModel(sights, x, y, known, scale, extra, u_centring)
+    model = BaselineModel(sights, x, y, known, scale, extra, before.u_centring)
+    noise, claim = before.noise, before.claim
     start = noise or claim or Claim(1e-8, 1e-7, 1e-12)
     values = np.zeros(len(model.names))
     for _ in range(20):

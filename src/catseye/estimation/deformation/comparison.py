@@ -70,6 +70,28 @@ class PointMovements:
         return np.sqrt(np.maximum(np.diagonal(self.difference_covariance, axis1=1, axis2=2), 0.0))
 
 
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """How `compare` tests two epochs.
+
+    level, power, rule         as `moved_points`; with a frame half the level is spent on it and half on the others
+    rounding                   m, the last digit of coordinates carried from the first epoch; their departure from its
+                               result is an error of u = rounding / sqrt(12) each. 0: carried with all digits
+    same_point                 m: where the distances to other points change by more in the median, it is another point
+    scale_by_variance_factor   False: a priori covariances. True: times the pooled variance factor, F tests
+    """
+
+    level: float = 0.05
+    power: float = 0.8
+    rule: str = "global"
+    rounding: float = 1e-5
+    same_point: float = 0.1
+    scale_by_variance_factor: bool = False
+
+
+USUAL = ComparisonOptions()
+
+
 def compare(
     first: NetworkSolution,
     second: NetworkSolution,
@@ -77,12 +99,7 @@ def compare(
     points: Sequence[str] | None = None,
     frame: Sequence[str] | None = None,
     datum: str | None = None,
-    level: float = 0.05,
-    power: float = 0.8,
-    rule: str = "global",
-    rounding: float = 1e-5,
-    same_point: float = 0.1,
-    scale_by_variance_factor: bool = False,
+    options: ComparisonOptions = USUAL,
 ) -> PointMovements:
     """What moved between two adjusted epochs of a network, with the covariance that their connection calls for.
 
@@ -92,37 +109,33 @@ def compare(
     frame                      stable points that each other point is compared with by itself, for large networks; None:
                                those that define the datum, where there are more than 700 common points
     datum                      what the datums may differ by, a key of `DATUMS`; None: found from the observations
-    level, power, rule         as `moved_points`; with a frame half the level is spent on it and half on the others
-    rounding                   m, the last digit of coordinates carried from the first epoch; their departure from its
-                               result is an error of u = rounding / sqrt(12) each. 0: carried with all digits
-    same_point                 m: where the distances to other points change by more in the median, it is another point
-    scale_by_variance_factor   False: a priori covariances. True: times the pooled variance factor, F tests
+    options                    level and rule of the tests, rounding of carried coordinates
 
     Raises EstimationError where there is no answer to compare, or where the epochs do not fit together.
 
     Source: [PELZER71], [CASPARY87] (congruence); [FOERSTNER16] chapter 4 (propagation; see `epoch_model`).
     """
     _check_alike(first, second)
-    held = DatumConnection.of(first, second, datum, rounding)
-    names, apart = _common(first, second, points, held, same_point)
+    held = DatumConnection.of(first, second, datum, options.rounding)
+    names, apart = _common(first, second, points, held, options.same_point)
     model = EpochModel.of(first, second, names, held)
     factor, homogeneity = _factor(first, second)
-    factor = factor if scale_by_variance_factor else KNOWN
-    options: dict[str, Any] = {
+    factor = factor if options.scale_by_variance_factor else KNOWN
+    tested: dict[str, Any] = {
         "datum": held.datum,
-        "level": level,
-        "power": power,
-        "rule": rule,
+        "level": options.level,
+        "power": options.power,
+        "rule": options.rule,
         "variance_factor": factor,
     }
     blocks = frame is not None or len(names) > LARGEST
     if blocks:
         inside = _frame(first, second, model, frame)
-        deformation, (difference, covariance) = _beside_frame(model, inside, options)
+        deformation, (difference, covariance) = _beside_frame(model, inside, tested)
     else:
         inside = np.zeros(0, dtype=int)
         epochs = model.epochs(np.arange(len(names)))
-        deformation = moved_points(epochs, **options)
+        deformation = moved_points(epochs, **tested)
         plain = differences(epochs, held.datum, deformation.stable)
         difference, covariance = _blocks_of(*_plain_differences(plain, deformation.stable))
     done = PointMovements(
@@ -139,7 +152,7 @@ def compare(
         homogeneity=homogeneity,
         words=(),
     )
-    return replace(done, words=tuple(_words(done, rounding, same_point, held.same)))
+    return replace(done, words=tuple(_words(done, options.rounding, options.same_point, held.same)))
 
 
 def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, SolverSettings, adjust
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows, variances
 from catseye.estimation.network.datum import (
@@ -59,6 +59,23 @@ def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNet
     return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
+@dataclass(frozen=True)
+class NetworkSettings:
+    """How far `adjust_network` goes.
+
+    iterations   cap of Gauss-Newton steps of each pass
+    tests        False leaves out covariance and test statistics
+    diagnose     False leaves the status at "converged" or "not converged", without looking for the cause
+    """
+
+    iterations: int = 50
+    tests: bool = True
+    diagnose: bool = True
+
+
+ALL_THE_WAY = NetworkSettings()
+
+
 def adjust_network(
     network: ObservationNetwork,
     *,
@@ -67,9 +84,7 @@ def adjust_network(
     inflation: Sequence[np.ndarray] | None = None,
     alone: bool = False,
     start: NetworkSolution | None = None,
-    iterations: int = 50,
-    tests: bool = True,
-    diagnose: bool = True,
+    settings: NetworkSettings = ALL_THE_WAY,
     engine: str | None = None,
 ) -> NetworkSolution:
     """The coordinates of a network with their covariance, and a fit per observation.
@@ -81,9 +96,7 @@ def adjust_network(
     alone       inflation of a correlated observation adds to its own variance and dilutes its correlations; else they
                 stay, as when a whole group is scaled
     start       an earlier solution of the same network to begin from
-    iterations  cap of Gauss-Newton steps of each pass
-    tests       False leaves out covariance and test statistics
-    diagnose    False leaves the status at "converged" or "not converged", without looking for the cause
+    settings    cap of steps, whether tests and the cause of a failure are wanted
     engine      "dense", "sparse" or "ranging" (pure ranging networks only); the fastest that serves if None
 
     Returns a NetworkSolution whose status says what happened, and where.
@@ -94,6 +107,7 @@ def adjust_network(
     if inflation is not None:
         kept = [np.isfinite(f) for f in inflation]
         active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
+    diagnose = settings.tests and settings.diagnose
     if engine in (None, "ranging"):
         from catseye.estimation.network.ranging_engine import adjusted_as_ranges
 
@@ -102,18 +116,19 @@ def adjust_network(
             active=active,
             inflation=inflation,
             start=start,
-            iterations=iterations,
-            tests=tests,
+            iterations=settings.iterations,
+            tests=settings.tests,
             forced=engine is not None,
         )
         if solution is not None:
-            return replace(solution, status=diagnosed(solution, _factor_alone)) if tests and diagnose else solution
+            return replace(solution, status=diagnosed(solution, _factor_alone)) if diagnose else solution
     problem = _Problem.of(network, start)
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
     sparse = None if engine is None else engine == "sparse"
-    solution = problem.solve(active, (inflation, alone), iterations, tests, sparse)
-    if tests and diagnose and np.isfinite(solution.covariance).all():
+    solver = SolverSettings(settings.iterations, settings.tests, sparse)
+    solution = problem.solve(active, (inflation, alone), solver)
+    if diagnose and np.isfinite(solution.covariance).all():
         return replace(solution, status=diagnosed(solution, _factor_alone))
     return solution
 
@@ -135,7 +150,9 @@ def _factor_alone(network: ObservationNetwork) -> NetworkSolution:
     """A quick trial: coordinates and variance factor, no tests."""
     large = len(network.points.names) >= FEWEST_POINTS
     try:
-        trial = adjust_network(network, iterations=15, tests=False, engine="ranging" if large else None)
+        trial = adjust_network(
+            network, settings=NetworkSettings(iterations=15, tests=False), engine="ranging" if large else None
+        )
     except EstimationError:  # large, and of another kind: it would take too long to try
         return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
     degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
@@ -200,10 +217,9 @@ class _Problem:
         self,
         active: Sequence[np.ndarray] | None,
         inflation: tuple[Sequence[np.ndarray] | None, bool],
-        iterations: int,
-        tests: bool,
-        sparse: bool | None,
+        solver: SolverSettings,
     ) -> NetworkSolution:
+        """The solution in its datum, in as many passes as it takes."""
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
@@ -229,9 +245,7 @@ class _Problem:
                 inflation=larger,
                 extra_variance=added,
                 names=self.names,
-                iterations=iterations,
-                tests=tests,
-                sparse=sparse,
+                solver=solver,
             )
             taken += solution.iterations
             x = solution.x
@@ -244,9 +258,9 @@ class _Problem:
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
             x = x + moved
-            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if tests else np.zeros(0)
+            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
             settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), u))
-            if settled and tests:
+            if settled and solver.tests:
                 solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
                 break
@@ -314,7 +328,7 @@ class _Problem:
         """No answer: the start, or where it stopped, with residuals and no covariance."""
         at = self.x0 if x is None else x
         nothing = np.zeros(len(at), dtype=bool)
-        solution = adjust(at, self.groups, free=nothing, tests=False, iterations=1)
+        solution = adjust(at, self.groups, free=nothing, solver=SolverSettings(tests=False, iterations=1))
         count = len(self.network.points.names)
         answer = self.answer(replace(solution, status=status), solution.q, "none")
         return replace(

@@ -116,11 +116,24 @@ def _roughness(parameters: np.ndarray, spread: float, size: float) -> Roughness:
     return Roughness(float(smooth) * spread, float(length) * size, float(own) * spread)
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredField:
+    """A field as it was measured at k points.
+
+    places   (k, 2) m
+    values   (k,) m: what is left when a design and its gain have taken their part
+    noise    (k, k) m^2, covariance of the measurement, before that
+    trend    (k, q), whose columns span those of the design too
+    """
+
+    places: np.ndarray
+    values: np.ndarray
+    noise: np.ndarray
+    trend: np.ndarray
+
+
 def foretell(
-    places: np.ndarray,
-    values: np.ndarray,
-    noise: np.ndarray,
-    trend: np.ndarray,
+    measured: MeasuredField,
     wanted: np.ndarray,
     wanted_trend: np.ndarray,
     *,
@@ -132,10 +145,7 @@ def foretell(
 ) -> Foretold:
     """Best linear unbiased prediction (universal kriging), with the covariance of what it misses.
 
-    places         (k, 2) m, measured
-    values         (k,) m, measured: what is left when `design` and `gain` have taken their part
-    noise          (k, k) m^2, covariance of the measurement, before that
-    trend          (k, q), whose columns span those of `design` too
+    measured       what is known, at k points
     wanted         (m, 2) m
     wanted_trend   (m, q)
     roughness      of the field
@@ -148,6 +158,7 @@ def foretell(
     prediction misses by (K field - field*) + (K - wanted_design gain) noise, which gives its covariance whatever the
     roughness is. Raises EstimationError where the points do not hold the trend.
     """
+    places, values, noise, trend = measured.places, measured.values, measured.noise, measured.trend
     smooth = roughness.covariance(places, places)
     smooth[np.diag_indices_from(smooth)] += roughness.own**2
     between = roughness.covariance(wanted, places)

@@ -290,38 +290,6 @@ class DelayPlan:
         return find
 
 
-def delay(
-    recordings: ArrayLike,
-    template: ArrayLike,
-    *,
-    sampling_hz: float,
-    expected: ArrayLike,
-    window: float,
-    weighting: str = "plain",
-    band_hz: tuple[float, float] | None = None,
-    noise: ArrayLike | None = None,
-    full_scale: float | None = None,
-) -> Delays:
-    """Arrival time of a known signal in recordings, once; for many calls keep a `DelayPlan`.
-
-    recordings   (..., n), integers or floats
-    template     (m,) samples of the signal from its start
-    expected     s, delay expected in each, (...,) or one for all
-    window, sampling_hz, weighting, band_hz, noise, full_scale   as for `DelayPlan`
-
-    Raises ValidityError as `DelayPlan` does.
-
-    >>> t = np.arange(100) / 8e3
-    >>> tone = np.sin(2 * np.pi * 1e3 * t) * np.sin(np.pi * t / t[-1]) ** 2
-    >>> heard = np.concatenate([np.zeros(400), tone, np.zeros(300)])
-    >>> round(float(delay(heard, tone, sampling_hz=8e3, expected=0.0505, window=2e-3).delay), 9)
-    0.05
-    """
-    plan = DelayPlan(template, sampling_hz=sampling_hz, window=window, weighting=weighting, band_hz=band_hz,
-                     noise=noise, full_scale=full_scale)  # fmt: skip
-    return plan(recordings, expected)
-
-
 def fast_length(least: int) -> int:
     """The smallest even product of 2, 3 and 5 that is at least that long: a quick Fourier transform.
 
