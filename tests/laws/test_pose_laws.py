@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from catseye.estimation.shapes.pose import fit_pose
+from catseye.estimation.shapes.pose import PlaceCovariances, fit_pose
 from catseye.geometry.frames.frame import Transform
 
 coordinate = st.floats(-100.0, 100.0)
@@ -20,7 +20,7 @@ def pose(seed, size=1e-4):
     y = x @ turn.T + rng.normal(size=3) * 1e-3 + rng.normal(size=x.shape) * 1e-4
     root = rng.normal(size=(21, 42)) * 1e-4 / 6
     names = [f"P{k}" for k in range(7)]
-    return fit_pose(names, x, y, frame="ground", covariance_second=root @ root.T), x
+    return fit_pose(names, x, y, frame="ground", covariance=PlaceCovariances(second=root @ root.T)), x
 
 
 @given(st.integers(0, 10**6), triple, triple, st.sampled_from([1e-5, 1e-2, 1.0]))

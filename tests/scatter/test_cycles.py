@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from catseye.estimation.ambiguity.search import AmbiguityStatus, locate
+from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, locate
 
 HALF = 0.0999
 RUNS = [pytest.param(200, id="quick"), pytest.param(3000, id="full", marks=pytest.mark.slow)]
@@ -33,7 +33,15 @@ def searched(runs, seed, *, ranges, u, sigma, common=0.0, wrong=0.0):
         stations, point, lengths, cycles, elsewhere = drawn(
             rng, ranges=ranges, u=u, sigma=sigma, common=common, wrong=wrong
         )
-        found = locate(np.zeros(3), u**2 * np.eye(3), stations, lengths, period=HALF, covariance=c, wrong=wrong)
+        found = locate(
+            np.zeros(3),
+            u**2 * np.eye(3),
+            stations,
+            lengths,
+            period=HALF,
+            covariance=c,
+            limits=AmbiguityLimits(wrong=wrong),
+        )
         off = found.x - point
         right.append(np.array_equal(found.cycles[~elsewhere], cycles[~elsewhere]))
         claimed.append(found.probability)

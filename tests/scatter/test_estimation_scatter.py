@@ -6,7 +6,7 @@ from scipy.stats import norm, poisson
 from threadpoolctl import threadpool_limits
 
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.least_squares.robust import adjust_robustly
+from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Distances
 from draws import draws, same_sigmas
 
@@ -74,7 +74,9 @@ def false_rejections(trials):
     out = 0
     with threadpool_limits(limits=1, user_api="blas"):
         for _ in range(trials):
-            solution = adjust_robustly(start, draw(rng, True), removable, points=points, free=FREE).require_converged()
+            solution = adjust_robustly(
+                start, draw(rng, True), removable, outliers=OutlierSearch(points=points), free=FREE
+            ).require_converged()
             out += sum(int(np.count_nonzero(~f.active)) for f in solution.fits)
     return out, 24 * trials
 

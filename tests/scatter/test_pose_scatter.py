@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.estimation.shapes.pose import fit_pose
+from catseye.estimation.shapes.pose import PlaceCovariances, fit_pose
 from catseye.geometry.antenna.pointing_series import TERMS, published
 from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
@@ -31,7 +31,7 @@ def test_poses_scatter_as_their_covariance_says(robust, thirds):
         first = x + rng.multivariate_normal(np.zeros(3 * n), q1).reshape(-1, 3)
         second = x + rng.multivariate_normal(np.zeros(3 * n), q2).reshape(-1, 3)
         found = fit_pose(
-            [str(k) for k in range(n)], first, second, frame="g", covariance_first=q1, covariance_second=q2,
+            [str(k) for k in range(n)], first, second, frame="g", covariance=PlaceCovariances(first=q1, second=q2),
             pivot=np.zeros(3), robust=robust,
         )  # fmt: skip
         sample.append(np.concatenate([found.translation, found.rotation]))
@@ -44,7 +44,9 @@ def test_poses_scatter_as_their_covariance_says(robust, thirds):
 
 def _full(x, q1, q2):
     names = [str(k) for k in range(len(x))]
-    return fit_pose(names, x, x, frame="g", covariance_first=q1, covariance_second=q2, pivot=np.zeros(3)).covariance
+    return fit_pose(
+        names, x, x, frame="g", covariance=PlaceCovariances(first=q1, second=q2), pivot=np.zeros(3)
+    ).covariance
 
 
 def test_pointing_fits_scatter_as_their_covariance_says():

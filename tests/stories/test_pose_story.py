@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.estimation.shapes.pose import fit_pose
+from catseye.estimation.shapes.pose import PlaceCovariances, fit_pose
 from catseye.estimation.shapes.rigid_body import motion_columns
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.records.site.folder import read_site
@@ -164,7 +164,9 @@ def test_of_the_whole_dish_s_prisms_alone_the_covariance_says_what_holds_them_ba
     part = whole.of(8)  # 277 of them in full: the pose itself, and Woodbury held against it
     names = [f"P{k}" for k in range(len(part.x))]
     q = part.matrix()
-    fitted = fit_pose(names, part.x, part.x, frame="ground", covariance_first=q, covariance_second=q, pivot=pivot)
+    fitted = fit_pose(
+        names, part.x, part.x, frame="ground", covariance=PlaceCovariances(first=q, second=q), pivot=pivot
+    )
     claimed = 2.0 * np.linalg.inv(part.information(motion_columns(part.x, pivot)[:, :6]))
     np.testing.assert_allclose(np.sqrt(np.diag(claimed)), fitted.u, rtol=1e-6)
 
@@ -187,7 +189,7 @@ def test_two_arc_seconds_planted_in_many_prisms_are_found_within_the_claim(whole
     for _ in range(30):
         noise = root @ rng.normal(size=(len(q), 2))
         both = (x + n.reshape(-1, 3) for x, n in zip((part.x, second), noise.T, strict=True))
-        found = fit_pose(names, *both, frame="ground", covariance_first=q, covariance_second=q, pivot=pivot)
+        found = fit_pose(names, *both, frame="ground", covariance=PlaceCovariances(first=q, second=q), pivot=pivot)
         half = np.linalg.cholesky(found.covariance[3:, 3:])
         off.append(np.linalg.solve(half, found.rotation - planted_turn))
     assert np.mean(np.square(off)) == pytest.approx(1.0, abs=4 * (2 / 90) ** 0.5)

@@ -43,9 +43,9 @@ class ValidInterval:
         mask = outside if values.ndim else None
         if np.isnan(first):
             raise ValidityError(f"{self.quantity} is not a number{where}; give a value in {span} {self.unit}", mask)
-        said = f"{first:g}" if not self.lower <= float(f"{first:g}") <= self.upper else repr(first)  # 100.0000001 %
+        digits = f"{first:g}" if not self.lower <= float(f"{first:g}") <= self.upper else repr(first)  # 100.0000001 %
         raise ValidityError(
-            f"{self.quantity} {said} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
+            f"{self.quantity} {digits} {self.unit}{where} is outside {span} {self.unit}, where {self.source} holds",
             mask,
         )
 

@@ -207,7 +207,7 @@ def _compared(
     quiet: bool,
     progress: ProgressLine,
 ) -> None:
-    from catseye.estimation.deformation.comparison import compare
+    from catseye.estimation.deformation.comparison import ComparisonOptions, compare
     from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
     from catseye.gateways.writers.objects import json_line
 
@@ -215,7 +215,7 @@ def _compared(
         if not one.answered:
             raise EstimationError(f"{source}: {one.solution.status}")
     names = None if points is None else [p.strip() for p in points.split(",") if p.strip()]
-    moved = compare(found[0].solution, found[1].solution, points=names, level=level)
+    moved = compare(found[0].solution, found[1].solution, points=names, options=ComparisonOptions(level=level))
     compared = ComparedEpochs(found[0], found[1], moved)
     if out is not None:
         from catseye.gateways.network.files import input_hashes, write_comparison

@@ -117,8 +117,8 @@ def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz:
             f"a photodiode of {diode.sheet_resistance:g} ohm per square and {diode.capacitance:g} F turns the phase by "
             f"more than half a turn at {modulation_hz:g} Hz (expected less resistance or capacitance)"
         )
-    seen = spot_response(offset, spot, diode, modulation_hz)
-    turn = np.where(seen == 0.0, np.nan, np.angle(seen))
+    response = spot_response(offset, spot, diode, modulation_hz)
+    turn = np.where(response == 0.0, np.nan, np.angle(response))
     return -turn * SPEED_OF_LIGHT / (2.0 * TWO_PI * modulation_hz)
 
 

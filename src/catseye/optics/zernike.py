@@ -110,13 +110,13 @@ def zernike(wanted: tuple[Term, ...], x: ArrayLike, y: ArrayLike) -> NDArray[np.
 
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     r2, angle = x * x + y * y, np.arctan2(y, x)
-    made = np.empty((*x.shape, len(wanted)))
+    terms = np.empty((*x.shape, len(wanted)))
     for k, (n, m) in enumerate(wanted):
         size = abs(m)
         radial = np.sqrt(r2) ** size * eval_jacobi((n - size) // 2, 0, size, 2.0 * r2 - 1.0)
         wave = np.sqrt(2.0) * (np.cos(size * angle) if m > 0 else np.sin(size * angle)) if m else 1.0
-        made[..., k] = np.sqrt(n + 1.0) * radial * wave
-    return made
+        terms[..., k] = np.sqrt(n + 1.0) * radial * wave
+    return terms
 
 
 def disk_quadrature(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,13 +8,21 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
-from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, with_datum
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
 from catseye.estimation.observations.kinds import Distances
-from catseye.estimation.quality.robustness import MOST_INFLATION, WEIGHTS, Rejection, estimate_robustly, snoop
+from catseye.estimation.quality.robustness import (
+    MOST_INFLATION,
+    WEIGHTS,
+    Rejection,
+    RobustOptions,
+    SnoopingOptions,
+    estimate_robustly,
+    snoop,
+)
 from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
 
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
@@ -74,7 +82,11 @@ def adjusted(
         raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
     network, placed = _placed(with_datum(network, datum))
     treated = reject or robust is not None or components is not None
-    plain = replace(adjust_network(network, diagnose=not treated), approximate=placed[0], assumed=placed[1])
+    plain = replace(
+        adjust_network(network, settings=NetworkSettings(diagnose=not treated)),
+        approximate=placed[0],
+        assumed=placed[1],
+    )
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
     result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
@@ -87,10 +99,12 @@ def adjusted(
         count += 1
         if progress is not None:
             progress("adjusting", count, 0)
-        return adjust_network(network, inflation=inflation, alone=True, diagnose=False, engine=engine).fits
+        return adjust_network(
+            network, inflation=inflation, alone=True, settings=NetworkSettings(diagnose=False), engine=engine
+        ).fits
 
     if robust is not None:
-        estimate = estimate_robustly(solve, sizes, method=robust, places=_places(network))
+        estimate = estimate_robustly(solve, sizes, options=RobustOptions(method=robust), places=_places(network))
         inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
         solution = _final(network, inflation, placed, alone=True)
         notes = () if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",)
@@ -119,7 +133,7 @@ def _with_rejections(
 ) -> AdjustedNetwork:
     """The answer without the observations that the w test rejects, by data snooping from a robust start."""
     start = estimate_robustly(solve, sizes, places=_places(network))
-    chosen = snoop(solve, sizes, level=level, start=start.rejected, doubtful=start.undecided)
+    chosen = snoop(solve, sizes, options=SnoopingOptions(level=level), start=start.rejected, doubtful=start.undecided)
     inflation = [
         np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
         for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
@@ -177,7 +191,7 @@ def _with_components(
         if progress is not None:
             progress("estimating components", count, 0)
         used = scales if out is None else [s * o for s, o in zip(scales, out, strict=True)]
-        return adjust_network(network, inflation=used, diagnose=False, engine=engine).fits
+        return adjust_network(network, inflation=used, settings=NetworkSettings(diagnose=False), engine=engine).fits
 
     sizes = tuple(len(g.observed) for g in network.groups)
     if by == "groups":

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.atmosphere.weather import humidity
-from catseye.atmosphere.weather.condensation import condensation, radiative_depression_k
+from catseye.atmosphere.weather.condensation import CondensationSpread, condensation, radiative_depression_k
 from catseye.errors import ValidityError
 
 
@@ -66,18 +66,17 @@ def test_the_probability_is_that_of_a_monte_carlo(surface, t, h, offset_known, w
         t,
         933.0,
         h,
-        u_surface_c=u_surface,
-        u_temperature_c=u_t,
-        u_humidity_percent=u_h,
-        covariance_c2=covariance,
+        u=CondensationSpread(surface_c=u_surface, temperature_c=u_t, humidity_percent=u_h, covariance_c2=covariance),
     )
     assert drawn.margin_k.std() == pytest.approx(float(found.u_margin_k), rel=within)
     assert np.mean(drawn.margin_k < 0.0) == pytest.approx(float(found.probability), abs=0.02)
 
 
 def test_a_shared_thermometer_nearly_cancels():
-    shared = condensation(5.0, 10.0, 933.0, 80.0, u_surface_c=1.0, u_temperature_c=1.0, covariance_c2=1.0)
-    apart = condensation(5.0, 10.0, 933.0, 80.0, u_surface_c=1.0, u_temperature_c=1.0)
+    shared = condensation(
+        5.0, 10.0, 933.0, 80.0, u=CondensationSpread(surface_c=1.0, temperature_c=1.0, covariance_c2=1.0)
+    )
+    apart = condensation(5.0, 10.0, 933.0, 80.0, u=CondensationSpread(surface_c=1.0, temperature_c=1.0))
     assert float(shared.u_margin_k) < 0.1 < 1.3 < float(apart.u_margin_k)
 
 
@@ -87,7 +86,9 @@ def test_without_uncertainties_the_probability_is_a_step():
 
 
 def test_perfectly_dry_air_leaves_every_surface_clear():
-    found = condensation(np.array([-40.0, 0.0]), 0.0, 933.0, 0.0, u_surface_c=1.0, u_humidity_percent=1.0)
+    found = condensation(
+        np.array([-40.0, 0.0]), 0.0, 933.0, 0.0, u=CondensationSpread(surface_c=1.0, humidity_percent=1.0)
+    )
     assert np.all(np.isinf(found.margin_k))
     assert found.probability.tolist() == [0.0, 0.0]
     assert found.lines() == ["clear: the air holds no vapour"] * 2
@@ -102,7 +103,7 @@ def test_a_sky_warmer_than_a_black_body_is_refused():
 def test_lines_say_deposit_margin_point_and_probability():
     found = condensation(
         np.array([5.0, 8.0, -3.5, -1.0]), np.array([10.0, 10.0, -2.0, 8.0]), 933.0, np.array([75.0, 75.0, 90.0, 70.0]),
-        u_surface_c=0.5,
+        u=CondensationSpread(surface_c=0.5),
     )  # fmt: skip
     assert found.lines() == [
         "dew: 0.8 K below the dew point, 5.8 °C, ± 0.5 K; 94 % probable",
@@ -144,8 +145,14 @@ def test_glass_under_a_clear_sky_is_several_kelvin_below_the_air_and_gold_is_not
         (lambda: condensation(5.0, 10.0, 101325.0, 75.0), "pressure 101325 hPa"),
         (lambda: condensation(5.0, 10.0, 933.0, 120.0), "relative humidity 120 %"),
         (lambda: condensation(np.nan, 10.0, 933.0, 75.0), "surface temperature is not a number"),
-        (lambda: condensation(5.0, 10.0, 933.0, 75.0, u_surface_c=-1.0), "u_surface_c = -1 is not a standard unc"),
-        (lambda: condensation(5.0, 10.0, 933.0, 75.0, u_surface_c=1.0, covariance_c2=1.0), "no correlation exceeds 1"),
+        (
+            lambda: condensation(5.0, 10.0, 933.0, 75.0, u=CondensationSpread(surface_c=-1.0)),
+            "u_surface_c = -1 is not a standard unc",
+        ),
+        (
+            lambda: condensation(5.0, 10.0, 933.0, 75.0, u=CondensationSpread(surface_c=1.0, covariance_c2=1.0)),
+            "no correlation exceeds 1",
+        ),
         (lambda: condensation(5.0, 10.0, 933.0, 75.0, formula="ciddor"), "unknown over ice"),
         (lambda: radiative_depression_k(10.0, 12.0), "dew point 2 °C above the air"),
         (lambda: radiative_depression_k(10.0, 2.0, wind=-1.0), "wind -1 m/s"),

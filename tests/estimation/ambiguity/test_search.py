@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.ambiguity.search import AmbiguityStatus, locate, locate_all
+from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, locate, locate_all
 from catseye.estimation.ambiguity.tree import Ranged, _next_cycles, _points
 
 HALF = 0.0999
@@ -157,7 +157,7 @@ def test_one_wrong_range_of_seven_is_named_and_left_out_only_when_asked_for():
     plain = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, **ask)
     assert plain.status is AmbiguityStatus.MISFIT
     assert "no whole cycles fit its 7 ranges" in plain.text
-    found = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, wrong=0.01, **ask)
+    found = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, limits=AmbiguityLimits(wrong=0.01), **ask)
     assert (found.status, found.left_out) == (AmbiguityStatus.FOUND, 3)
     np.testing.assert_allclose(found.x, point, rtol=0, atol=3e-4)
     right = np.rint((np.linalg.norm(stations - point, axis=1) - lengths) / HALF)
@@ -174,7 +174,7 @@ def test_a_wrong_range_can_make_wrong_cycles_fit_and_who_says_so_is_not_deceived
     trusting = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths, **ask)
     assert trusting.status is AmbiguityStatus.FOUND  # 1.6 m off: why `wrong` exists
     assert np.linalg.norm(trusting.x - point) > 1.0
-    careful = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths, wrong=0.01, **ask)
+    careful = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths, limits=AmbiguityLimits(wrong=0.01), **ask)
     assert careful.status is AmbiguityStatus.AMBIGUOUS
     assert careful.probability < 0.9
 
@@ -196,12 +196,28 @@ def test_the_price_of_leaving_a_range_out_is_the_odds_that_it_is_wrong():
             four.chi_square if np.any(four.cycles != all_five.cycles[some]) else four.chi_square + four.discrimination
         )
         rivals.append(square + price - all_five.chi_square)
-    found = locate(np.zeros(3), prior, stations, lengths, covariance=np.full(5, sigma**2), wrong=wrong, **ask)
+    found = locate(
+        np.zeros(3),
+        prior,
+        stations,
+        lengths,
+        covariance=np.full(5, sigma**2),
+        limits=AmbiguityLimits(wrong=wrong),
+        **ask,
+    )
     assert min(rivals) < all_five.discrimination  # a rival of this kind it is
     assert found.discrimination == pytest.approx(min(rivals), abs=1e-6)
     assert found.probability < all_five.probability
     with pytest.raises(ValidityError, match=r"wrong = 0\.5"):
-        locate(np.zeros(3), prior, stations, lengths, covariance=np.full(5, sigma**2), wrong=0.5, **ask)
+        locate(
+            np.zeros(3),
+            prior,
+            stations,
+            lengths,
+            covariance=np.full(5, sigma**2),
+            limits=AmbiguityLimits(wrong=0.5),
+            **ask,
+        )
 
 
 @pytest.mark.parametrize("ranges", [1, 2, 3])

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.errors import EstimationError
-from catseye.estimation.baseline.adjustment import adjust_baseline, places_in_line
+from catseye.estimation.baseline.adjustment import BaselineNoise, adjust_baseline, places_in_line
 from catseye.estimation.baseline.iso17123 import full_test, is_nothing, same_precision, within_claim
 from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, KnownPlaces
 from draws import draws, examples, same_sigmas
@@ -134,7 +134,10 @@ BOTH = [(i, j) for i in range(7) for j in range(7) if i != j]
 
 def test_pillars_off_the_line_are_found_by_directions():
     found = adjust_baseline(
-        sights(SEVEN, OFF, BOTH, zero=0.0123, aimed=True), SEVEN + 0.01 * (SEVEN > 0), np.zeros(7), noise=TINY
+        sights(SEVEN, OFF, BOTH, zero=0.0123, aimed=True),
+        SEVEN + 0.01 * (SEVEN > 0),
+        np.zeros(7),
+        before=BaselineNoise(noise=TINY),
     )
     assert found.x == pytest.approx(SEVEN, abs=1e-9)
     assert found.y == pytest.approx(OFF, abs=1e-8)
@@ -155,7 +158,7 @@ def test_a_pillar_left_of_the_line_is_read_smaller_on_a_clockwise_circle():
     by_hand[5] += np.arctan2(1.0, 100.0)
     length = np.hypot(x[s.end] - x[s.start], y[s.end] - y[s.start])
     s = replace(s, distance=length, direction=by_hand)
-    assert adjust_baseline(s, x, np.zeros(3), noise=TINY).y[1] == pytest.approx(1.0, abs=1e-7)
+    assert adjust_baseline(s, x, np.zeros(3), before=BaselineNoise(noise=TINY)).y[1] == pytest.approx(1.0, abs=1e-7)
 
 
 def dense(s, x, y, noise, columns):
@@ -187,7 +190,7 @@ def test_sets_means_give_what_all_shots_together_give():
     wave = np.cos(s.distance)[:, None]
     wave = s.mean(wave)[s.set]
     steady = replace(s, systematic=s.mean(s.systematic)[s.set])
-    found = adjust_baseline(steady, SEVEN, np.zeros(7), noise=noise, extra=Extra(("wave",), wave))
+    found = adjust_baseline(steady, SEVEN, np.zeros(7), before=BaselineNoise(noise=noise), extra=Extra(("wave",), wave))
     values, covariance, p, y = dense(steady, SEVEN, np.zeros(7), noise, wave)
     got = found.values - np.concatenate([SEVEN[1:], [0.0, 0.0]])
     assert got == pytest.approx(values, abs=1e-12)
@@ -207,7 +210,7 @@ def test_known_pillars_tell_scale_and_zero():
     s = sights(SEVEN, OFF, BOTH)
     s = replace(s, distance=s.distance * (1 + 3e-6) - 0.002)
     known = KnownPlaces(SEVEN, OFF, np.arange(1, 7), 1e-10 * (np.eye(6) + 0.5))
-    found = adjust_baseline(s, SEVEN, OFF, known=known, scale=True, noise=TINY)
+    found = adjust_baseline(s, SEVEN, OFF, known=known, scale=True, before=BaselineNoise(noise=TINY))
     assert found.of("scale")[0] == pytest.approx(3e-6, rel=1e-6)
     assert found.of("zero")[0] == pytest.approx(-0.002, abs=1e-9)
 
@@ -217,14 +220,14 @@ def test_cyclic_terms_come_back_with_their_signs():
     x = SEVEN + 0.13 * np.arange(7) ** 2
     wave = np.stack([np.cos(2 * np.pi * s.distance / 1.5), np.sin(2 * np.pi * s.distance / 1.5)], axis=1)
     bent = replace(s, distance=s.distance + wave @ [3e-4, -2e-4])
-    found = adjust_baseline(bent, x, np.zeros(7), noise=TINY, extra=Extra(("c", "s"), wave))
+    found = adjust_baseline(bent, x, np.zeros(7), before=BaselineNoise(noise=TINY), extra=Extra(("c", "s"), wave))
     assert (found.of("c")[0], found.of("s")[0]) == pytest.approx((3e-4, -2e-4), abs=1e-9)
 
 
 def test_what_distances_cannot_tell_is_refused_by_name():
     ends = sights(np.array([0.0, 50.0]), np.zeros(2), [(0, 1), (1, 0)])
     with pytest.raises(EstimationError, match=r"do not determine .*zero"):
-        adjust_baseline(ends, [0.0, 50.0], [0.0, 0.0], noise=TINY)
+        adjust_baseline(ends, [0.0, 50.0], [0.0, 0.0], before=BaselineNoise(noise=TINY))
     few = sights(SEVEN[:4], np.zeros(4), list(combinations(range(4), 2)))
     with pytest.raises(EstimationError, match="2 redundant sets do not tell the noise"):
         adjust_baseline(few, SEVEN[:4], np.zeros(4))
@@ -241,7 +244,9 @@ def test_the_whole_and_its_parts_place_the_pillars_and_tell_the_zero():
     x = np.array([0.0, 100.0, 250.0, 400.0])
     s = sights(x, np.zeros(4), pairs, zero=0.0021)
     assert places_in_line(s.start, s.end, s.distance, 4) == pytest.approx(x, abs=0.01)
-    assert adjust_baseline(s, x, np.zeros(4), noise=TINY).of("zero")[0] == pytest.approx(0.0021, abs=1e-9)
+    assert adjust_baseline(s, x, np.zeros(4), before=BaselineNoise(noise=TINY)).of("zero")[0] == pytest.approx(
+        0.0021, abs=1e-9
+    )
 
 
 def test_a_pillar_that_may_stand_on_either_side_is_not_guessed():
@@ -252,7 +257,7 @@ def test_a_pillar_that_may_stand_on_either_side_is_not_guessed():
 def test_a_set_that_nothing_controls_has_no_standardised_residual():
     pairs = [(0, 1), (0, 2), (1, 2), (1, 0), (2, 0), (2, 1), (0, 3)]
     s = sights(np.array([0.0, 100.0, 250.0, 400.0]), np.zeros(4), pairs, noise=1e-3, rng=np.random.default_rng(1))
-    found = adjust_baseline(s, [0.0, 100.0, 250.0, 400.0], np.zeros(4), noise=TINY)
+    found = adjust_baseline(s, [0.0, 100.0, 250.0, 400.0], np.zeros(4), before=BaselineNoise(noise=TINY))
     assert np.isnan(found.w_set[-1])
     assert np.isfinite(found.w_set[:-1]).all()
 
@@ -266,7 +271,7 @@ def test_known_uncertainties_have_no_degrees_of_freedom():
     part = alone.of("zero")[1]
     s = replace(s, systematic=np.full((42, 1), 3.0 * part), effects=("zero",))
     assert adjust_baseline(s, SEVEN, np.zeros(7)).freedom_of("zero") == pytest.approx(3500.0, rel=0.05)
-    assert adjust_baseline(s, SEVEN, np.zeros(7), noise=TINY).freedom_of("zero") == np.inf
+    assert adjust_baseline(s, SEVEN, np.zeros(7), before=BaselineNoise(noise=TINY)).freedom_of("zero") == np.inf
 
 
 @examples(100)
@@ -337,7 +342,7 @@ def test_left_out_systematic_effects_would_be_seen_to_be_missing():
     for _ in range(60):
         s = campaign(rng, noise, True)
         s = replace(s, systematic=np.zeros((len(s), 0)), effects=())
-        found = adjust_baseline(s, SEVEN, np.zeros(7), noise=noise)
+        found = adjust_baseline(s, SEVEN, np.zeros(7), before=BaselineNoise(noise=noise))
         last.append(found.of("x 6")[0])
         claimed.append(found.of("x 6")[1])
     assert np.std(last) > 1.3 * np.mean(claimed)

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.deformation import comparison, epoch_model
-from catseye.estimation.deformation.comparison import compare
-from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.deformation.comparison import ComparisonOptions, compare
+from catseye.estimation.network.adjustment import NetworkSettings, adjust_network
 from draws import draws
 from repository import TESTS
 
@@ -87,7 +87,7 @@ def test_the_large_metro_shifts_are_not_the_significant_ones(metro):
     assert again.deformation.names == d.names
     np.testing.assert_allclose(again.deformation.p, d.p)
     assert not again.apart
-    scaled = compare(*metro, scale_by_variance_factor=True)
+    scaled = compare(*metro, options=ComparisonOptions(scale_by_variance_factor=True))
     value = (1.02670 * 47 + 1.52458 * 70) / 117
     assert scaled.variance_factor.value == pytest.approx(value, abs=1e-4)
     assert scaled.homogeneity == pytest.approx(2 * stats.f.sf(1.52458 / 1.02670, 70, 47), rel=1e-3)
@@ -101,14 +101,14 @@ def test_the_second_epoch_follows_its_held_points_as_readjusting_it_does(metro):
     rows = [second.index[name] for name in MONITORED]
     held = np.argwhere(second.network.points.fixed)
     assert len(held) == 24
-    slope, h = np.zeros((30, 24)), 1e-3
+    slope, h, quick = np.zeros((30, 24)), 1e-3, NetworkSettings(tests=False)
     for k, (i, axis) in enumerate(held):
         ends = []
         for sign in (1, -1):
             xyz = second.network.points.xyz.copy()
             xyz[i, axis] += sign * h
             network = replace(second.network, points=replace(second.network.points, xyz=xyz))
-            ends.append(adjusted(network, start=second, tests=False).x[rows].ravel())
+            ends.append(adjusted(network, start=second, settings=quick).x[rows].ravel())
         slope[:, k] = (ends[0] - ends[1]) / (2 * h)
     own = first.block(MONITORED)
     datum = [second.network.points.names[i] for i in dict.fromkeys(held[:, 0])]
@@ -288,17 +288,17 @@ def test_one_by_one_beside_a_frame_a_point_has_the_displacement_of_a_joint_adjus
     first, second = twins(ranging_network, rng, moved=("T002", "T009"))
     turn = Rotation.from_rotvec([0.2, -0.4, 0.9]).as_matrix()
     stations = [f"S{i:02d}" for i in range(1, 9)]
-    found = compare(first, second, frame=stations, level=1e-3)
+    found = compare(first, second, frame=stations, options=ComparisonOptions(level=1e-3))
     d = found.deformation
     assert [d.names[i] for i in np.flatnonzero(d.moved)] == ["T002", "T009"]
     for name in ("T001", "T002", "T012"):
-        alone = compare(first, second, points=[*stations, name], level=1e-30)
+        alone = compare(first, second, points=[*stations, name], options=ComparisonOptions(level=1e-30))
         i, j = d.names.index(name), alone.deformation.names.index(name)
         np.testing.assert_allclose(d.displacement[i], alone.deformation.displacement[j], rtol=0, atol=3e-9)
         scale = d.covariance[i].max()
         np.testing.assert_allclose(d.covariance[i], alone.deformation.covariance[j], rtol=0, atol=1e-4 * scale)
         np.testing.assert_allclose(d.statistic[i], alone.deformation.statistic[j], rtol=1e-3)
-    plain = compare(first, second, points=stations, level=1e-30)
+    plain = compare(first, second, points=stations, options=ComparisonOptions(level=1e-30))
     np.testing.assert_allclose(found.difference[:8], plain.difference, rtol=0, atol=1e-9)
     assert turned_alike(first, second, turn, found, stations)
     with pytest.raises(EstimationError, match="S77 of the frame: not among the points compared"):
@@ -311,7 +311,7 @@ def turned_alike(first, second, turn, found, stations):
     """The second epoch readjusted from given coordinates in other axes: nothing changes."""
     points = second.network.points
     network = replace(second.network, points=replace(points, xyz=points.xyz @ turn.T + [3e3, 0.0, 5.0]))
-    other = compare(first, adjusted(network), frame=stations, level=1e-3)
+    other = compare(first, adjusted(network), frame=stations, options=ComparisonOptions(level=1e-3))
     np.testing.assert_allclose(other.deformation.displacement, found.deformation.displacement, rtol=0, atol=1e-8)
     np.testing.assert_allclose(other.deformation.statistic, found.deformation.statistic, rtol=2e-3, atol=1e-3)
     scale = found.difference_covariance.max()
@@ -320,9 +320,9 @@ def turned_alike(first, second, turn, found, stations):
 
 
 def test_a_carried_metro_point_beside_its_frame_is_as_in_the_joint_model(metro):
-    joint = compare(*metro, points=["33"], level=1e-30)
-    found = compare(*metro, frame=[*CARRIED, "41", "42"], level=1e-30)
-    beside = compare(*metro, points=["33", "41", "42"], level=1e-30)
+    joint = compare(*metro, points=["33"], options=ComparisonOptions(level=1e-30))
+    found = compare(*metro, frame=[*CARRIED, "41", "42"], options=ComparisonOptions(level=1e-30))
+    beside = compare(*metro, points=["33", "41", "42"], options=ComparisonOptions(level=1e-30))
     i, j = found.deformation.names.index("33"), beside.deformation.names.index("33")
     np.testing.assert_allclose(found.deformation.displacement[i], beside.deformation.displacement[j], atol=1e-10)
     np.testing.assert_allclose(found.deformation.covariance[i], beside.deformation.covariance[j], rtol=1e-6, atol=1e-14)
@@ -367,7 +367,7 @@ def test_a_point_that_kept_its_name_only_is_set_apart_and_compared_when_asked(ra
     assert [d.names[i] for i in np.flatnonzero(d.moved)] == ["T004"]
     assert np.linalg.norm(d.displacement[d.moved]) == pytest.approx(0.5, abs=2e-4)
     with pytest.raises(EstimationError, match="no common point is where it was: S01, S02"):
-        compare(first, second, same_point=1e-9)
+        compare(first, second, options=ComparisonOptions(same_point=1e-9))
 
 
 def test_what_does_not_fit_together_is_refused_in_one_line(metro, ranging_network):
@@ -426,7 +426,7 @@ def test_every_engine_gives_the_comparison_that_the_dense_one_gives(large, engin
     """Selected inverse and block elimination against whole normal equations."""
     drawn, dense = large
     own = [adjust_network(epoch, engine=engine) for epoch in drawn]
-    for options in ({"frame": [f"S{i:02d}" for i in range(1, 7)]}, {"rule": "local"}):
+    for options in ({"frame": [f"S{i:02d}" for i in range(1, 7)]}, {"options": ComparisonOptions(rule="local")}):
         fast, plain = (compare(*epochs, **options) for epochs in (own, dense))
         d = plain.deformation
         assert [d.names[i] for i in np.flatnonzero(d.moved)] == ["S03", "T025"]

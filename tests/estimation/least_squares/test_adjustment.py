@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, STEP_IN_SIGMAS, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, STEP_IN_SIGMAS, SolverSettings, adjust
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import Distances, Linear
 
@@ -257,7 +257,7 @@ def test_extra_variance_is_a_larger_covariance_in_the_answer_and_in_every_test(d
 
 def test_without_tests_the_answer_is_the_same_and_the_fits_hold_residuals_only():
     x0, groups, _ = network(4)
-    full, bare = adjust(x0, groups), adjust(x0, groups, tests=False)
+    full, bare = adjust(x0, groups), adjust(x0, groups, solver=SolverSettings(tests=False))
     np.testing.assert_array_equal(full.x, bare.x)
     np.testing.assert_array_equal(stacked(full, "residual"), stacked(bare, "residual"))
     assert not stacked(bare, "standardised").any()
@@ -325,7 +325,7 @@ def test_one_floating_direction_is_named_in_any_unit(unit):
 def test_a_floating_mode_of_very_many_parameters_is_still_named():
     n = 1050  # each has less than a thousandth of the mode
     rods = Linear("rods", np.zeros(n - 1), np.ones(n - 1), np.arange(n), np.eye(n - 1, n, 1) - np.eye(n - 1, n))
-    status = adjust(np.zeros(n), [rods], tests=False).status
+    status = adjust(np.zeros(n), [rods], solver=SolverSettings(tests=False)).status
     assert status.startswith("rank deficient: parameter ")
 
 
@@ -392,7 +392,7 @@ def test_steps_that_overshoot_are_halved():
 
 
 def test_too_few_steps_have_a_status_and_no_answer():
-    solution = adjust(np.array([3.0]), [Bent(0.0)], iterations=2)
+    solution = adjust(np.array([3.0]), [Bent(0.0)], solver=SolverSettings(iterations=2))
     assert solution.status.startswith("not converged: the last step was ")
     assert "after 2 iterations; check the starting coordinates" in solution.status
     with pytest.raises(EstimationError, match="not converged"):

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from catseye.estimation.least_squares.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import SolverSettings, adjust
 from catseye.estimation.observations.kind import ObservationKind
 
 
@@ -37,7 +37,7 @@ def test_parameters_whose_products_cancel_have_their_covariance_and_tests(within
     observed = factor @ [1.0, 0.2, -0.3] + 1e-3 * rng.normal(size=4)
     groups = [slice(0, 4)] if within else [slice(0, 2), slice(2, 4)]
     rows = [Sums(f"g{k}", observed[g], np.full(4, 1e-6)[g], columns[g], factor[g]) for k, g in enumerate(groups)]
-    found = {form: adjust(np.zeros(3), rows, sparse=form) for form in (True, False)}
+    found = {form: adjust(np.zeros(3), rows, solver=SolverSettings(sparse=form)) for form in (True, False)}
     np.testing.assert_allclose(found[True].x, found[False].x, rtol=0, atol=1e-15)
     for one, other in zip(found[True].fits, found[False].fits, strict=True):
         np.testing.assert_allclose(one.redundancy, other.redundancy, rtol=0, atol=1e-12)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
 from catseye.estimation.least_squares.conflict import LocalConflict
-from catseye.estimation.least_squares.robust import adjust_robustly
+from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Distances, Linear
 from draws import examples
 
@@ -58,10 +58,11 @@ class Field:
         ]
         return [*shots, *self.prior]
 
-    def adjusted(self, **options):
+    def adjusted(self, *, advice=(), critical=3.5, **options):
         k, m = len(self.observed), len(self.to)
         removable = [np.ones(m, dtype=bool)] * k + [np.zeros(len(p.observed), dtype=bool) for p in self.prior]
-        return adjust_robustly(self.x0, self.groups(), removable, points=self.points, free=self.free, **options)
+        outliers = OutlierSearch(self.points, advice, critical)
+        return adjust_robustly(self.x0, self.groups(), removable, outliers=outliers, free=self.free, **options)
 
     def left_out(self, solution):
         return {(s, int(k)) for s, f in enumerate(solution.fits) for k in np.flatnonzero(~f.active)}

@@ -14,7 +14,14 @@ from scipy.stats import chi2, norm
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit, adjust
 from catseye.estimation.observations.kinds import Linear
-from catseye.estimation.quality.robustness import WEIGHTS, _Rows, estimate_robustly, snoop
+from catseye.estimation.quality.robustness import (
+    WEIGHTS,
+    RobustOptions,
+    SnoopingOptions,
+    _Rows,
+    estimate_robustly,
+    snoop,
+)
 from draws import draws, examples, same_sigmas
 
 quick = examples(25)
@@ -188,7 +195,7 @@ def test_l1_comes_to_the_least_sum_of_absolute_residuals_of_a_linear_programme()
     line = Line(a)
     line.solver(b)([np.ones(60)])
     unit = np.sqrt(1 - np.sum((a @ line.q) * a, axis=1))  # studentised: Schweppe's weights
-    answer = estimate_robustly(line.solver(b), [60], method="l1", iterations=3000)
+    answer = estimate_robustly(line.solver(b), [60], options=RobustOptions(method="l1", iterations=3000))
     programme = linprog(
         np.concatenate([np.zeros(3), unit, unit]),
         A_eq=np.hstack([a, np.eye(60), -np.eye(60)]),
@@ -207,7 +214,7 @@ def test_the_estimating_equations_are_met(method):
     line = Line(a, sigma)
     line.solver(b)([np.ones(80)])
     unit = sigma * np.sqrt(1 - np.sum((a @ line.q) * a, axis=1) / sigma**2)
-    answer = estimate_robustly(line.solver(b), [80], method=method, iterations=3000)
+    answer = estimate_robustly(line.solver(b), [80], options=RobustOptions(method=method, iterations=3000))
     v = b - a @ line.x
     weight = WEIGHTS[method](v / unit)
     slope = a.T @ (a * (weight / sigma**2)[:, None])
@@ -224,7 +231,7 @@ def test_a_wrong_observation_with_leverage_is_found_although_its_residual_is_sma
     b = 1.0 + 0.5 * x + 0.3 * rng.normal(size=32)
     b[31] += 12.0
     for method in ("huber", "biweight", "igg3"):
-        answer = estimate_robustly(line.solver(b), [32], method=method)
+        answer = estimate_robustly(line.solver(b), [32], options=RobustOptions(method=method))
         assert np.flatnonzero(answer.rejected[0]).tolist() == [31]
     first = line.solver(b)([np.ones(32)])[0]
     assert abs(first.residual[31]) < abs(first.standardised[31]) / 1.3
@@ -292,7 +299,9 @@ def test_an_unknown_scale_is_found_from_the_median():
     line = Line(rng.normal(size=(400, 5)))
     b = 7.0 * (rng.normal(size=400) + 60.0 * (np.arange(400) < 80) * rng.choice([-1, 1], 400))
     for start in ("annealed", "l1"):
-        answer = estimate_robustly(line.solver(b), [400], method="biweight", start=start, scale="mad", limit=4.5)
+        answer = estimate_robustly(
+            line.solver(b), [400], options=RobustOptions(method="biweight", start=start, scale="mad", limit=4.5)
+        )
         assert answer.scale == pytest.approx(7.0, rel=0.4)  # a fifth wrong widens the median by a fifth
         assert answer.rejected[0][:80].all()
         assert answer.rejected[0][80:].sum() <= 2
@@ -301,14 +310,14 @@ def test_an_unknown_scale_is_found_from_the_median():
 def test_the_scale_of_good_observations_is_not_biased():
     line, b = Line(np.random.default_rng(5).normal(size=(2000, 5))), 7.0 * np.random.default_rng(6).normal(size=2000)
     for method in ("huber", "biweight"):
-        answer = estimate_robustly(line.solver(b), [2000], method=method, scale="mad")
+        answer = estimate_robustly(line.solver(b), [2000], options=RobustOptions(method=method, scale="mad"))
         assert answer.scale == pytest.approx(7.0, rel=0.08)  # 2.6 % of scatter
 
 
 def test_a_scale_cannot_come_from_observations_that_fit_exactly():
     line = Line(np.ones((9, 1)))
     with pytest.raises(EstimationError, match="scale of the residuals is 0: more than half of the 9 checked"):
-        estimate_robustly(line.solver(np.zeros(9)), [9], scale="mad")
+        estimate_robustly(line.solver(np.zeros(9)), [9], options=RobustOptions(scale="mad"))
 
 
 def test_a_place_where_two_choices_explain_as_much_is_undecided():
@@ -316,7 +325,7 @@ def test_a_place_where_two_choices_explain_as_much_is_undecided():
     b = np.random.default_rng(0).normal(size=24)
     b[4:8] += 90.0  # four against four
     b[8:11] += [70.0, -40.0, 200.0]  # five against three that do not agree
-    answer = estimate_robustly(line.solver(b), [24], places=places, hold=1)
+    answer = estimate_robustly(line.solver(b), [24], places=places, options=RobustOptions(hold=1))
     assert answer.undecided[0].tolist() == [True] * 8 + [False] * 16
     assert np.flatnonzero(answer.rejected[0][8:]).tolist() == [0, 1, 2]
 
@@ -325,7 +334,7 @@ def test_a_place_where_hardly_more_agree_than_hold_it_is_undecided():
     line, places = Line(np.kron(np.eye(2), np.ones((8, 1)))), [np.repeat(np.arange(2), 8)]
     b = np.random.default_rng(0).normal(size=16)
     b[2:8] += [100.0, -250.0, 400.0, 700.0, -900.0, 1500.0]  # two agree, and that may be chance
-    answer = estimate_robustly(line.solver(b), [16], places=places, hold=1)
+    answer = estimate_robustly(line.solver(b), [16], places=places, options=RobustOptions(hold=1))
     assert answer.undecided[0].tolist() == [True] * 8 + [False] * 8
 
 
@@ -345,7 +354,7 @@ def test_a_large_but_unrelated_test_is_no_rival():
     b = np.kron(np.ones(2), np.linspace(-1, 1, 30))
     b[4] += 4.6  # left out
     b[40] -= 2.9  # nearly
-    found = snoop(Line(a).solver(b), [60], level=0.05)
+    found = snoop(Line(a).solver(b), [60], options=SnoopingOptions(level=0.05))
     assert [r.row for r in found.rejections] == [4]
     assert found.rejections[0].rival is None
     assert not found.undecided[0].any()
@@ -364,12 +373,14 @@ def test_what_is_not_removable_keeps_its_weight():
 def test_unknown_names_are_refused_in_one_line():
     line = Line(np.ones((3, 1)))
     with pytest.raises(EstimationError, match="'welsch' from 'annealed' with 'known' scale is unknown; known: huber"):
-        estimate_robustly(line.solver(np.zeros(3)), [3], method="welsch")
+        estimate_robustly(line.solver(np.zeros(3)), [3], options=RobustOptions(method="welsch"))
 
 
 def test_a_cap_on_iterations_is_told():
     line = Line(np.random.default_rng(0).normal(size=(20, 2)))
-    answer = estimate_robustly(line.solver(np.arange(20.0) ** 2), [20], method="l1", iterations=2)
+    answer = estimate_robustly(
+        line.solver(np.arange(20.0) ** 2), [20], options=RobustOptions(method="l1", iterations=2)
+    )
     assert answer.status.startswith("not converged: weights still changed by")
 
 
@@ -387,7 +398,7 @@ def survives(seed):
     network, wrong = Ranging(seed), thirty_percent(seed)
     observed = network.contaminated(seed, wrong)
     solve = network.solver(observed)
-    robust = estimate_robustly(solve, [480], places=[network.to], seed=seed)
+    robust = estimate_robustly(solve, [480], places=[network.to], options=RobustOptions(seed=seed))
     undecided = robust.undecided[0].reshape(8, 60).any(axis=0)
     after = snoop(solve, [480], start=robust.rejected, doubtful=robust.undecided, weigh=False)
     missed = (wrong & ~after.rejected[0] & ~after.undecided[0]).reshape(8, 60).any(axis=0)
@@ -484,7 +495,7 @@ def test_margins_are_differences_of_pvv_between_the_two_explanations():
     b = rng.normal(size=12)
     b[2] += 9.0
     solve = Line(a).solver(b)
-    found = snoop(solve, [12], level=0.3)
+    found = snoop(solve, [12], options=SnoopingOptions(level=0.3))
     (first,) = found.rejections
     assert first.rival is not None
 
@@ -500,7 +511,8 @@ def test_snooping_good_observations_leaves_one_out_as_rarely_as_its_level_says(r
     rng = np.random.default_rng(77)
     line = Line(np.kron(np.eye(4), rng.normal(size=(10, 2))))
     alarms = sum(
-        bool(snoop(line.solver(rng.normal(size=40)), [40], level=0.2, weigh=False).rejections) for _ in range(runs)
+        bool(snoop(line.solver(rng.normal(size=40)), [40], options=SnoopingOptions(level=0.2), weigh=False).rejections)
+        for _ in range(runs)
     )
     # Sidak is nearly exact here; 0.016 of scatter in 600
     assert alarms / runs == pytest.approx(0.2, abs=same_sigmas(0.055, 600, runs))
@@ -513,7 +525,7 @@ def claims(trials, seed):
     for trial in range(trials):
         wrong = rng.random(size) < 0.1
         solve = network.solver(network.contaminated(int(rng.integers(2**31)), wrong))
-        robust = estimate_robustly(solve, [size], places=[network.to], trials=60, seed=trial)
+        robust = estimate_robustly(solve, [size], places=[network.to], options=RobustOptions(trials=60, seed=trial))
         after = snoop(solve, [size], start=robust.rejected, doubtful=robust.undecided)
         doubt = after.undecided[0].reshape(8, -1).any(axis=0)
         error = network.x - network.true[8:]

@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError, FrameError
-from catseye.estimation.shapes.pose import METHODS, fit_pose, relative_pose
+from catseye.estimation.shapes.pose import METHODS, PlaceCovariances, fit_pose, relative_pose
 from catseye.geometry.frames.frame import Transform
 from draws import draws
 
@@ -33,7 +33,9 @@ def names(n):
 
 def test_what_was_done_is_found_about_any_pivot():
     x, pivot = points(), np.array([3.0, -70.0, 20.0])
-    found = fit_pose(names(12), x, moved(x, pivot=pivot), frame="ground", covariance_second=spread(12), pivot=pivot)
+    found = fit_pose(
+        names(12), x, moved(x, pivot=pivot), frame="ground", covariance=PlaceCovariances(second=spread(12)), pivot=pivot
+    )
     np.testing.assert_allclose(found.translation, SHIFT, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.rotation, TURN, rtol=0, atol=1e-13)
     assert found.motion.degrees_of_freedom == 30
@@ -47,7 +49,9 @@ def test_the_fit_is_scipys_with_both_covariances():
     q1, q2 = spread(12, seed=2), spread(12, seed=3)
     first = x + rng.multivariate_normal(np.zeros(36), q1).reshape(-1, 3)
     second = moved(x) + rng.multivariate_normal(np.zeros(36), q2).reshape(-1, 3)
-    found = fit_pose(names(12), first, second, frame="g", covariance_first=q1, covariance_second=q2, pivot=np.zeros(3))
+    found = fit_pose(
+        names(12), first, second, frame="g", covariance=PlaceCovariances(first=q1, second=q2), pivot=np.zeros(3)
+    )
     white = np.linalg.inv(np.linalg.cholesky(q1 + q2))  # turns of 1e-5 do not change Q1
 
     def residuals(p):
@@ -66,16 +70,20 @@ def test_the_fit_is_scipys_with_both_covariances():
 def test_the_gain_is_the_derivative_of_the_fit():
     x, q = points(6), spread(6)
     y = moved(x) + np.random.default_rng(8).normal(size=x.shape) * 5e-5
-    found = fit_pose(names(6), x, y, frame="g", covariance_second=q, pivot=np.ones(3))
+    found = fit_pose(names(6), x, y, frame="g", covariance=PlaceCovariances(second=q), pivot=np.ones(3))
     for k in range(18):
         step = np.zeros(18)
         step[k] = 1e-5
-        other = fit_pose(names(6), x, y + step.reshape(-1, 3), frame="g", covariance_second=q, pivot=np.ones(3))
+        other = fit_pose(
+            names(6), x, y + step.reshape(-1, 3), frame="g", covariance=PlaceCovariances(second=q), pivot=np.ones(3)
+        )
         change = np.concatenate([other.translation - found.translation, other.rotation - found.rotation])
         # second order and rounding: 1e-5 of turns of 3e-5
         np.testing.assert_allclose(change / 1e-5, found.gain[:, k], rtol=0, atol=1e-4 * np.abs(found.gain).max())
     again = found.about(np.array([0.0, 5.0, 40.0]))
-    direct = fit_pose(names(6), x, y, frame="g", covariance_second=q, pivot=np.array([0.0, 5.0, 40.0]))
+    direct = fit_pose(
+        names(6), x, y, frame="g", covariance=PlaceCovariances(second=q), pivot=np.array([0.0, 5.0, 40.0])
+    )
     np.testing.assert_allclose(again.gain, direct.gain, rtol=0, atol=1e-7)
 
 
@@ -86,15 +94,15 @@ def test_a_point_that_moved_alone_is_left_out_and_the_rest_is_right(method):
     y = moved(x) + rng.normal(size=x.shape) * 5e-5
     y[3] += [2e-3, 0.0, -1e-3]
     y[11] += [0.0, 5e-4, 0.0]
-    found = fit_pose(names(n), x, y, frame="g", covariance_second=q, pivot=np.zeros(3), robust=method)
+    found = fit_pose(names(n), x, y, frame="g", covariance=PlaceCovariances(second=q), pivot=np.zeros(3), robust=method)
     assert set(found.left_out) == {"P03", "P11"}
     assert min(found.left_out.values()) > 4.0
     clean = np.setdiff1d(np.arange(n), [3, 11])
     direct = fit_pose([names(n)[k] for k in clean], x[clean], y[clean], frame="g",
-                      covariance_second=np.eye(54) * 25e-10, pivot=np.zeros(3))  # fmt: skip
+                      covariance=PlaceCovariances(second=np.eye(54) * 25e-10), pivot=np.zeros(3))  # fmt: skip
     np.testing.assert_array_equal(found.translation, direct.translation)
     np.testing.assert_array_equal(found.covariance, direct.covariance)
-    plain = fit_pose(names(n), x, y, frame="g", covariance_second=q)
+    plain = fit_pose(names(n), x, y, frame="g", covariance=PlaceCovariances(second=q))
     assert plain.p < 1e-6
     assert int(np.argmax(plain.w)) == 3
 
@@ -106,7 +114,9 @@ def test_good_points_stay_with_a_robust_start(runs):
         rng = np.random.default_rng(100 + seed)
         x = points(15, seed)
         y = moved(x) + rng.normal(size=x.shape) * 5e-5
-        found = fit_pose(names(15), x, y, frame="g", covariance_second=np.eye(45) * 25e-10, robust="igg3")
+        found = fit_pose(
+            names(15), x, y, frame="g", covariance=PlaceCovariances(second=np.eye(45) * 25e-10), robust="igg3"
+        )
         kept.append(len(found.names))
     assert sum(15 - k for k in kept) <= 2 * runs // 20  # of 45 coordinates each beyond 4 sigma: 0.003 expected
 
@@ -115,14 +125,18 @@ def test_a_pose_in_other_axes_moves_the_same_points():
     x, q = points(), spread(12)
     turn = Rotation.from_rotvec([0.4, -1.0, 0.3]).as_matrix()
     to = Transform("reflector", "ground", turn, np.array([1.0, 50.0, -3.0]))
-    found = fit_pose(names(12), x, moved(x), frame="ground", covariance_second=q)
+    found = fit_pose(names(12), x, moved(x), frame="ground", covariance=PlaceCovariances(second=q))
     told = found.in_frame(to)
     np.testing.assert_allclose(told.motion.apply(to.points(x)), to.points(found.motion.apply(x)), rtol=0, atol=1e-13)
     both = np.kron(np.eye(12), turn)
     direct = fit_pose(
-        names(12), to.points(x), to.points(moved(x)), frame="reflector", covariance_second=both @ q @ both.T,
+        names(12),
+        to.points(x),
+        to.points(moved(x)),
+        frame="reflector",
+        covariance=PlaceCovariances(second=both @ q @ both.T),
         pivot=told.pivot,
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(told.covariance, direct.covariance, rtol=0, atol=1e-9 * np.abs(direct.covariance).max())
     np.testing.assert_allclose(told.gain, direct.gain, rtol=0, atol=1e-7)
     with pytest.raises(FrameError, match="'reflector' cannot be told"):
@@ -131,8 +145,15 @@ def test_a_pose_in_other_axes_moves_the_same_points():
 
 def test_a_body_seen_from_another_that_moved_with_it_has_not_moved():
     x, y = points(seed=1), points(seed=2) + np.array([0.0, 0.0, 60.0])
-    a = fit_pose(names(12), x, moved(x), frame="r", covariance_second=spread(12), pivot=np.zeros(3))
-    b = fit_pose(names(12), y, moved(y), frame="r", covariance_second=spread(12), pivot=np.array([0.0, 0.0, 60.0]))
+    a = fit_pose(names(12), x, moved(x), frame="r", covariance=PlaceCovariances(second=spread(12)), pivot=np.zeros(3))
+    b = fit_pose(
+        names(12),
+        y,
+        moved(y),
+        frame="r",
+        covariance=PlaceCovariances(second=spread(12)),
+        pivot=np.array([0.0, 0.0, 60.0]),
+    )
     still, q = relative_pose(b, a, np.zeros((6, 6)))
     np.testing.assert_allclose(still, 0.0, atol=5e-8)  # 60 m times (3.7e-5)^2 / 2
     np.testing.assert_allclose(np.diag(q), b.u**2 + a.about(b.pivot).u ** 2, rtol=1e-12)
@@ -145,8 +166,8 @@ def test_points_that_share_every_error_tell_the_relative_motion_better():
     rng, x, y = np.random.default_rng(9), points(6, 1), points(6, 2)
     root = rng.normal(size=(36, 40)) * 1e-5
     q = root @ root.T
-    a = fit_pose(names(6), x, x, frame="r", covariance_second=q[:18, :18], pivot=np.zeros(3))
-    b = fit_pose(names(6), y, y, frame="r", covariance_second=q[18:, 18:], pivot=np.ones(3))
+    a = fit_pose(names(6), x, x, frame="r", covariance=PlaceCovariances(second=q[:18, :18]), pivot=np.zeros(3))
+    b = fit_pose(names(6), y, y, frame="r", covariance=PlaceCovariances(second=q[18:, 18:]), pivot=np.ones(3))
     _, claimed = relative_pose(b, a, b.gain @ q[18:, :18] @ a.gain.T)
     draws = rng.multivariate_normal(np.zeros(36), q, 4000)
     six_a, six_b = draws[:, :18] @ a.gain.T, draws[:, 18:] @ b.gain.T
@@ -159,13 +180,13 @@ def test_points_that_share_every_error_tell_the_relative_motion_better():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"covariance_second": None}, "both are missing"),
+        ({"covariance": PlaceCovariances()}, "both are missing"),
         ({"robust": "median"}, "none of l1"),
-        ({"covariance_second": np.eye(5)}, "expected"),
+        ({"covariance": PlaceCovariances(second=np.eye(5))}, "expected"),
     ],
 )
 def test_what_cannot_be_fitted_is_said_in_one_line(change, said):
-    given = {"frame": "g", "covariance_second": spread(5), **change}
+    given = {"frame": "g", "covariance": PlaceCovariances(second=spread(5)), **change}
     with pytest.raises(EstimationError, match=said):
         fit_pose(names(5), points(5), points(5), **given)
 
@@ -173,7 +194,7 @@ def test_what_cannot_be_fitted_is_said_in_one_line(change, said):
 def test_points_on_a_line_are_refused_by_name():
     line = np.arange(5.0)[:, None] * [1.0, 2.0, 0.0]
     with pytest.raises(EstimationError, match="on one line"):
-        fit_pose(names(5), line, line, frame="g", covariance_second=spread(5))
+        fit_pose(names(5), line, line, frame="g", covariance=PlaceCovariances(second=spread(5)))
 
 
 def test_what_both_epochs_share_counts_once_in_every_row():
@@ -190,9 +211,9 @@ def test_what_both_epochs_share_counts_once_in_every_row():
         first,
         second,
         frame="ground",
-        covariance_first=joint[: 3 * n, : 3 * n],
-        covariance_second=joint[3 * n :, 3 * n :],
-        cross=joint[: 3 * n, 3 * n :],
+        covariance=PlaceCovariances(
+            first=joint[: 3 * n, : 3 * n], second=joint[3 * n :, 3 * n :], cross=joint[: 3 * n, 3 * n :]
+        ),
     )
     turned = np.hstack([-np.kron(np.eye(n), found.motion.matrix), np.eye(3 * n)])
     weight = np.linalg.inv(turned @ joint @ turned.T)

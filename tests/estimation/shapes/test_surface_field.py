@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.surface_field import Roughness, find_roughness, foretell
+from catseye.estimation.shapes.surface_field import MeasuredField, Roughness, find_roughness, foretell
 from draws import draws, same_sigmas
 
 ROUGH = Roughness(smooth=2e-4, length=25.0, own=7e-5)
@@ -25,7 +25,7 @@ def test_it_is_the_solution_of_the_textbooks_saddle_system():
     rng, places, field, trend = scene(1, 30, 4)
     seen, wanted = slice(0, 30), slice(30, 34)
     noise = np.diag(rng.uniform(1, 4, 30) * 1e-9)
-    found = foretell(places[seen], field[seen], noise, trend[seen], places[wanted], trend[wanted],
+    found = foretell(MeasuredField(places[seen], field[seen], noise, trend[seen]), places[wanted], trend[wanted],
                      roughness=ROUGH, same=np.full(4, -1))  # fmt: skip
     v = ROUGH.covariance(places[seen], places[seen]) + ROUGH.own**2 * np.eye(30) + noise
     for k in range(4):
@@ -46,7 +46,7 @@ def test_foretold_less_true_scatters_as_claimed(runs):
         noise = 9e-10 * np.eye(80)
         measured = field[:80] + 3e-5 * rng.normal(size=80)
         rough = find_roughness(places[:80], measured, noise, trend[:80])
-        found = foretell(places[:80], measured, noise, trend[:80], places[80:], trend[80:],
+        found = foretell(MeasuredField(places[:80], measured, noise, trend[:80]), places[80:], trend[80:],
                          roughness=rough, same=np.full(60, -1))  # fmt: skip
         ratios.append(np.mean((found.value - field[80:]) ** 2 / np.diag(found.covariance)))
     assert np.mean(ratios) == pytest.approx(1.0, abs=same_sigmas(0.15, 24, runs))
@@ -67,7 +67,7 @@ def test_the_roughness_that_was_planted_is_found(runs):
 
 def test_a_measured_point_without_noise_is_foretold_as_measured():
     _, places, field, trend = scene(3, 40, 0)
-    found = foretell(places, field, np.zeros((40, 40)), trend, places[:5], trend[:5],
+    found = foretell(MeasuredField(places, field, np.zeros((40, 40)), trend), places[:5], trend[:5],
                      roughness=ROUGH, same=np.arange(5))  # fmt: skip
     np.testing.assert_allclose(found.value, field[:5], atol=1e-11)
     assert np.diag(found.covariance).max() < 1e-14
@@ -79,4 +79,10 @@ def test_what_cannot_be_is_refused():
         find_roughness(places, field, np.zeros((8, 8)), trend)
     same = np.column_stack([np.ones(8), np.ones(8)])
     with pytest.raises(EstimationError, match="do not hold the 2 coefficients"):
-        foretell(places, field, np.zeros((8, 8)), same, places[:1], same[:1], roughness=ROUGH, same=np.array([-1]))
+        foretell(
+            MeasuredField(places, field, np.zeros((8, 8)), same),
+            places[:1],
+            same[:1],
+            roughness=ROUGH,
+            same=np.array([-1]),
+        )

@@ -9,7 +9,7 @@ import pytest
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.atmosphere.sound.velocity import EARTH_RADIUS
 from catseye.errors import EstimationError, InputError, ValidityError
-from catseye.estimation.baseline.adjustment import adjust_baseline
+from catseye.estimation.baseline.adjustment import BaselineNoise, adjust_baseline
 from catseye.estimation.baseline.model import BaselineSights, Claim
 from catseye.records.laboratory.baseline import FORMAT, Baseline, read_heights, read_observations
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
@@ -210,7 +210,7 @@ def test_few_good_data_are_accused_in_five_of_a_hundred(tables):
         d = x[pairs[:, 1]] - x[pairs[:, 0]] + 6e-4 * rng.standard_normal(6)
         none = np.full(6, np.nan)
         s = BaselineSights(*pairs.T, np.arange(6), pairs[:, 0], d, np.ones(6), np.zeros((6, 0)), (), none, none)
-        found = adjust_baseline(s, x, np.zeros(4), claim=Claim(3.6e-9, 3.6e-7, 0.0))
+        found = adjust_baseline(s, x, np.zeros(4), before=BaselineNoise(claim=Claim(3.6e-9, 3.6e-7, 0.0)))
         accused += bool(suspects_of(found, np.arange(6), 0.05))
     assert accused <= 0.05 * tables + same_sigmas(40 / 500 - 0.05, 500, tables) * tables
 

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.errors import ValidityError
-from catseye.signal.delay.arrival import DelayPlan, DelayStatus, delay, fast_length, noise_spectrum
+from catseye.signal.delay.arrival import DelayPlan, DelayStatus, fast_length, noise_spectrum
 from catseye.signal.delay.waveform import chirp, maximum_length_chips, maximum_length_sequence, pulse, sampled
 
 FS = 48e3
@@ -241,8 +241,9 @@ def test_what_cannot_be_sought_is_refused(wrong, said):
     template = sampled("chirp", FS, **CHIRP)
     values = {"recordings": heard(0.05)[0], "template": template, "sampling_hz": FS, "expected": 0.05, "window": 3e-3}
     values |= wrong
+    recordings, expected = values.pop("recordings"), values.pop("expected")
     with pytest.raises(ValidityError, match=said):
-        delay(values.pop("recordings"), values.pop("template"), **values)
+        DelayPlan(**values)(recordings, expected)
 
 
 @given(st.integers(2, 100_000))

@@ -45,7 +45,7 @@ def test_without_force_the_filter_moves_as_the_differential_equation():
     later = state.advanced(0.7)
     path = solve_ivp(lambda _, x: system @ x, (0, 0.7), begun, rtol=1e-11, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(later.mean[:2], to_z @ path, rtol=0, atol=1e-9)
-    assert later.seen()[0][0] == pytest.approx(path[0], abs=1e-9)
+    assert later.expected_sample()[0][0] == pytest.approx(path[0], abs=1e-9)
 
 
 @given(st.floats(0.01, 2.0), st.floats(0.01, 2.0))
@@ -91,12 +91,12 @@ def test_jacobian_of_the_filter_is_the_slope_of_its_model():
     state.mean[:8] = rng.normal(size=8)
 
     def shown(mean):
-        return replace(state, mean=mean).advanced(0.23).seen(0.128)[0]
+        return replace(state, mean=mean).advanced(0.23).expected_sample(0.128)[0]
 
     n = len(state.mean)
     slopes = np.stack([(shown(state.mean + h) - shown(state.mean - h)) / 2e-6 for h in 1e-6 * np.eye(n)], axis=-1)
     later = state.advanced(0.23)
-    rows = later.seen(0.128)[1]
+    rows = later.expected_sample(0.128)[1]
     # the covariance of a unit change in each state, carried by the filter
     carried = []
     quiet = replace(state, covariance=np.zeros((n, n)))

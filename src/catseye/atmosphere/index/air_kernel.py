@@ -57,8 +57,8 @@ def saturation_polynomial(model: IndexModel, factor: Callable) -> SaturationPoly
 
     >>> from catseye.atmosphere.weather.humidity import enhancement_factor
     >>> from catseye.atmosphere.index.ciddor_hill1999 import MODEL
-    >>> found = saturation_polynomial(MODEL, enhancement_factor)
-    >>> round(float(saturation_value.py_func(20.0, found.middle, found.per_c, found.even, found.odd)), 4)  # hPa
+    >>> fit = saturation_polynomial(MODEL, enhancement_factor)
+    >>> round(float(saturation_value.py_func(20.0, fit.middle, fit.per_c, fit.even, fit.odd)), 4)  # hPa
     23.3916
     """
     limit, p = model.limits["temperature_c"], model.limits["pressure_hpa"].lower

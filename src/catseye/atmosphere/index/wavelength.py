@@ -107,13 +107,13 @@ def vacuum_wavelength_um(air_um, temperature_c, pressure_hpa, humidity_percent, 
     0.78
     """
     known = np.asarray(air_um, float)
-    found = known
+    vacuum_um = known
     for _ in range(ROUNDS):
-        before = found
+        before = vacuum_um
         n = 1.0 + phase_refractivity(temperature_c, pressure_hpa, humidity_percent, wavelength_um=before, **air)
-        found = known * n
-        if np.all(np.abs(found - before) <= 1e-15 * found):
-            return found
+        vacuum_um = known * n
+        if np.all(np.abs(vacuum_um - before) <= 1e-15 * vacuum_um):
+            return vacuum_um
     raise EstimationError(f"the vacuum wavelength did not settle in {ROUNDS} rounds; is {known} um air's?")
 
 

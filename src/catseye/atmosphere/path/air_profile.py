@@ -159,8 +159,8 @@ class AirProfile:
         z, share = nodes_along(a[:, 2], b[:, 2], NODES)
         warmth, pressure, damp = self.state(t, z)
         light = {"wavelength_um": wavelength_um, "model": model, "co2_ppm": co2_ppm}
-        found = air(warmth, pressure, damp, **light)
-        slopes = found.sensitivity
+        index = air(warmth, pressure, damp, **light)
+        slopes = index.sensitivity
         pairs = (
             (self.temperature, np.ones(z.shape)),
             (self.temperature, slopes.temperature_c),
@@ -177,7 +177,7 @@ class AirProfile:
                 part += np.outer(size, size) * profile.prior.local_covariance(t) * shared[profile.prior.local_length]
             parts.append(part)
         warm, covariance = parts[0], parts[1] + parts[2] + parts[3]
-        return PathIndex(found.group_refractivity @ share, covariance, warmth @ share, warm, found.standard_uncertainty)
+        return PathIndex(index.group_refractivity @ share, covariance, warmth @ share, warm, index.standard_uncertainty)
 
 
 def shared_air(a, b, length) -> np.ndarray:

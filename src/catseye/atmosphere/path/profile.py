@@ -205,8 +205,8 @@ class Profile:
     def coefficients(self, seconds) -> np.ndarray:
         """The coefficients at times (m,): (m, 3), the level from `mean`."""
         lag = np.asarray(seconds, float)[:, None] - self.readings.seconds
-        seen = self.basis(self.readings.z) * self.weights[:, None]
-        return np.stack([c.covariance(lag) @ seen[:, j] for j, c in enumerate(self.prior.coefficients)], axis=1)
+        design = self.basis(self.readings.z) * self.weights[:, None]
+        return np.stack([c.covariance(lag) @ design[:, j] for j, c in enumerate(self.prior.coefficients)], axis=1)
 
     def at(self, seconds, z) -> np.ndarray:
         """The smooth quantity at times (m,) and heights (m, ...), local air and offsets left out: (m, ...)."""

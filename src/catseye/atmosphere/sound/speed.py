@@ -211,20 +211,20 @@ def temperatures_c(speed, pressure_hpa, humidity_percent, vapour_pressure_hpa, m
     return np.where(inside, t + step, np.nan)[()]
 
 
-def _refused_outside(chosen, found, speed):
+def _refused_outside(chosen, temperature, speed):
     SPEED.check(speed)
-    bad = np.isnan(found)
+    bad = np.isnan(temperature)
     if np.any(bad):
         limit = chosen.limits["temperature_c"]
         at = int(np.flatnonzero(bad)[0])
-        where = f" (element {at} of {found.size})" if np.ndim(found) else ""
-        value = float(np.broadcast_to(np.asarray(speed, float), np.shape(found)).flat[at])
+        where = f" (element {at} of {temperature.size})" if np.ndim(temperature) else ""
+        value = float(np.broadcast_to(np.asarray(speed, float), np.shape(temperature)).flat[at])
         raise ValidityError(
             f"speed of sound {value:g} m/s{where} is that of no air within {limit.lower:g} to {limit.upper:g} C, "
             f"where {limit.source} holds",
-            bad if np.ndim(found) else None,
+            bad if np.ndim(temperature) else None,
         )
-    return found
+    return temperature
 
 
 def _check_vapour(chosen, e, pressure_hpa) -> None:

@@ -6,9 +6,11 @@ than its dew point says, for the frost point is the higher of the two. Clean gla
 frost point for want of nuclei: this is the temperature from which on a deposit is possible, the cautious side.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import humidity
@@ -52,37 +54,44 @@ class Condensation(NamedTuple):
         return [_line(*(value.item() for value in row)) for row in zip(*columns, strict=True)]
 
 
-def condensation(
-    surface_c,
-    temperature_c,
-    pressure_hpa,
-    humidity_percent,
-    *,
-    u_surface_c=0.0,
-    u_temperature_c=0.0,
-    u_humidity_percent=0.0,
-    covariance_c2=0.0,
-    formula="buck",
-) -> Condensation:
+@dataclass(frozen=True, eq=False)
+class CondensationSpread:
+    """Standard uncertainties of what condensation depends on; numbers or arrays.
+
+    surface_c          of the surface's temperature, °C
+    temperature_c      of the air's, °C
+    humidity_percent   of the relative humidity, %
+    covariance_c2      covariance of both temperatures, °C²: temperature_c² where the surface was taken as the air's
+                       temperature plus an offset
+    """
+
+    surface_c: ArrayLike = 0.0
+    temperature_c: ArrayLike = 0.0
+    humidity_percent: ArrayLike = 0.0
+    covariance_c2: ArrayLike = 0.0
+
+
+EXACT = CondensationSpread()
+
+
+def condensation(surface_c, temperature_c, pressure_hpa, humidity_percent, *, u=EXACT, formula="buck") -> Condensation:
     """Margin of surfaces to the dew or frost point of the air around them, and the probability of a deposit.
 
     surface_c            temperature of the surface, -100 to 100 °C
     temperature_c        air temperature, -100 to 100 °C
     pressure_hpa         total pressure, 100 to 1400 hPa
     humidity_percent     relative humidity over liquid water, 0 to 100 %
-    u_surface_c          standard uncertainty of the surface's temperature, °C; likewise for the air's and for humidity
-    covariance_c2        covariance of both temperatures, °C²: u_temperature_c² where the surface was taken as the air's
-                         temperature plus an offset
+    u                    standard uncertainties, a `CondensationSpread`
     formula              of saturation, `buck` or `iapws`
 
-    The margin is taken to be normal: with u_humidity_percent below a third of the humidity the probability is within
+    The margin is taken to be normal: with u of humidity below a third of the humidity the probability is within
     0.02 of a Monte Carlo. Where the dew point is 0 °C u_margin_k is up to 6 % too large: a frost point moves a tenth
     less with humidity. Without uncertainties the probability is 0 or 1.
     Raises ValidityError outside these limits, for an uncertainty below zero, and for a covariance above u u.
     Source: [PARKER04] section 1.4.1 with eqs. 1.3, 1.4, 1.7; [JCGM100] eq. 13.
 
-    >>> found = condensation(5.0, 10.0, 933.0, 75.0, u_surface_c=0.5)
-    >>> round(float(found.margin_k), 2), str(found.deposit), round(float(found.probability), 2)
+    >>> risk = condensation(5.0, 10.0, 933.0, 75.0, u=CondensationSpread(surface_c=0.5))
+    >>> round(float(risk.margin_k), 2), str(risk.deposit), round(float(risk.probability), 2)
     (-0.78, 'dew', 0.94)
     """
     SURFACE.check(surface_c)
@@ -90,7 +99,7 @@ def condensation(
     humidity.PRESSURE.check(pressure_hpa)
     humidity.HUMIDITY.check(humidity_percent)
     u_s, u_t, u_h, covariance = (
-        np.asarray(u, float) for u in (u_surface_c, u_temperature_c, u_humidity_percent, covariance_c2)
+        np.asarray(v, float) for v in (u.surface_c, u.temperature_c, u.humidity_percent, u.covariance_c2)
     )
     _refuse_uncertainties(u_s, u_t, u_h, covariance)
     surface, p = np.asarray(surface_c, float), np.asarray(pressure_hpa, float)
@@ -103,10 +112,10 @@ def condensation(
     slope = _slope_hpa_per_c(np.where(dry, 0.0, threshold), dew >= 0.0, p, formula)
     per_t, per_h = share * air.per_c / slope, air.pressure_hpa / 100.0 / slope
     variance = u_s**2 + (per_t * u_t) ** 2 + (per_h * u_h) ** 2 - 2.0 * per_t * covariance
-    u = np.sqrt(np.maximum(np.where(dry, 0.0, variance), 0.0))  # rounding: a full correlation may leave -1e-17
+    u_margin = np.sqrt(np.maximum(np.where(dry, 0.0, variance), 0.0))  # rounding: a full correlation may leave -1e-17
     threat = np.where(dry, "none", np.where(dew >= 0.0, "dew", "frost"))
     deposit = np.where(margin < 0.0, np.where(surface < 0.0, "frost", "dew"), "none")
-    answer = np.broadcast_arrays(margin, threshold, threat, deposit, u, _below_zero(margin, u))
+    answer = np.broadcast_arrays(margin, threshold, threat, deposit, u_margin, _below_zero(margin, u_margin))
     return Condensation(*(column[()] for column in answer))
 
 

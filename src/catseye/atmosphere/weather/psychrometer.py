@@ -137,8 +137,8 @@ def wet_bulb_c(temperature_c, vapour_pressure_hpa, pressure_hpa, *, over_ice=Fal
         at = ICE_FORMULAS[formula](wet, p) if over_ice else saturation(wet, p, formula)  # on its way it may pass 0 °C
         step = (at.pressure_hpa - a * p * (t - wet) - e) / (at.per_c + a * p)
         wet = wet - step
-    found = (np.abs(step) < 1e-9) & ((wet <= MELTING_C) | (not over_ice))
-    return np.where(found, wet, np.nan)[()]
+    settled = (np.abs(step) < 1e-9) & ((wet <= MELTING_C) | (not over_ice))
+    return np.where(settled, wet, np.nan)[()]
 
 
 def _coefficient(over_ice):

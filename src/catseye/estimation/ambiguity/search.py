@@ -81,6 +81,22 @@ class Located:
         )
 
 
+@dataclass(frozen=True)
+class AmbiguityLimits:
+    """What `locate` allows for.
+
+    wrong   probability that a range is wrong altogether, light from elsewhere: any length of a period is then as
+            likely. 0 trusts them all; else any one may be left out
+    most    candidates to try before giving up
+    """
+
+    wrong: float = 0.0
+    most: int = 2_000_000
+
+
+ALL_TRUSTED = AmbiguityLimits()
+
+
 def locate(
     start: np.ndarray,
     prior_covariance: np.ndarray,
@@ -90,8 +106,7 @@ def locate(
     period: np.ndarray | float,
     covariance: np.ndarray,
     station_covariance: np.ndarray | None = None,
-    wrong: float = 0.0,
-    most: int = 2_000_000,
+    limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> Located:
     """The point and the whole cycles that fit a prior position and ranges modulo a half wavelength.
 
@@ -102,9 +117,7 @@ def locate(
     period               (r,) or one, m: the half wavelength in the air of each path
     covariance           (r, r) m^2 of the lengths, or (r,) variances: noise, constants, what stations have in common
     station_covariance   (r, 3, 3) m^2 or (3r, 3r) jointly; None if known or already in `covariance`
-    wrong                probability that a range is wrong altogether, light from elsewhere: any length of a period is
-                         then as likely. 0 trusts them all; else any one may be left out
-    most                 candidates to try before giving up
+    limits               whether a range may be wrong, and when to give up
 
     FOUND means: it fits (chi-square passes at 5.7e-7), and all the others together are less probable than 5.7e-7, every
     set of whole cycles being as likely beforehand as its position in the prior. With `wrong` those count too that fit
@@ -117,16 +130,16 @@ def locate(
 
     >>> s = np.array([[60.0, 0, 0], [0, 60, 0], [-60, 0, 5], [0, -60, -5], [40, 40, 20]])
     >>> l = np.mod(np.linalg.norm(s - [1.0, 2.0, 30.0], axis=1), 0.1)
-    >>> found = locate([1.2, 1.9, 30.2], 0.04 * np.eye(3), s, l, period=0.1, covariance=np.full(5, 1e-8))
-    >>> found.status.name, found.x.round(6).tolist(), found.cycles[:3].tolist()
+    >>> located = locate([1.2, 1.9, 30.2], 0.04 * np.eye(3), s, l, period=0.1, covariance=np.full(5, 1e-8))
+    >>> located.status.name, located.x.round(6).tolist(), located.cycles[:3].tolist()
     ('FOUND', [1.0, 2.0, 30.0], [662, 653, 659])
     """
     ranged = _ranged(start, prior_covariance, stations, lengths, period, covariance, station_covariance)
     if ranged is None:
         return _nothing(len(np.atleast_1d(lengths)), AmbiguityStatus.REFUSED)
-    if not 0.0 <= wrong < 0.5:
-        raise ValidityError(f"wrong = {wrong}: a probability of 0 to 0.5 is expected")
-    explanations = _explanations(ranged, wrong, most)
+    if not 0.0 <= limits.wrong < 0.5:
+        raise ValidityError(f"wrong = {limits.wrong}: a probability of 0 to 0.5 is expected")
+    explanations = _explanations(ranged, limits.wrong, limits.most)
     if explanations is None:
         return _nothing(len(ranged.lengths), AmbiguityStatus.TOO_MANY)
     return _judged(ranged, explanations)
@@ -141,8 +154,7 @@ def locate_all(
     period: np.ndarray | float,
     covariance: np.ndarray,
     seen: np.ndarray | None = None,
-    wrong: float = 0.0,
-    most: int = 2_000_000,
+    limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> list[Located]:
     """`locate` for many points that were ranged from the same stations.
 
@@ -153,7 +165,7 @@ def locate_all(
     period             (p, r), (r,) or one, m
     covariance         (p, r, r) or (r, r) m^2; or variances (p, r)
     seen               (p, r) bool, which ranges there are; all if None
-    wrong, most        as for `locate`
+    limits             as for `locate`
 
     A point's cycles are those of its own ranges, in the stations' order.
 
@@ -167,18 +179,17 @@ def locate_all(
     variances = c.ndim == 2 and c.shape == (points, r) and not (points == r and np.allclose(c, c.T))
     there = np.ones((points, r), dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
     answers = []
-    for i, mine in enumerate(there):
-        own = c[i][mine] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(mine, mine)]
+    for i, used in enumerate(there):
+        own = c[i][used] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(used, used)]
         answers.append(
             locate(
                 start[i],
                 prior[i],
-                stations[mine],
-                lengths[i, mine],
-                period=periods[i, mine],
+                stations[used],
+                lengths[i, used],
+                period=periods[i, used],
                 covariance=own,
-                wrong=wrong,
-                most=most,
+                limits=limits,
             )
         )
     return answers
@@ -240,26 +251,26 @@ class _Explanation:
 
     left_out: int
     penalty: float
-    found: CycleCandidates
+    candidates: CycleCandidates
 
 
 def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation] | None:
     """The searches with all ranges and, if they may be wrong, without each; None where one gave up."""
     everything = np.arange(len(ranged.lengths))
     base = trunk(ranged, everything, most)
-    found = None if base is None else grown(ranged, everything, base, most)
-    if base is None or found is None:
+    candidates = None if base is None else grown(ranged, everything, base, most)
+    if base is None or candidates is None:
         return None
-    explanations = [_Explanation(-1, 0.0, found)]
+    explanations = [_Explanation(-1, 0.0, candidates)]
     u = np.linalg.norm(ranged.root, axis=1)
     for i in everything if wrong > 0.0 and len(everything) > 1 else ():
         rows = np.delete(everything, i)
         own = trunk(ranged, rows, most) if i in base.rows else base
-        found = None if own is None else grown(ranged, rows, own, most)
-        if found is None:
+        candidates = None if own is None else grown(ranged, rows, own, most)
+        if candidates is None:
             return None
         odds = (1.0 - wrong) / wrong * ranged.periods[i] / (np.sqrt(2.0 * np.pi) * u[i])
-        explanations.append(_Explanation(int(i), float(2.0 * np.log(max(odds, 1.0))), found))
+        explanations.append(_Explanation(int(i), float(2.0 * np.log(max(odds, 1.0))), candidates))
     return explanations
 
 
@@ -270,25 +281,25 @@ def _judged(ranged: Ranged, explanations: list[_Explanation]) -> Located:
     """
     from scipy.special import chdtri
 
-    lowest = [float(np.min(e.found.chi_square, initial=np.inf)) + e.penalty for e in explanations]
-    mine = explanations[int(np.argmin(lowest))]
+    lowest = [float(np.min(e.candidates.chi_square, initial=np.inf)) + e.penalty for e in explanations]
+    chosen = explanations[int(np.argmin(lowest))]
     if not np.isfinite(min(lowest)):
         return _nothing(len(ranged.lengths), AmbiguityStatus.MISFIT)
-    best = int(np.argmin(mine.found.chi_square))
-    cycles, square = mine.found.cycles[best], float(mine.found.chi_square[best])
+    best = int(np.argmin(chosen.candidates.chi_square))
+    cycles, square = chosen.candidates.cycles[best], float(chosen.candidates.chi_square[best])
     doubts, rivals, nowhere = [], [], np.full((1, 3), np.nan)
     for e in explanations:
         common = np.ones(len(cycles), dtype=bool)
-        common[[i for i in (e.left_out, mine.left_out) if i >= 0]] = False
-        other = np.any(e.found.cycles[:, common] != cycles[common], axis=1)
-        costs = np.append(e.found.chi_square[other], e.found.floor) + e.penalty - min(lowest)
+        common[[i for i in (e.left_out, chosen.left_out) if i >= 0]] = False
+        other = np.any(e.candidates.cycles[:, common] != cycles[common], axis=1)
+        costs = np.append(e.candidates.chi_square[other], e.candidates.floor) + e.penalty - min(lowest)
         doubts.append(float(np.sum(np.exp(-0.5 * np.clip(costs, -1400.0, 1400.0)))))
-        rivals.append((costs, np.concatenate([e.found.x[other], nowhere])))
+        rivals.append((costs, np.concatenate([e.candidates.x[other], nowhere])))
     costs, places = (np.concatenate(part) for part in zip(*rivals, strict=True))
     nearest = int(np.argmin(costs))
     listed = np.where(np.isfinite(places[:, 0]), costs, np.inf)
     doubt = sum(doubts)
-    took_part = len(cycles) - (mine.left_out >= 0)
+    took_part = len(cycles) - (chosen.left_out >= 0)
     if square > float(chdtri(took_part, SURE)):
         status = AmbiguityStatus.MISFIT
     elif doubt / (1.0 + doubt) <= (SURE if len(explanations) == 1 else SURE_OF_ALL) and doubts[0] <= SURE * (1 + doubt):
@@ -296,14 +307,14 @@ def _judged(ranged: Ranged, explanations: list[_Explanation]) -> Located:
     else:
         status = AmbiguityStatus.TOO_FEW if took_part < 4 else AmbiguityStatus.AMBIGUOUS
     return Located(
-        mine.found.x[best],
-        mine.found.covariance,
+        chosen.candidates.x[best],
+        chosen.candidates.covariance,
         cycles,
         square,
         places[int(np.argmin(listed))] if np.isfinite(listed).any() else nowhere[0],
         float(costs[nearest]),
         1.0 / (1.0 + doubt),
-        sum(e.found.tried for e in explanations),
-        mine.left_out,
+        sum(e.candidates.tried for e in explanations),
+        chosen.left_out,
         status,
     )

@@ -87,11 +87,11 @@ def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
     set's point follows by Gauss-Newton with the prior.
     """
     first = _best_figure(ranged, rows)
-    mine = ranged.ordered(first)
-    cycles = _first_cycles(mine, len(first), most)
+    ordered = ranged.ordered(first)
+    cycles = _first_cycles(ordered, len(first), most)
     if cycles is None:
         return None
-    x, information, square = _points(mine, cycles, mine.start + np.zeros((len(cycles), 3)))
+    x, information, square = _points(ordered, cycles, ordered.start + np.zeros((len(cycles), 3)))
     inside = square <= SIGMAS**2
     return Trunk(first, cycles[inside], x[inside], information[inside], square[inside])
 
@@ -111,16 +111,16 @@ def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> CycleCand
     rest = np.setdiff1d(rows, base.rows)
     noise = np.linalg.norm(ranged.root, axis=1)
     order = np.concatenate([base.rows, rest[np.argsort(noise[rest], kind="stable")]])
-    mine = ranged.ordered(order)
+    ordered = ranged.ordered(order)
     cycles, x, information, square = base.cycles, base.x, base.information, base.chi_square
     tried, floor = len(cycles), np.inf
     for k in range(len(base.rows), len(order)):
-        cycles, x, spared = _next_cycles(mine, k, cycles, x, information, square)
+        cycles, x, spared = _next_cycles(ordered, k, cycles, x, information, square)
         floor = min(floor, spared)
         tried = max(tried, len(cycles))
         if len(cycles) > most:
             return None
-        x, information, square = _points(mine, cycles, x)
+        x, information, square = _points(ordered, cycles, x)
     distance = np.linalg.norm(x[:, None] - ranged.stations, axis=2)
     whole = np.rint((distance - ranged.lengths) / ranged.periods)
     whole[:, order] = cycles
@@ -161,14 +161,14 @@ def _first_cycles(ranged: Ranged, first: int, most: int) -> np.ndarray | None:
     if np.prod(counts) > 20.0 * most:
         return None
     kept = np.zeros((1, 0))
-    seen = slope @ slope.T + (ranged.root @ ranged.root.T)[:first, :first]
+    covariance = slope @ slope.T + (ranged.root @ ranged.root.T)[:first, :first]
     for k in range(first):  # one range after the other, so that corners of the box are never made
         now = np.arange(low[k], high[k] + 1)
         grid = np.concatenate([np.repeat(kept, len(now), axis=0), np.tile(now, len(kept))[:, None]], axis=1)
         size = k + 1
         off = ranged.lengths[:size] + grid * ranged.periods[:size] - distance[:size]
         # what is excluded is excluded however the curvature turns out: its largest effect is taken off first
-        inverse = np.linalg.inv(np.linalg.cholesky(seen[:size, :size]))
+        inverse = np.linalg.inv(np.linalg.cholesky(covariance[:size, :size]))
         far = np.linalg.norm(off @ inverse.T, axis=1) - np.linalg.norm(np.abs(inverse) @ bend[:size])
         kept = grid[far <= SIGMAS]
     return kept if len(kept) <= most else None

@@ -95,6 +95,23 @@ class BaselineSolution:
         return np.array(rows, int), self.covariance[np.ix_(at, at)]
 
 
+@dataclass(frozen=True, eq=False)
+class BaselineNoise:
+    """What is known of the noise before a baseline is adjusted.
+
+    noise        variances to use as they are; None estimates them
+    claim        variances to use where the data leave too little to estimate them from
+    u_centring   of instrument and target across the line, for directions only, m
+    """
+
+    noise: Claim | None = None
+    claim: Claim | None = None
+    u_centring: float = 2e-4
+
+
+ESTIMATED = BaselineNoise()
+
+
 def adjust_baseline(
     sights: BaselineSights,
     x,
@@ -103,9 +120,7 @@ def adjust_baseline(
     known: KnownPlaces | None = None,
     scale: bool = False,
     extra: Extra | None = None,
-    u_centring: float = 2e-4,
-    noise: Claim | None = None,
-    claim: Claim | None = None,
+    before: BaselineNoise = ESTIMATED,
 ) -> BaselineSolution:
     """Pillars and instrument by least squares, with variance components of the noise.
 
@@ -114,15 +129,14 @@ def adjust_baseline(
     known        places known before; else the pillar of least x holds x and y, the one of largest x its y
     scale        True: the instrument's scale is unknown, for which `known` is needed
     extra        further terms
-    u_centring   of instrument and target across the line, for directions only, m
-    noise        variances to use as they are; None estimates them
-    claim        variances to use where the data leave too little to estimate them from
+    before       what is known of the noise; else it is estimated
 
     Raises EstimationError where the shots do not determine the parameters, or nothing tells the noise.
     Source: least squares with correlated observations; restricted likelihood of the components, [PATTERSON71].
     """
     x, y = np.array(x, float), np.array(y, float)
-    model = BaselineModel(sights, x, y, known, scale, extra, u_centring)
+    model = BaselineModel(sights, x, y, known, scale, extra, before.u_centring)
+    noise, claim = before.noise, before.claim
     start = noise or claim or Claim(1e-8, 1e-7, 1e-12)
     values = np.zeros(len(model.names))
     for _ in range(20):
@@ -182,18 +196,18 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
     bounds = list(zip(low[active], high[active], strict=True))
     tries = [begin, begin + np.log([0.1, 10.0])[[0] * (len(begin) - 1) + [1]]]
     best = min((minimize(criterion, t, jac=True, method="L-BFGS-B", bounds=bounds) for t in tries), key=lambda r: r.fun)
-    found = all_of(best.x)
-    return Claim(*found), _component_covariance(model, y, a, found, active, repeats)
+    components = all_of(best.x)
+    return Claim(*components), _component_covariance(model, y, a, components, active, repeats)
 
 
-def _component_covariance(model, y, a, found, active, repeats):
+def _component_covariance(model, y, a, components, active, repeats):
     """From the expected information, half the trace of P Q P Q."""
     m = len(model.distance)
-    normal = Normal(y, a, model.variance(Claim(*found)), model.names)
+    normal = Normal(y, a, model.variance(Claim(*components)), model.names)
     cofactors = model.cofactors()
     information = 0.5 * cofactors @ normal.p[:m, :m] ** 2 @ cofactors.T
     if repeats:
-        information[0, 0] += 0.5 * repeats / found[0] ** 2
+        information[0, 0] += 0.5 * repeats / components[0] ** 2
     covariance = np.full((3, 3), np.nan)
     part = information[np.ix_(active, active)]
     size = 1.0 / np.sqrt(np.diag(part))
@@ -223,8 +237,8 @@ def _solution(model: BaselineModel, values, noise: Claim, u_noise: np.ndarray, n
     misclosure, _ = model.rows(values)
     py, diagonal = normal.p @ misclosure, np.diag(normal.p)
     p = normal.p[:m, :m]
-    seen = diagonal[:m] * np.diag(normal.v)[:m] > CONTROLLED
-    size = np.sqrt(np.where(seen, diagonal[:m], np.nan))
+    controlled = diagonal[:m] * np.diag(normal.v)[:m] > CONTROLLED
+    size = np.sqrt(np.where(controlled, diagonal[:m], np.nan))
     w_set = py[:m] / size
     repeats = len(sights) - m
     n = model.shots[sights.set]

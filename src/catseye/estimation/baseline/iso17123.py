@@ -58,8 +58,8 @@ def full_test(start, end, distance, order, sigma=None) -> FullTest:
     Source: [ISO12], full test procedure, there for seven points and 21 distances. Raises EstimationError where the
     distances do not determine the zero, or leave nothing redundant.
 
-    >>> found = full_test([0, 0, 1, 0, 1, 2], [1, 2, 2, 3, 3, 3], [1.1, 3.1, 2.1, 6.1, 5.1, 3.1], [0, 1, 2, 3])
-    >>> round(found.zero, 12), found.degrees_of_freedom
+    >>> result = full_test([0, 0, 1, 0, 1, 2], [1, 2, 2, 3, 3, 3], [1.1, 3.1, 2.1, 6.1, 5.1, 3.1], [0, 1, 2, 3])
+    >>> round(result.zero, 12), result.degrees_of_freedom
     (0.1, 2)
     """
     start, end, distance = np.asarray(start), np.asarray(end), np.asarray(distance, float)

@@ -165,11 +165,11 @@ class BaselineModel:
         s = self.sights
         mean, variance = np.full(len(self.shots), np.nan), np.full(len(self.shots), np.nan)
         for k in self.aimed:
-            mine = np.flatnonzero((s.set == k) & seen)
-            turn = s.direction[mine] - s.direction[mine[0]]
-            weight = 1.0 / s.u_direction[mine] ** 2
-            mean[k] = s.direction[mine[0]] + np.sum(weight * np.arctan2(np.sin(turn), np.cos(turn))) / np.sum(weight)
-            variance[k] = np.min(s.u_direction[mine]) ** 2  # repeats share what makes a reading wrong
+            in_set = np.flatnonzero((s.set == k) & seen)
+            turn = s.direction[in_set] - s.direction[in_set[0]]
+            weight = 1.0 / s.u_direction[in_set] ** 2
+            mean[k] = s.direction[in_set[0]] + np.sum(weight * np.arctan2(np.sin(turn), np.cos(turn))) / np.sum(weight)
+            variance[k] = np.min(s.u_direction[in_set]) ** 2  # repeats share what makes a reading wrong
         return mean, variance
 
     def at(self, values):

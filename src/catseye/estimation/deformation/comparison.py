@@ -70,6 +70,28 @@ class PointMovements:
         return np.sqrt(np.maximum(np.diagonal(self.difference_covariance, axis1=1, axis2=2), 0.0))
 
 
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """How `compare` tests two epochs.
+
+    level, power, rule         as `moved_points`; with a frame half the level is spent on it and half on the others
+    rounding                   m, the last digit of coordinates carried from the first epoch; their departure from its
+                               result is an error of u = rounding / sqrt(12) each. 0: carried with all digits
+    same_point                 m: where the distances to other points change by more in the median, it is another point
+    scale_by_variance_factor   False: a priori covariances. True: times the pooled variance factor, F tests
+    """
+
+    level: float = 0.05
+    power: float = 0.8
+    rule: str = "global"
+    rounding: float = 1e-5
+    same_point: float = 0.1
+    scale_by_variance_factor: bool = False
+
+
+USUAL = ComparisonOptions()
+
+
 def compare(
     first: NetworkSolution,
     second: NetworkSolution,
@@ -77,12 +99,7 @@ def compare(
     points: Sequence[str] | None = None,
     frame: Sequence[str] | None = None,
     datum: str | None = None,
-    level: float = 0.05,
-    power: float = 0.8,
-    rule: str = "global",
-    rounding: float = 1e-5,
-    same_point: float = 0.1,
-    scale_by_variance_factor: bool = False,
+    options: ComparisonOptions = USUAL,
 ) -> PointMovements:
     """What moved between two adjusted epochs of a network, with the covariance that their connection calls for.
 
@@ -92,39 +109,35 @@ def compare(
     frame                      stable points that each other point is compared with by itself, for large networks; None:
                                those that define the datum, where there are more than 700 common points
     datum                      what the datums may differ by, a key of `DATUMS`; None: found from the observations
-    level, power, rule         as `moved_points`; with a frame half the level is spent on it and half on the others
-    rounding                   m, the last digit of coordinates carried from the first epoch; their departure from its
-                               result is an error of u = rounding / sqrt(12) each. 0: carried with all digits
-    same_point                 m: where the distances to other points change by more in the median, it is another point
-    scale_by_variance_factor   False: a priori covariances. True: times the pooled variance factor, F tests
+    options                    level and rule of the tests, rounding of carried coordinates
 
     Raises EstimationError where there is no answer to compare, or where the epochs do not fit together.
 
     Source: [PELZER71], [CASPARY87] (congruence); [FOERSTNER16] chapter 4 (propagation; see `epoch_model`).
     """
     _check_alike(first, second)
-    held = DatumConnection.of(first, second, datum, rounding)
-    names, apart = _common(first, second, points, held, same_point)
+    held = DatumConnection.of(first, second, datum, options.rounding)
+    names, apart = _common(first, second, points, held, options.same_point)
     model = EpochModel.of(first, second, names, held)
     factor, homogeneity = _factor(first, second)
-    factor = factor if scale_by_variance_factor else KNOWN
-    options: dict[str, Any] = {
+    factor = factor if options.scale_by_variance_factor else KNOWN
+    tested: dict[str, Any] = {
         "datum": held.datum,
-        "level": level,
-        "power": power,
-        "rule": rule,
+        "level": options.level,
+        "power": options.power,
+        "rule": options.rule,
         "variance_factor": factor,
     }
     blocks = frame is not None or len(names) > LARGEST
     if blocks:
         inside = _frame(first, second, model, frame)
-        deformation, (difference, covariance) = _beside_frame(model, inside, options)
+        deformation, (difference, covariance) = _beside_frame(model, inside, tested)
     else:
         inside = np.zeros(0, dtype=int)
         epochs = model.epochs(np.arange(len(names)))
-        deformation = moved_points(epochs, **options)
+        deformation = moved_points(epochs, **tested)
         plain = differences(epochs, held.datum, deformation.stable)
-        difference, covariance = _blocks_of(*_seen(plain, deformation.stable))
+        difference, covariance = _blocks_of(*_plain_differences(plain, deformation.stable))
     done = PointMovements(
         first=first,
         second=second,
@@ -139,7 +152,7 @@ def compare(
         homogeneity=homogeneity,
         words=(),
     )
-    return replace(done, words=tuple(_words(done, rounding, same_point, held.same)))
+    return replace(done, words=tuple(_words(done, options.rounding, options.same_point, held.same)))
 
 
 def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:
@@ -231,19 +244,15 @@ def _beside_frame(
     """
     level, factor = options["level"], options["variance_factor"]
     epochs = model.epochs(inside)
-    found = moved_points(epochs, **{**options, "level": 0.5 * level})
-    between = differences(epochs, options["datum"], found.stable)
-    stable = replace(between, used=between.used & np.repeat(found.stable, 3))
+    congruence = moved_points(epochs, **{**options, "level": 0.5 * level})
+    between = differences(epochs, options["datum"], congruence.stable)
+    stable = replace(between, used=between.used & np.repeat(congruence.stable, 3))
     used = np.flatnonzero(stable.used)
     others = np.setdiff1d(np.arange(len(model.names)), inside)
     motions = motion_columns(model.x[others], between.pivot) @ between.combination
     step = model.y[others] @ between.turned.T + between.shifted - model.x[others]
-    rows = (3 * others[:, None] + np.arange(3)).ravel()
-    q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
-    turn = between.turned
-    q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
-    across = q1 - ahead + turned_covariance(q2 - back, turn, columns=False)
-    own = model.of_points(others, turn)
+    across = _across(model, others, inside, between.turned)
+    own = model.of_points(others, between.turned)
 
     def foretold(gain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         g, c = gain.reshape(-1, 3, len(used)), across[:, used].reshape(-1, 3, len(used))
@@ -253,7 +262,7 @@ def _beside_frame(
 
     if np.linalg.matrix_rank(between.motions[used]) < between.motions.shape[1]:
         raise EstimationError(
-            f"the {int(found.stable.sum())} stable points of the frame do not hold the datum; add more"
+            f"the {int(congruence.stable.sum())} stable points of the frame do not hold the datum; add more"
         )
     fit = stable.fit()
     displacement, covariance = foretold(motions @ fit.gain + across[:, used] @ fit.weight)
@@ -269,28 +278,36 @@ def _beside_frame(
     def joined(frame: np.ndarray, rest: np.ndarray) -> np.ndarray:
         return np.concatenate([frame, rest])[at]
 
-    text = f"frame {found.status}; of the {len(others)} other points "
+    text = f"frame {congruence.status}; of the {len(others)} other points "
     text += f"moved: {listed([model.names[i] for i in others[moved]])}" if moved.any() else "none moved"
     deformation = replace(
-        found,
+        congruence,
         names=model.names,
-        displacement=joined(found.displacement, displacement),
-        covariance=joined(found.covariance, covariance * factor.value),
-        statistic=joined(found.statistic, statistic / factor.value),
-        p=joined(found.p, p),
-        p_adjusted=joined(found.p_adjusted, np.minimum(1.0, p * count)),
-        moved=joined(found.moved, moved),
-        held=joined(found.held, np.zeros(len(others), dtype=bool)),
-        stable=joined(found.stable, ~moved),
-        detectable=joined(found.detectable, np.sqrt(needed * worst)),
+        displacement=joined(congruence.displacement, displacement),
+        covariance=joined(congruence.covariance, covariance * factor.value),
+        statistic=joined(congruence.statistic, statistic / factor.value),
+        p=joined(congruence.p, p),
+        p_adjusted=joined(congruence.p_adjusted, np.minimum(1.0, p * count)),
+        moved=joined(congruence.moved, moved),
+        held=joined(congruence.held, np.zeros(len(others), dtype=bool)),
+        stable=joined(congruence.stable, ~moved),
+        detectable=joined(congruence.detectable, np.sqrt(needed * worst)),
         level=level,
         status=text,
     )
-    frame_plain = _blocks_of(*_seen(between, found.stable))
+    frame_plain = _blocks_of(*_plain_differences(between, congruence.stable))
     return deformation, (joined(frame_plain[0], plain[0]), joined(frame_plain[1], plain[1]))
 
 
-def _seen(between: Differences, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _across(model: EpochModel, others: np.ndarray, inside: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Covariance (3k, 3f) of the differences of other points and of those inside, the second epoch turned."""
+    rows = (3 * others[:, None] + np.arange(3)).ravel()
+    q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
+    q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
+    return q1 - ahead + turned_covariance(q2 - back, turn, columns=False)
+
+
+def _plain_differences(between: Differences, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Plain differences in the datum of stable points; nan where too few of them are left to hold it."""
     held = between.motions[np.repeat(stable, 3) & between.used]
     if np.linalg.matrix_rank(held) < held.shape[1]:

@@ -290,8 +290,8 @@ def _aligned(
     base = motion_columns(x, pivot)
     size = float(np.abs(base[:, 3:]).max())
     for _ in range(ALIGNMENTS):
-        seen = (base @ combination)[on]
-        motion = combination @ np.linalg.lstsq(seen, (y - x).ravel()[on], rcond=None)[0]
+        columns = (base @ combination)[on]
+        motion = combination @ np.linalg.lstsq(columns, (y - x).ravel()[on], rcond=None)[0]
         curved = float(motion[3:6] @ motion[3:6] + motion[6] ** 2) * size
         if np.isfinite(limit):
             if curved > CURVED * limit:

@@ -141,15 +141,15 @@ class _Search:
         across = covariance @ self.precision[rows]
         weighted = self.weighted - self.precision[:, rows] @ displacement
         tests: list[_PointTest | None] = []
-        for i, mine in enumerate(self.rows):
+        for i, point in enumerate(self.rows):
             if i in out:
-                at = np.flatnonzero(np.isin(rows, mine))
+                at = np.flatnonzero(np.isin(rows, point))
                 tests.append(self._test(displacement[at], covariance[np.ix_(at, at)]))
                 continue
-            own = self.precision[np.ix_(mine, mine)] - self.precision[np.ix_(mine, rows)] @ across[:, mine]
-            if len(mine) and self._holds(own, mine):
+            own = self.precision[np.ix_(point, point)] - self.precision[np.ix_(point, rows)] @ across[:, point]
+            if len(point) and self._holds(own, point):
                 inverse = np.linalg.inv(own)
-                tests.append(self._test(inverse @ weighted[mine], inverse))
+                tests.append(self._test(inverse @ weighted[point], inverse))
             else:
                 tests.append(None)
         pvv, degrees = self.pvv - float(self.weighted[rows] @ displacement), self.degrees - len(rows)
@@ -164,14 +164,14 @@ class _Search:
     def detectable(self, noncentrality: float) -> tuple[np.ndarray, np.ndarray]:
         """Per point the displacement of this noncentrality in the direction seen worst, and that direction."""
         size, direction = np.full(len(self.rows), np.nan), np.full((len(self.rows), 3), np.nan)
-        for i, mine in enumerate(self.rows):
-            own = self.precision[np.ix_(mine, mine)]
-            if len(mine) == 0 or not self._holds(own, mine):
+        for i, point in enumerate(self.rows):
+            own = self.precision[np.ix_(point, point)]
+            if len(point) == 0 or not self._holds(own, point):
                 continue
             values, vectors = np.linalg.eigh(own)
             size[i] = np.sqrt(noncentrality * self.variance_factor.value / values[0])
             direction[i] = 0.0
-            direction[i, self.axes[mine]] = vectors[:, 0]
+            direction[i, self.axes[point]] = vectors[:, 0]
         return size, direction
 
 

@@ -194,7 +194,6 @@ def constrained(
         approximate_stations, approximate_points, range_changes, sigma, basis
     )
     batch, (n, s), q = changes.shape[:-2], changes.shape[-2:], basis.shape[1]
-    shaped = basis.reshape(n, 3, q)
     seen = weight > 0.0
     theta, size = np.zeros((*batch, q)), np.full(batch, np.inf)
     limit = STEP * float(np.linalg.norm(points[..., None, :] - stations, axis=-1).mean())
@@ -202,7 +201,7 @@ def constrained(
         moved = (theta @ basis.T).reshape(*batch, n, 3)
         residual = np.where(seen, changes - change_of_range(stations, points, moved), 0.0)
         unit, turned = _directions(stations, points, moved)
-        design = np.einsum("...nsi,niq->...nsq", unit, shaped).reshape(*batch, n * s, q)
+        design = np.einsum("...nsi,niq->...nsq", unit, basis.reshape(n, 3, q)).reshape(*batch, n * s, q)
         inverse, rank = _inverse(np.swapaxes(design, -1, -2) @ (weight.reshape(*batch, n * s, 1) * design))
         gain = inverse @ np.swapaxes(design * weight.reshape(*batch, n * s, 1), -1, -2)
         step = (gain @ residual.reshape(*batch, n * s, 1))[..., 0]
@@ -218,10 +217,6 @@ def constrained(
     violation = u_violation**2 * outside @ np.swapaxes(outside, -1, -2)
     good = (rank == q) & (size < limit)
     channels = seen.sum(axis=(-1, -2))
-    status = np.full(batch, DETERMINED, dtype=object)
-    for i in np.argwhere(~good):
-        short = UNDETERMINED.format(rank=rank[tuple(i)], wanted=q, channels=channels[tuple(i)])
-        status[tuple(i)] = short if rank[tuple(i)] < q else NOT_CONVERGED
     known = [np.where(good[..., None, None], a, np.nan) for a in (
         moved, noise + approximation + violation, noise, approximation, violation, inverse, by_points, by_stations,
         resolution, np.where(seen, residual, np.nan),
@@ -242,8 +237,17 @@ def constrained(
         pvv=np.where(good, np.sum(weight * residual**2, axis=(-1, -2)), np.nan),
         degrees_of_freedom=np.where(good, channels - q, 0),
         rank=rank,
-        status=status,
+        status=_statuses(good, rank, channels, q),
     )
+
+
+def _statuses(good: np.ndarray, rank: np.ndarray, channels: np.ndarray, wanted: int) -> np.ndarray:
+    """Status of each group: determined, or why not."""
+    status = np.full(good.shape, DETERMINED, dtype=object)
+    for i in np.argwhere(~good):
+        short = UNDETERMINED.format(rank=rank[tuple(i)], wanted=wanted, channels=channels[tuple(i)])
+        status[tuple(i)] = short if rank[tuple(i)] < wanted else NOT_CONVERGED
+    return status
 
 
 def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[np.ndarray, np.ndarray]:

@@ -86,7 +86,7 @@ class DatumConnection:
         owns = [{} if free else _coordinates(s) for s, free in zip((first, second), loose, strict=True)]
         carried: dict[tuple[str, int], float] = {}
         foreign: list[dict[tuple[str, int], float]] = [{}, {}]
-        for own, other, strange, at, mine in (
+        for own, other, strange, at, of_second in (
             (owns[0], owns[1], foreign[0], second, False),
             (owns[1], owns[0], foreign[1], first, True),
         ):
@@ -95,7 +95,7 @@ class DatumConnection:
                     continue
                 there = at.x[at.index[name], axis] if name in at.index else np.inf
                 by = abs(value - there)
-                (carried if mine and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
+                (carried if of_second and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
         if datum is None:
             _refuse_foreign(foreign, carried, max(rounding, HELD_APART))
             datum = _least_datum(np.concatenate([f.kinds for f in floats], axis=1))

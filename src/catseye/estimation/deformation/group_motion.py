@@ -79,14 +79,14 @@ def group_motion(
     if strangers or set(group) & set(stable):
         wrong = ", ".join(strangers or sorted(set(group) & set(stable)))
         raise EstimationError(f"{wrong}: {'not common to both epochs' if strangers else 'both in group and stable'}")
-    mine, others = [places[name] for name in group], [places[name] for name in stable]
+    of_group, others = [places[name] for name in group], [places[name] for name in stable]
     n = len(epochs.names)
     between = differences(epochs, datum, np.isin(np.arange(n), others))
-    kept = np.repeat(np.isin(np.arange(n), mine + others), 3)
+    kept = np.repeat(np.isin(np.arange(n), of_group + others), 3)
     between = replace(between, used=between.used & kept)
     points = np.asarray(epochs.first, dtype=float)
-    centre = points[mine].mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
-    on_group = np.repeat(np.isin(np.arange(n), mine), 3)[:, None]
+    centre = points[of_group].mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
+    on_group = np.repeat(np.isin(np.arange(n), of_group), 3)[:, None]
     rigid = np.where(on_group, motion_columns(points, centre)[:, :6], 0.0)
     names = [f"{motion} of the group" for motion in MOTIONS[:6]]
     base, components = _strain_base(strain_axes)
@@ -109,7 +109,7 @@ def group_motion(
         motion=global_test(still.pvv - moving.pvv, 6, variance_factor),
         rigid=global_test(moving.pvv - full.pvv, len(components), variance_factor) if components else None,
         fit=global_test(full.pvv, full.degrees_of_freedom, variance_factor) if full.degrees_of_freedom else None,
-        curvature=float(0.5 * (turn @ turn) * np.linalg.norm(arms[mine], axis=1).max()),
+        curvature=float(0.5 * (turn @ turn) * np.linalg.norm(arms[of_group], axis=1).max()),
     )
 
 

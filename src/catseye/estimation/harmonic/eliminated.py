@@ -8,6 +8,8 @@ with W the inverse of its covariance and F = (b' x R, U) its row by s; then S = 
 covariance of s is S^-1, that of a is N^-1 + H S^-1 H', of both together -H S^-1. Exact.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,20 @@ from catseye.estimation.harmonic.dense import FLOATING, Solved, inverse_of
 Array = NDArray[np.float64]
 LEFT = 8000  # unknowns left: their matrix takes 0.5 GB
 PIECE = 128  # points in work at a time where epochs share something
+
+
+class _Design(NamedTuple):
+    """What the unknowns act by.
+
+    u           (T or 1, n, 3, q) m, by what epochs share
+    r           (n, 3, 6) rigid design
+    body, own   (T, K), (T, m) functions
+    """
+
+    u: Array
+    r: Array
+    body: Array
+    own: Array
 
 
 def solved_by_elimination(
@@ -69,9 +85,8 @@ def solved_by_elimination(
         right -= half.T @ np.einsum("pji,pj->pi", root, g_own[at]).ravel()
     core = _core(big, before, k, m)
     s = core @ right
-    return _answer(
-        s, core, inverse, g_own, y, weights, u=u, r=r, body=body, own=own, links=_links(g_body, weights, u, own)
-    )
+    links = _links(g_body, weights, u, own)
+    return _answer(s, core, inverse, g_own, y, weights, design=_Design(u, r, body, own), links=links)
 
 
 def weights_of(points: Array, seen: Array) -> Array:
@@ -177,10 +192,10 @@ def _core(big: Array, size: Array, k: int, m: int) -> Array:
 
 
 def _answer(
-    s: Array, core: Array, inverse: Array, g_own: Array, y: Array, weights: Array,
-    *, u: Array, r: Array, body: Array, own: Array, links,
-) -> Solved:  # fmt: skip
+    s: Array, core: Array, inverse: Array, g_own: Array, y: Array, weights: Array, *, design: _Design, links
+) -> Solved:
     """Own shifts, all covariances and the weighted squares."""
+    u, r, body, own = design
     (epochs, n), k, m = y.shape[:2], body.shape[1], own.shape[1]
     arms = arms_of(r)
     a = np.einsum("pij,pj->pi", inverse, g_own)

@@ -91,12 +91,12 @@ class HarmonicFit:
         r = rigid_design(arms)
         k = body.shape[1]
         six = np.einsum("pk,kjlh,pl->pjh", body, self.rigid_covariance.reshape(k, 6, k, 6), body)
-        found = np.einsum("nij,pjh,nlh->pnil", r, six, r)
+        rigid = np.einsum("nij,pjh,nlh->pnil", r, six, r)
         mixed = np.einsum("pf,nfikj,pk->pnij", own, self.cross.reshape(n, m, 3, k, 6), body)
         mixed = np.einsum("pnij,nlj->pnil", mixed, r)
         blocks = self.own_covariance.reshape(n, m, 3, m, 3)
         return (
-            found + mixed + np.swapaxes(mixed, -1, -2) + np.einsum("pf,nfigl,pg->pnil", own, blocks, own, optimize=True)
+            rigid + mixed + np.swapaxes(mixed, -1, -2) + np.einsum("pf,nfigl,pg->pnil", own, blocks, own, optimize=True)
         )
 
     def whole_covariance(self, body: Array, own: Array, arms: Array) -> Array:
@@ -132,10 +132,10 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
 
     >>> t = np.linspace(0.0, 1.0, 5)[:, None]
     >>> arms = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    >>> seen = np.einsum("tk,i->tki", t, [1.0, 0.0, 2.0]) + np.zeros((5, 3, 3))
+    >>> measured = np.einsum("tk,i->tki", t, [1.0, 0.0, 2.0]) + np.zeros((5, 3, 3))
     >>> none = np.zeros((5, 0))
-    >>> found = fit_harmonics(seen, arms, body=t, own=none, spread=Spread(points=np.eye(3)[None, None]))
-    >>> found.rigid[:3, 0].round(9).astype(int).tolist()
+    >>> fit = fit_harmonics(measured, arms, body=t, own=none, spread=Spread(points=np.eye(3)[None, None]))
+    >>> fit.rigid[:3, 0].round(9).astype(int).tolist()
     [1, 0, 2]
     """
     y = np.array(displacement, dtype=float)
@@ -149,28 +149,30 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
                 f"{len(arms)} points with a full covariance are too many unknowns (expected {TOGETHER} at most): give "
                 "covariances of points and what they share"
             )
-        found = solved_together(y, seen, r, body=body, own=own, full=spread.full)
+        solved = solved_together(y, seen, r, body=body, own=own, full=spread.full)
     elif spread.points is not None:
-        found = solved_by_elimination(y, seen, r, body=body, own=own, points=spread.points, shared=spread.shared)
+        solved = solved_by_elimination(y, seen, r, body=body, own=own, points=spread.points, shared=spread.shared)
     else:
         raise ValidityError("a spread has neither a full covariance nor those of points (expected one)")
-    six, six_covariance = _rigid_parts(found.own, np.asarray(arms, dtype=float), found.six_link, found.rigid_covariance)
-    residual = y - moved(body @ found.rigid.T, arms) - np.einsum("tm,nim->tni", own, found.own)
+    six, six_covariance = _rigid_parts(
+        solved.own, np.asarray(arms, dtype=float), solved.six_link, solved.rigid_covariance
+    )
+    residual = y - moved(body @ solved.rigid.T, arms) - np.einsum("tm,nim->tni", own, solved.own)
     residual[~seen] = np.nan
     unknown = 6 * body.shape[1] + 3 * len(arms) * own.shape[1]
     return HarmonicFit(
-        found.rigid,
-        found.own,
-        found.own_covariance,
-        found.cross,
-        found.rigid_covariance,
+        solved.rigid,
+        solved.own,
+        solved.own_covariance,
+        solved.cross,
+        solved.rigid_covariance,
         six,
         six_covariance,
-        found.shared,
+        solved.shared,
         residual,
-        found.pvv,
+        solved.pvv,
         3 * int(seen.sum()) - unknown,
-        found.whole,
+        solved.whole,
     )
 
 
@@ -179,9 +181,9 @@ def _rigid_parts(own: Array, arms: Array, link: Array | None, rigid_covariance: 
     m = own.shape[2]
     if link is None:
         size = len(rigid_covariance) + 6 * m
-        found = np.full((size, size), np.nan)
-        found[: len(rigid_covariance), : len(rigid_covariance)] = rigid_covariance
-        return np.full((6, m), np.nan), found
+        covariance = np.full((size, size), np.nan)
+        covariance[: len(rigid_covariance), : len(rigid_covariance)] = rigid_covariance
+        return np.full((6, m), np.nan), covariance
     part = rigid_part(arms)
     assert part is not None  # link says so
     return np.einsum("jni,nim->jm", part, own), link

@@ -105,6 +105,23 @@ class LeastSquaresSolution:
         return (sum(f.pvv for f in chosen) / degrees if degrees > 1e-9 else float("nan")), degrees
 
 
+@dataclass(frozen=True)
+class SolverSettings:
+    """How `adjust` solves.
+
+    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
+    tests        False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
+    sparse       solve sparse or dense; chosen by size if None
+    """
+
+    iterations: int = 50
+    tests: bool = True
+    sparse: bool | None = None
+
+
+COMPLETE = SolverSettings()
+
+
 def adjust(
     x0: np.ndarray,
     groups: Sequence[ObservationGroup],
@@ -114,9 +131,7 @@ def adjust(
     extra_variance: Sequence[np.ndarray] | None = None,
     inflation: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
-    iterations: int = 50,
-    tests: bool = True,
-    sparse: bool | None = None,
+    solver: SolverSettings = COMPLETE,
 ) -> LeastSquaresSolution:
     """The parameters that fit groups of observations best, with full covariance and a fit per observation.
 
@@ -127,9 +142,7 @@ def adjust(
     extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
     inflation       one (m,) array a group, a factor on its standard uncertainties; correlations stay
     names           (n,) what the parameters are called, for the status
-    iterations      cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
-    tests           False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
-    sparse          solve sparse or dense; chosen by size if None
+    solver          cap of steps, whether tests are wanted, sparse or dense
 
     Returns a Solution whose status says what happened; raises EstimationError only for a covariance that is none.
 
@@ -140,7 +153,8 @@ def adjust(
     moving = np.arange(n) if free is None else np.flatnonzero(free)
     given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
     rows = [ActiveRows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
-    normal = NormalEquations.of(rows, moving, n, sparse)
+    tests, iterations = solver.tests, solver.iterations
+    normal = NormalEquations.of(rows, moving, n, solver.sparse)
     q: Covariance = Dense(np.zeros((n, n))) if not normal.sparse else _Nothing(n)
     floating = np.zeros((0, n))
     status, taken, size = NOT_CONVERGED, 0, np.inf
@@ -238,18 +252,18 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
     if not tests:
         return fit
     wide = rows.spread(jacobian)
-    seen = np.where(on[:, None], wide, 0.0)
-    weighted, pv, own = rows.weigh(seen), rows.weigh(v), rows.own_weight()
+    design = np.where(on[:, None], wide, 0.0)
+    weighted, pv, own = rows.weigh(design), rows.weigh(v), rows.own_weight()
     spread = rows.products(q, weighted)
     visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
-    redundancy[:] = 1.0 - np.sum(spread * seen, axis=1)
+    redundancy[:] = 1.0 - np.sum(spread * design, axis=1)
     standardised[:] = pv / np.sqrt(visible)
     error[:] = pv / visible
     detectable[:] = NONCENTRALITY / np.sqrt(visible)
     out = np.flatnonzero(~on)
     if len(out):
         gain, expected = rows.prediction(out)
-        rest = wide[out] - gain @ seen if gain is not None else wide[out]
+        rest = wide[out] - gain @ design if gain is not None else wide[out]
         surprise = residual[out] - gain @ v if gain is not None else residual[out]
         expected = expected + np.sum(rows.products(q, rest, out) * rest, axis=1)
         redundancy[out] = 1.0

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri
 
-from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, SolverSettings, adjust
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.observations.kinds import ObservationGroup
 
@@ -99,7 +99,7 @@ def search(
             return local, wrong
         x = solution.x.copy()
         x[columns] += place
-        solution = adjust(x, groups, free=np.zeros(len(x), dtype=bool), tests=False)
+        solution = adjust(x, groups, free=np.zeros(len(x), dtype=bool), solver=SolverSettings(tests=False))
         jacobians = [g.predict(x)[1] for g in groups]
     return local, None
 

@@ -202,13 +202,13 @@ class NormalEquations:
             ones = [_gram(r, np.ones_like(j), self.size) for r, j in zip(self.rows, self._jacobians, strict=True)]
             self._pattern = csc_array(sum(ones, csc_array((self.size, self.size))))
             self._pattern.sort_indices()
-        found = csc_array((self.size, self.size))
+        normal = csc_array((self.size, self.size))
         for r, j in zip(self.rows, self._jacobians, strict=True):
-            found = csc_array(found + _gram(r, j, self.size))
-        found.sort_indices()
+            normal = csc_array(normal + _gram(r, j, self.size))
+        normal.sort_indices()
         data = np.zeros(self._pattern.nnz)
-        data[np.searchsorted(_places(self._pattern), _places(found))] = found.data
-        return csc_array((data, self._pattern.indices, self._pattern.indptr), shape=found.shape)
+        data[np.searchsorted(_places(self._pattern), _places(normal))] = normal.data
+        return csc_array((data, self._pattern.indices, self._pattern.indptr), shape=normal.shape)
 
     def _set_floating(self, directions: np.ndarray) -> None:
         self._floating = np.zeros((directions.shape[1], self.size))

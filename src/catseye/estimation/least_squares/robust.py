@@ -1,12 +1,18 @@
 """Which observations are wrong: a robust start, the smallest conflict of each point, then removal by test."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import (
+    NONCENTRALITY,
+    GroupFit,
+    LeastSquaresSolution,
+    SolverSettings,
+    adjust,
+)
 from catseye.estimation.least_squares.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
 from catseye.estimation.observations.kinds import ObservationGroup
 
@@ -20,33 +26,46 @@ BACK = 0.9  # of `critical`: what is out comes back below it; between the two it
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
+@dataclass(frozen=True, eq=False)
+class OutlierSearch:
+    """What `adjust_robustly` searches by.
+
+    points     columns of each point, (3,) an array: where a few observations meet, the smallest conflict is sought
+    advice     what is known of single points besides; it helps to tell which observation is wrong, and takes no part
+               in the answer
+    critical   |w| above which an observation is left out, and below nine tenths of which it comes back; 3.5 leaves out
+               one good observation in 2000
+    rounds     cap of removal rounds; if they do not end, the status says so
+    """
+
+    points: Sequence[np.ndarray] = ()
+    advice: Sequence[ObservationGroup] = ()
+    critical: float = 3.5
+    rounds: int = 100
+
+
+TESTS_ALONE = OutlierSearch()
+
+
 def adjust_robustly(
     x0: np.ndarray,
     groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
     *,
-    points: Sequence[np.ndarray] = (),
-    advice: Sequence[ObservationGroup] = (),
+    outliers: OutlierSearch = TESTS_ALONE,
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
-    critical: float = 3.5,
-    rounds: int = 100,
 ) -> LeastSquaresSolution:
     """An adjustment without the observations that do not belong to it; the fits say which (`active`).
 
     x0          (n,) start values
     groups      observations, as for `adjust`
     removable   one (m,) bool array a group: True for observations that may be wrong and may be left out
-    points      columns of each point, (3,) an array: where a few observations meet, the smallest conflict is sought
-    advice      what is known of single points besides; it helps to tell which observation is wrong, and takes no
-                part in the answer
+    outliers    how wrong ones are searched for
     free        (n,) bool, as for `adjust`
     active      one (m,) bool array a group: start from this selection instead of searching for one
     names       (n,) what the parameters are called
-    critical    |w| above which an observation is left out, and below nine tenths of which it comes back; 3.5 leaves out
-                one good observation in 2000
-    rounds      cap of removal rounds; if they do not end, the status says so
 
     Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
     sigmas from dragging others along. Where few observations meet in a point such a fit can share the blame between
@@ -64,12 +83,12 @@ def adjust_robustly(
         large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
         active = [~may | (np.abs(f.residual) < 10.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
     else:
-        solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), tests=False)
-        large = [may & ~a for may, a in zip(removable, active, strict=True)] if advice else []
-    active = _searched(solution, groups, removable, points, advice, large, active)
+        solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), solver=SolverSettings(tests=False))
+        large = [may & ~a for may, a in zip(removable, active, strict=True)] if outliers.advice else []
+    active = _searched(solution, groups, removable, outliers, large, active)
     x = solution.x
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
-    for _ in range(rounds):
+    for _ in range(outliers.rounds):
         solution = adjust(x, groups, free=free, active=active, names=names)
         if not solution.solved:
             if careful is None:
@@ -84,16 +103,19 @@ def adjust_robustly(
         worst, group = max(
             (float(t[a].max(initial=0.0)), i) for i, (t, a) in enumerate(zip(tests, active, strict=True))
         )
-        if worst > critical:  # one at a time: neighbours at a point with few checks look wrong together
+        if worst > outliers.critical:  # one at a time: neighbours at a point with few checks look wrong together
             active = [a.copy() for a in active]
             active[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
             continue
-        back = [~a & (t < BACK * critical) & (n < MOST_RETURNS) for t, a, n in zip(tests, active, returns, strict=True)]
+        back = [
+            ~a & (t < BACK * outliers.critical) & (n < MOST_RETURNS)
+            for t, a, n in zip(tests, active, returns, strict=True)
+        ]
         if not any(b.any() for b in back):
-            return _without_undecided(solution, groups, removable, points, advice, free, names)
+            return _without_undecided(solution, groups, removable, outliers, free, names)
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
-    return replace(solution, status=UNDECIDED.format(rounds=rounds))
+    return replace(solution, status=UNDECIDED.format(rounds=outliers.rounds))
 
 
 def _checked(fit: GroupFit) -> np.ndarray:
@@ -109,8 +131,7 @@ def _without_undecided(
     solution: LeastSquaresSolution,
     groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
-    points: Sequence[np.ndarray],
-    advice: Sequence[ObservationGroup],
+    outliers: OutlierSearch,
     free: np.ndarray | None,
     names: Sequence[str] | None,
 ) -> LeastSquaresSolution:
@@ -123,8 +144,8 @@ def _without_undecided(
     checked = [_checked(f) for f in solution.fits]
     jacobians = [g.predict(solution.x)[1] for g in groups]
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
-    for columns in touched(points, groups, jacobians, rejected):
-        local = at_point(columns, groups, jacobians, removable, solution, advice, slack=1.0)
+    for columns in touched(outliers.points, groups, jacobians, rejected):
+        local = at_point(columns, groups, jacobians, removable, solution, outliers.advice, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
         grave = [
             index
@@ -160,13 +181,20 @@ def _reweighted(
 ) -> LeastSquaresSolution:
     """A fit in which every observation that may be wrong weighs by its own residual."""
     extra = [np.zeros(len(g.observed)) for g in groups]
-    solution = adjust(x0, groups, free=free, names=names, iterations=1, tests=False)
+    solution = adjust(x0, groups, free=free, names=names, solver=SolverSettings(iterations=1, tests=False))
     for _ in range(8):
         if not solution.solved:
             break
         for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
             extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
-        solution = adjust(solution.x, groups, free=free, extra_variance=extra, names=names, iterations=1, tests=False)
+        solution = adjust(
+            solution.x,
+            groups,
+            free=free,
+            extra_variance=extra,
+            names=names,
+            solver=SolverSettings(iterations=1, tests=False),
+        )
     return solution
 
 
@@ -174,8 +202,7 @@ def _searched(
     solution: LeastSquaresSolution,
     groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
-    points: Sequence[np.ndarray],
-    advice: Sequence[ObservationGroup],
+    outliers: OutlierSearch,
     suspects: Sequence[np.ndarray],
     active: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
@@ -184,8 +211,8 @@ def _searched(
     if not solution.solved:
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     jacobians = [g.predict(solution.x)[1] for g in groups]
-    for columns in touched(points, groups, jacobians, suspects) if suspects else ():
-        local, wrong = search(columns, groups, jacobians, removable, solution, advice)
+    for columns in touched(outliers.points, groups, jacobians, suspects) if suspects else ():
+        local, wrong = search(columns, groups, jacobians, removable, solution, outliers.advice)
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong

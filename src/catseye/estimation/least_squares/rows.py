@@ -12,11 +12,11 @@ from catseye.estimation.observations.kinds import ObservationGroup
 
 def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Columns (k,) that rows (m, w) share, sorted, and where each row's own ones are among them (k: none)."""
-    found, position = np.unique(columns, return_inverse=True)
+    distinct, position = np.unique(columns, return_inverse=True)
     position = position.reshape(columns.shape)
-    if len(found) and found[0] < 0:
-        return found[1:], np.where(columns < 0, len(found) - 1, position - 1)
-    return found, position
+    if len(distinct) and distinct[0] < 0:
+        return distinct[1:], np.where(columns < 0, len(distinct) - 1, position - 1)
+    return distinct, position
 
 
 def dense_jacobian(jacobian: np.ndarray, position: np.ndarray, width: int) -> np.ndarray:

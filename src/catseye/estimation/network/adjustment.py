@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, SolverSettings, adjust
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows, variances
 from catseye.estimation.network.datum import (
@@ -59,6 +59,23 @@ def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNet
     return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
+@dataclass(frozen=True)
+class NetworkSettings:
+    """How far `adjust_network` goes.
+
+    iterations   cap of Gauss-Newton steps of each pass
+    tests        False leaves out covariance and test statistics
+    diagnose     False leaves the status at "converged" or "not converged", without looking for the cause
+    """
+
+    iterations: int = 50
+    tests: bool = True
+    diagnose: bool = True
+
+
+ALL_THE_WAY = NetworkSettings()
+
+
 def adjust_network(
     network: ObservationNetwork,
     *,
@@ -67,9 +84,7 @@ def adjust_network(
     inflation: Sequence[np.ndarray] | None = None,
     alone: bool = False,
     start: NetworkSolution | None = None,
-    iterations: int = 50,
-    tests: bool = True,
-    diagnose: bool = True,
+    settings: NetworkSettings = ALL_THE_WAY,
     engine: str | None = None,
 ) -> NetworkSolution:
     """The coordinates of a network with their covariance, and a fit per observation.
@@ -81,9 +96,7 @@ def adjust_network(
     alone       inflation of a correlated observation adds to its own variance and dilutes its correlations; else they
                 stay, as when a whole group is scaled
     start       an earlier solution of the same network to begin from
-    iterations  cap of Gauss-Newton steps of each pass
-    tests       False leaves out covariance and test statistics
-    diagnose    False leaves the status at "converged" or "not converged", without looking for the cause
+    settings    cap of steps, whether tests and the cause of a failure are wanted
     engine      "dense", "sparse" or "ranging" (pure ranging networks only); the fastest that serves if None
 
     Returns a NetworkSolution whose status says what happened, and where.
@@ -94,6 +107,7 @@ def adjust_network(
     if inflation is not None:
         kept = [np.isfinite(f) for f in inflation]
         active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
+    diagnose = settings.tests and settings.diagnose
     if engine in (None, "ranging"):
         from catseye.estimation.network.ranging_engine import adjusted_as_ranges
 
@@ -102,18 +116,19 @@ def adjust_network(
             active=active,
             inflation=inflation,
             start=start,
-            iterations=iterations,
-            tests=tests,
+            iterations=settings.iterations,
+            tests=settings.tests,
             forced=engine is not None,
         )
         if solution is not None:
-            return replace(solution, status=diagnosed(solution, _factor_alone)) if tests and diagnose else solution
+            return replace(solution, status=diagnosed(solution, _factor_alone)) if diagnose else solution
     problem = _Problem.of(network, start)
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
     sparse = None if engine is None else engine == "sparse"
-    solution = problem.solve(active, (inflation, alone), iterations, tests, sparse)
-    if tests and diagnose and np.isfinite(solution.covariance).all():
+    solver = SolverSettings(settings.iterations, settings.tests, sparse)
+    solution = problem.solve(active, (inflation, alone), solver)
+    if diagnose and np.isfinite(solution.covariance).all():
         return replace(solution, status=diagnosed(solution, _factor_alone))
     return solution
 
@@ -135,7 +150,9 @@ def _factor_alone(network: ObservationNetwork) -> NetworkSolution:
     """A quick trial: coordinates and variance factor, no tests."""
     large = len(network.points.names) >= FEWEST_POINTS
     try:
-        trial = adjust_network(network, iterations=15, tests=False, engine="ranging" if large else None)
+        trial = adjust_network(
+            network, settings=NetworkSettings(iterations=15, tests=False), engine="ranging" if large else None
+        )
     except EstimationError:  # large, and of another kind: it would take too long to try
         return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
     degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
@@ -200,33 +217,24 @@ class _Problem:
         self,
         active: Sequence[np.ndarray] | None,
         inflation: tuple[Sequence[np.ndarray] | None, bool],
-        iterations: int,
-        tests: bool,
-        sparse: bool | None,
+        solver: SolverSettings,
     ) -> NetworkSolution:
+        """The solution in its datum, in as many passes as it takes."""
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
-        larger, added = _padded(inflation[0], self.groups, 1.0), None
-        if larger is not None and inflation[1]:
-            finite = [np.where(np.isfinite(f), f, 1.0) for f in larger]
-            larger, added = None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
+        larger, added = self._inflated(*inflation)
         rows = [ActiveRows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
         x, taken = self.x0, 0
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: LeastSquaresSolution | None = None
         settled = False
         for _ in range(PASSES):
-            try:
-                floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
-            except np.linalg.LinAlgError:
-                floating = Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+            floating = self._motions(rows, x)
             conditions, loose = datum_conditions(floating, datum, points.xyz)
             if loose.shape[1]:
-                apart = unconnected(self.network)
                 text = WEAK_DATUM if datum.any() else NO_DATUM
-                status = apart or text.format(motions=floating.words(loose))
-                return self.unanswered(status, x)
+                return self.unanswered(unconnected(self.network) or text.format(motions=floating.words(loose)), x)
             held = self.free.copy()
             held[minimal_coordinates(conditions)] = False
             solution = adjust(
@@ -237,9 +245,7 @@ class _Problem:
                 inflation=larger,
                 extra_variance=added,
                 names=self.names,
-                iterations=iterations,
-                tests=tests,
-                sparse=sparse,
+                solver=solver,
             )
             taken += solution.iterations
             x = solution.x
@@ -252,15 +258,11 @@ class _Problem:
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
             x = x + moved
-            size = float(np.ptp(x[:n].reshape(-1, 3), axis=0).max())
-            limit = SETTLED * size
-            if tests:  # what a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties
-                u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0))
-                limit = max(limit, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
-            settled = bool(np.abs(moved[:n]).max() <= limit)
+            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
+            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), u))
+            if settled and solver.tests:
+                solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
-                if tests:
-                    solution = replace(solution, q=transformed(solution.q, t, conditions))
                 break
         assert solution is not None
         solution = replace(solution, x=x, iterations=taken)
@@ -269,10 +271,27 @@ class _Problem:
         if len(solution.floating):
             status = unconnected(self.network) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
-        answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
+        answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
+
+    def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
+        """Motions at x that nothing holds; none where the start is too poor to tell them."""
+        try:
+            return floating_motions(rows, x, x[: 3 * len(self.network.points.names)].reshape(-1, 3), self.free)
+        except np.linalg.LinAlgError:
+            return Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
+
+    def _inflated(
+        self, inflation: Sequence[np.ndarray] | None, alone: bool
+    ) -> tuple[list[np.ndarray] | None, list[np.ndarray] | None]:
+        """Factors on standard uncertainties, one array a group; or, `alone`, variances to add instead."""
+        factors = _padded(inflation, self.groups, 1.0)
+        if factors is None or not alone:
+            return factors, None
+        finite = [np.where(np.isfinite(f), f, 1.0) for f in factors]
+        return None, [variances(g) * (f**2 - 1.0) for g, f in zip(self.groups, finite, strict=True)]
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points
@@ -309,7 +328,7 @@ class _Problem:
         """No answer: the start, or where it stopped, with residuals and no covariance."""
         at = self.x0 if x is None else x
         nothing = np.zeros(len(at), dtype=bool)
-        solution = adjust(at, self.groups, free=nothing, tests=False, iterations=1)
+        solution = adjust(at, self.groups, free=nothing, solver=SolverSettings(tests=False, iterations=1))
         count = len(self.network.points.names)
         answer = self.answer(replace(solution, status=status), solution.q, "none")
         return replace(
@@ -319,6 +338,15 @@ class _Problem:
             variance_factor=float("nan"),
             degrees_of_freedom=float("nan"),
         )
+
+
+def _motion_limit(points: np.ndarray, u: np.ndarray) -> float:
+    """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
+
+    What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
+    """
+    size = float(np.ptp(points, axis=0).max())
+    return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
 
 
 def _padded(

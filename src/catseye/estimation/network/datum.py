@@ -90,9 +90,9 @@ def floating_motions(rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray,
     squares[: len(singular)] = singular**2
     combination = back @ turned[squares < FLOATS].T
     moving = np.linalg.norm(combination[:k], axis=0) > 1e-9 * np.linalg.norm(combination, axis=0)
-    found = basis @ combination[:, moving]
-    largest = np.abs(found[:coordinates]).max(axis=0, initial=0.0)
-    return Floating(found / largest, allowed @ combination[:k, moving] / largest, centre, size)
+    floating = basis @ combination[:, moving]
+    largest = np.abs(floating[:coordinates]).max(axis=0, initial=0.0)
+    return Floating(floating / largest, allowed @ combination[:k, moving] / largest, centre, size)
 
 
 def _row_form(rows: ActiveRows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

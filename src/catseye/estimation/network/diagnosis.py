@@ -65,10 +65,10 @@ def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -
     others = [p.name for k, p in enumerate(network.parameters) if part[3 * count + k] > 1e-2 * part.max()]
     if not worst:
         return FLOATS.format(points=", ".join(others[:4]), advice="observe it, hold it, or give it a prior")
-    seen = _observations_at(network, worst[:4])
+    observations = _observations_at(network, worst[:4])
     words = [
         f"{names[i]} ({number} observations)" if number != 1 else f"{names[i]} (1 observation)"
-        for i, number in zip(worst[:4], seen, strict=True)
+        for i, number in zip(worst[:4], observations, strict=True)
     ]
     text = ", ".join(words) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
     if others:

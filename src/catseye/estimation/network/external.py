@@ -26,8 +26,8 @@ def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
             result.append(np.full(len(group.observed), np.nan))
             continue
         rows = ActiveRows.of(group, fit.active)
-        seen = np.where(fit.active[:, None], rows.spread(group.predict(x)[1]), 0.0)
-        weighted, columns = rows.weigh(seen), rows.row_columns()
+        design = np.where(fit.active[:, None], rows.spread(group.predict(x)[1]), 0.0)
+        weighted, columns = rows.weigh(design), rows.row_columns()
         largest = np.zeros(len(columns))
         step = BATCH if rows.columns.ndim == 2 else max(1, len(columns))
         for low in range(0, len(columns), step):

@@ -149,7 +149,7 @@ def schedule(
         i, j = pairs[best]
         q, left = _across(solution.x, full, pairs[best : best + 1])[0], sigma[best] ** 2 + own[best]
         # Q becomes Q - q q' / left; what every other pair sees of it follows from two numbers a pair
-        felt, common = _seen(q, pairs, unit) / left, _seen(full[:, inside] @ q[inside], pairs, unit)
+        felt, common = _onto_ranges(q, pairs, unit) / left, _onto_ranges(full[:, inside] @ q[inside], pairs, unit)
         shown = np.maximum(shown - 2.0 * felt * common + felt**2 * float(q[inside] @ q[inside]), 0.0)
         own = np.maximum(own - felt**2 * left, 0.0)
         full -= np.outer(q, q / left)
@@ -227,7 +227,7 @@ def _across(x: np.ndarray, full: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return result
 
 
-def _seen(vector: np.ndarray, pairs: np.ndarray, unit: np.ndarray) -> np.ndarray:
+def _onto_ranges(vector: np.ndarray, pairs: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """a'v (k,) of ranges between pairs, v over all coordinates."""
     v = vector.reshape(-1, 3)
     return np.sum(unit * (v[pairs[:, 1]] - v[pairs[:, 0]]), axis=1)

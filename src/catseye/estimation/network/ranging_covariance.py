@@ -34,16 +34,16 @@ class RangingCovariance:
         at = np.flatnonzero(self.station >= 0)
         place[3 * at[:, None] + np.arange(3)] = self.station[at][:, None] * width + np.arange(3)
         for k, columns in ((3, self.zero), (4, self.scale)):
-            mine = np.flatnonzero(columns >= 0)
-            place[3 * count + columns[mine]] = mine * width + k
+            stations = np.flatnonzero(columns >= 0)
+            place[3 * count + columns[stations]] = stations * width + k
         return place
 
     @cached_property
     def _all(self) -> Mapped:
         own, n = self._own, len(self.solution.covariance)
         maps, target = np.zeros((len(own), n)), np.full(len(own), -1)
-        mine, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
-        maps[mine, own[mine]] = 1.0
+        at_station, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
+        maps[at_station, own[at_station]] = 1.0
         target[late] = self.target[late // 3]
         maps[late] = self.solution.following(np.arange(len(self.solution.targets)))[target[late], late % 3]
         return Mapped(maps, target, np.arange(len(own)) % 3)

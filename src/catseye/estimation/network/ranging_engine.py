@@ -213,12 +213,12 @@ def _priors(network: ObservationNetwork, split: _Split, role: np.ndarray) -> Poi
     for k in split.priors:
         group = network.groups[k]
         point = group.point.reshape(-1, 3)[:, 0] // 3  # type: ignore[attr-defined]
-        mine = role[point] >= 0
+        in_role = role[point] >= 0
         c = group.covariance
         blocks = c.reshape(-1, 3)[:, :, None] * np.eye(3) if c.ndim == 1 else c.reshape(-1, 3, 3)
-        index.append(role[point][mine])
-        observed.append(group.observed.reshape(-1, 3)[mine])
-        covariance.append(blocks[mine])
+        index.append(role[point][in_role])
+        observed.append(group.observed.reshape(-1, 3)[in_role])
+        covariance.append(blocks[in_role])
     if not index or not sum(len(i) for i in index):
         return None
     return PointPriors(np.concatenate(index), np.concatenate(observed), np.concatenate(covariance))

@@ -1,41 +1,30 @@
 """Distances between points that are carried: each shot finds both ends turned and shifted."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
-from catseye.estimation.observations.reading import reading, reading_columns
+from catseye.estimation.observations.between_points import BetweenPoints
+from catseye.estimation.observations.kind import ObservationKind
+from catseye.estimation.observations.reading import reading
 from catseye.estimation.observations.sight import length, triples
 
 
 @dataclass(frozen=True, eq=False)
-class MovingDistances(ObservationKind):
+class MovingDistances(BetweenPoints, ObservationKind):
     """observed = scale |B target + b - A origin - a| + offset + sum c_q x[nuisance_q] + error.
 
     The parameters are the points at one instant, the epoch; A, a and B, b carry them to the instant of each shot, as a
-    rigid telescope would. `Distances` otherwise.
+    rigid telescope would. First come the fields of `BetweenPoints`, last those of `LengthsBetweenPoints` but `shift`.
 
-    name                       what the group is, for reports
-    observed                   (m,) metres
-    covariance                 of the observed values, see `Observations`
-    origin, target             (m,) columns of the x of both points
-    origin_turn, target_turn   (m, 3, 3) A, B: rotations
-    origin_shift, target_shift (m, 3) a, b, m
-    scale, offset              (m,) or one
-    nuisance, coefficient      (m, q) columns that act linearly, and their derivatives
+    origin_turn, target_turn     (m, 3, 3) A, B: rotations
+    origin_shift, target_shift   (m, 3) a, b, m
     """
 
     kind: ClassVar[str] = "moving_distance"
     unit: ClassVar[str] = "m"
 
-    name: str
-    observed: np.ndarray
-    covariance: np.ndarray
-    origin: np.ndarray
-    target: np.ndarray
     origin_turn: np.ndarray
     origin_shift: np.ndarray
     target_turn: np.ndarray
@@ -46,15 +35,6 @@ class MovingDistances(ObservationKind):
     coefficient: np.ndarray | float = 1.0
     scaling: np.ndarray | None = None
     scaling_coefficient: np.ndarray | float = 1.0
-
-    @cached_property
-    def columns(self) -> np.ndarray:
-        """(m, 6 + q + s): origin, target, nuisance, scaling."""
-        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target), *reading_columns(self))
-
-    @property
-    def ends(self) -> tuple[np.ndarray, ...]:
-        return self.origin, self.target
 
     def ends_at_shots(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Origins and targets (m, 3) where each shot found them."""

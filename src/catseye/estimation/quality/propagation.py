@@ -127,8 +127,8 @@ def propagate(
     Source: [JCGM100] eqs. 13, 16 and G.2b. Exact for a linear model; the interval is that of a t distribution.
 
     >>> two = (Input("a", 1.0, 0.3), Input("b", 2.0, 0.2, "rectangular"))
-    >>> found = propagate(two, np.array([1.0, 2.0]), value=5.0)
-    >>> round(found.u, 6), [round(float(s), 2) for s in found.share], round(found.expanded, 4)
+    >>> budget = propagate(two, np.array([1.0, 2.0]), value=5.0)
+    >>> round(budget.u, 6), [round(float(s), 2) for s in budget.share], round(budget.expanded, 4)
     (0.5, [0.36, 0.64], 0.98)
     """
     from scipy.stats import t as student
@@ -233,9 +233,9 @@ def monte_carlo(
 
     Source: [JCGM101] clauses 7.2-7.7.
 
-    >>> found = monte_carlo(lambda x: x[:, 0], lambda g, n: g.uniform(-1.0, 1.0, (n, 1)), draws=200_000,
-    ...                     generator=np.random.default_rng(1))
-    >>> round(found.u, 2), round(found.high, 2)
+    >>> result = monte_carlo(lambda x: x[:, 0], lambda g, n: g.uniform(-1.0, 1.0, (n, 1)), draws=200_000,
+    ...                      generator=np.random.default_rng(1))
+    >>> round(result.u, 2), round(result.high, 2)
     (0.58, 0.95)
     """
     if draws < 2 or not 0.0 < probability < 1.0:
@@ -263,16 +263,16 @@ def adaptive_monte_carlo(
     """
     size = max(10_000, int(np.ceil(100.0 / (1.0 - probability))))
     pieces: list[np.ndarray] = []
-    told: list[tuple[float, float, float, float]] = []
+    rounds: list[tuple[float, float, float, float]] = []
     while True:
         pieces.append(model(draw(generator, size)))
         one = _summary(pieces[-1], probability)
-        told.append((one.mean, one.u, one.low, one.high))
-        sets = len(told)
+        rounds.append((one.mean, one.u, one.low, one.high))
+        sets = len(rounds)
         if sets < 2:
             continue
-        tolerance = numerical_tolerance(float(np.mean([u for _, u, _, _ in told])), digits)
-        spread = np.std(np.array(told), axis=0, ddof=1) / np.sqrt(sets)
+        tolerance = numerical_tolerance(float(np.mean([u for _, u, _, _ in rounds])), digits)
+        spread = np.std(np.array(rounds), axis=0, ddof=1) / np.sqrt(sets)
         settled = bool(np.all(2.0 * spread < tolerance))
         if settled or (sets + 1) * size > most:
             return _summary(np.concatenate(pieces), probability, settled)

@@ -378,7 +378,7 @@ def suspects(
     Source: [BAARDA68]; [POPE76].
     """
     tests = observation_tests(fits, level=level, correction=correction, known_sigma=known_sigma)
-    found = [
+    rejected = [
         SuspectObservation(
             group=i,
             row=int(k),
@@ -391,4 +391,4 @@ def suspects(
         for i, fit in enumerate(fits)
         for k in np.flatnonzero(tests.verdict[i] == SUSPECT)
     ]
-    return sorted(found, key=lambda s: (s.p, -abs(s.statistic)))
+    return sorted(rejected, key=lambda s: (s.p, -abs(s.statistic)))

@@ -54,8 +54,8 @@ def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float =
 
     Source: [ISO19] part 2, 7.4 (unequal sets too); moments, exact for equal sets.
 
-    >>> found = repeatability([1.0, 1.2, 2.0, 2.2], ["a", "a", "b", "b"])
-    >>> round(found.within, 6), round(found.between, 6), round(found.mean, 6)
+    >>> result = repeatability([1.0, 1.2, 2.0, 2.2], ["a", "a", "b", "b"])
+    >>> round(result.within, 6), round(result.between, 6), round(result.mean, 6)
     (0.141421, 0.7, 1.6)
     """
     y = np.asarray(values, dtype=float)

@@ -144,44 +144,58 @@ class _Rows:
         return np.where(active, np.where(self.may, w, np.nan), self.of("standardised"))
 
 
+@dataclass(frozen=True)
+class RobustOptions:
+    """How `estimate_robustly` weighs and searches.
+
+    method       a key of WEIGHTS; the convex huber and l1 need no start
+    start        of a redescending method: "annealed" (Geman-McClure from the largest residual down), "l1", or "none"
+    scale        "known" sigmas, or "mad": all sigmas off by one factor, from the median absolute residual
+    limit        |w| beyond which an observation counts as rejected
+    iterations   cap of each reweighting
+    trials       of the search of places; a quarter of them takes part in each
+    hold         number of local unknowns of a place
+    seed         of the search
+    """
+
+    method: str = "biweight"
+    start: str = "annealed"
+    scale: str = "known"
+    limit: float = 4.0
+    iterations: int = 100
+    trials: int = 100
+    hold: int = 3
+    seed: int = 0
+
+
+BIWEIGHT = RobustOptions()
+
+
 def estimate_robustly(
     solve: Solve,
     sizes: Sequence[int],
     *,
-    method: str = "biweight",
-    start: str = "annealed",
-    scale: str = "known",
     removable: Sequence[np.ndarray] | None = None,
     places: Sequence[np.ndarray] | None = None,
-    limit: float = 4.0,
-    iterations: int = 100,
-    trials: int = 100,
-    hold: int = 3,
-    seed: int = 0,
+    options: RobustOptions = BIWEIGHT,
 ) -> RobustEstimate:
     """M-estimate by iterated reweighting of studentised residuals, with a start that survives many wrong observations.
 
     solve        the engine, see the top of this file
     sizes        number of observations of each group
-    method       a key of WEIGHTS; the convex huber and l1 need no start
-    start        of a redescending method: "annealed" (Geman-McClure from the largest residual down), "l1", or "none"
-    scale        "known" sigmas, or "mad": all sigmas off by one factor, from the median absolute residual
     removable    one (m,) bool array a group: False for observations that are never down-weighted
     places       one (m,) int array a group: rows with the same number (not negative) share local unknowns, such as the
                  target of a range. Given, each place with several rejections is searched for a better choice: a few
                  rows drawn at random hold it, those that agree with them join. Reweighting alone often chooses wrong
                  where a third of a place's ranges are wrong
-    limit        |w| beyond which an observation counts as rejected
-    iterations   cap of each reweighting
-    trials       of the search; a quarter of the places takes part in each
-    hold         number of local unknowns of a place
-    seed         of the search
+    options      method, start, scale and caps
 
     Weights are those of Schweppe's form: of the residual over its own standard uncertainty in plain least squares.
     Raises EstimationError for an unknown name, or where the engine has no answer.
 
     Source: [HUBER09] (iterated reweighting, leverage); [BLACK96] (annealing); [TORR00] (the cost of a choice).
     """
+    method, start, scale, iterations = options.method, options.start, options.scale, options.iterations
     if method not in WEIGHTS or start not in STARTS or scale not in ("known", "mad"):
         raise EstimationError(
             f"robust estimation {method!r} from {start!r} with {scale!r} scale is unknown; known: "
@@ -200,7 +214,7 @@ def estimate_robustly(
     if places is not None:
         if method in REDESCENDING:
             _reweight(rows, geman_mcclure, s, False, iterations)
-        undecided = _search(rows, np.concatenate(list(places)), s, limit, trials, hold, seed)
+        undecided = _search(rows, np.concatenate(list(places)), s, options)
     anew = anew and method not in REDESCENDING  # a redescending method keeps the scale of its start
     change = _reweight(rows, WEIGHTS[method], 1.0 if anew else s, anew, iterations)
     s = _scale(rows, anew) if anew else s
@@ -208,7 +222,7 @@ def estimate_robustly(
     status = CONVERGED if change < SETTLED else NOT_CONVERGED.format(change=change, iterations=iterations)
     return RobustEstimate(
         weights=rows.split(1.0 / rows.inflation**2),
-        rejected=rows.split(np.abs(w) > limit),
+        rejected=rows.split(np.abs(w) > options.limit),
         undecided=rows.split(undecided),
         statistic=rows.split(w),
         scale=s,
@@ -247,16 +261,14 @@ def _reweight(
     return change
 
 
-def _search(
-    rows: _Rows, places: np.ndarray, scale: float, limit: float, trials: int, hold: int, seed: int
-) -> np.ndarray:
+def _search(rows: _Rows, places: np.ndarray, scale: float, options: RobustOptions) -> np.ndarray:
     """Searches places with several rejections for the cheapest choice of wrong observations; True where undecided.
 
     That is where a rival is nearly as cheap, or where hardly more rows agree than hold the place.
     A choice costs the sum of min(t^2, limit^2) over its place. A quarter of the places is tried at a time, each held by
     no more rows than it needs: a wrong choice then says nothing about what it shares with the others.
     """
-    rng = np.random.default_rng(seed)
+    rng, hold, limit = np.random.default_rng(options.seed), options.hold, options.limit
     count = int(places.max(initial=-1)) + 1
     at, inside = np.where(places < 0, count, places), places >= 0
 
@@ -279,7 +291,7 @@ def _search(
 
     best = agrees()
     cost, wrong, rival = kept(best), grave(), np.full(count + 1, np.inf)
-    for _ in range(trials):
+    for _ in range(options.trials):
         tried = (np.bincount(at, ~best & inside, count + 1) > 1) & (rng.random(count + 1) < 0.25)
         if not tried.any():
             continue
@@ -345,29 +357,42 @@ class Snooped:
     fits: tuple[GroupFit, ...]
 
 
+@dataclass(frozen=True)
+class SnoopingOptions:
+    """What `snoop` tests by.
+
+    level        chance of leaving any good observation out, over all
+    correction   for their number, as `reliability.single_level`
+    rounds       cap of the solutions before weighing
+    """
+
+    level: float = 0.05
+    correction: str = "sidak"
+    rounds: int = 1000
+
+
+SIDAK = SnoopingOptions()
+
+
 def snoop(
     solve: Solve,
     sizes: Sequence[int],
     *,
-    level: float = 0.05,
-    correction: str = "sidak",
+    options: SnoopingOptions = SIDAK,
     removable: Sequence[np.ndarray] | None = None,
     start: Sequence[np.ndarray] | None = None,
     doubtful: Sequence[np.ndarray] | None = None,
     weigh: bool = True,
-    rounds: int = 1000,
 ) -> Snooped:
     """Data snooping: out with the worst, one by one; back in with those that pass; rivals weighed at the end.
 
     solve       the engine, see the top of this file; sigmas are known
     sizes       number of observations of each group
-    level       chance of leaving any good observation out, over all
-    correction  for their number, as `reliability.single_level`
+    options     level of the tests and cap of rounds
     removable   one (m,) bool array a group: False for observations that are never left out
     start       one (m,) bool array a group, left out at first, such as `RobustEstimate.rejected`
     doubtful    one (m,) bool array a group, such as `RobustEstimate.undecided`: neither trusted nor tested
     weigh       one more solution for each rejection: would another observation explain as much?
-    rounds      cap of the solutions before weighing
 
     Raises EstimationError where the engine has no answer with `start` left out.
 
@@ -376,11 +401,11 @@ def snoop(
     rows = _Rows(solve, sizes, removable)
     if doubtful is not None:
         rows.doubt(np.concatenate(list(doubtful)))
-    critical = w_critical(single_level(level, max(int(np.count_nonzero(rows.may)), 1), correction))
+    critical = w_critical(single_level(options.level, max(int(np.count_nonzero(rows.may)), 1), options.correction))
     out = np.zeros(len(rows.may), dtype=bool) if start is None else np.concatenate(list(start)) & rows.may
     returns = np.zeros(len(out), dtype=int)
     worst, ended = np.inf, False
-    for _ in range(rounds):
+    for _ in range(options.rounds):
         w = _tests(rows, out)
         inside = np.where(out, -1.0, w)
         worst = float(inside.max(initial=0.0))
@@ -393,7 +418,7 @@ def snoop(
         else:
             ended = True
             break
-    status = CONVERGED if ended else NOT_ENDED.format(rounds=rounds, worst=worst, limit=critical)
+    status = CONVERGED if ended else NOT_ENDED.format(rounds=options.rounds, worst=worst, limit=critical)
     rejections, undecided = _rejections(rows, out, critical, weigh)
     undecided |= rows.doubtful
     status = _loosen(rows, out, undecided, status)
@@ -426,7 +451,7 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
     without = np.square(np.where(out, 0.0, _tests(rows, out)))
     w, errors = rows.of("standardised"), rows.of("estimated_error")
     undecided = np.zeros(len(out), dtype=bool)
-    found = []
+    rejections = []
     for row in sorted(np.flatnonzero(out), key=lambda i: -abs(w[i])):
         margin, rival = np.nan, None
         if weigh:
@@ -442,8 +467,8 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
             alike = explains & (margins < DECISIVE)
             alike[row] = alike.any()
             undecided |= alike
-        found.append(Rejection(*rows.place(int(row)), float(w[row]), float(errors[row]), margin, rival))
-    return tuple(found), undecided
+        rejections.append(Rejection(*rows.place(int(row)), float(w[row]), float(errors[row]), margin, rival))
+    return tuple(rejections), undecided
 
 
 def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) -> str:

@@ -105,9 +105,9 @@ def fit_paraboloid(
     free = ordered(free)
     k, count = len(points), sum(PARAMETERS[name] for name in free)
     weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
-    if (seen := int(np.count_nonzero(weights))) < count:
+    if (given := int(np.count_nonzero(weights))) < count:
         what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
-        raise EstimationError(f"{what} needs {count} points, {seen} given")
+        raise EstimationError(f"{what} needs {count} points, {given} given")
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
     root = np.sqrt(weights)[:, None]
     translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
@@ -117,16 +117,9 @@ def fit_paraboloid(
         scaled = root * (cos[:, None] if measure == "half-path" else 1.0)
         gain = _gain(design, scaled, k)
         step = gain @ deviation
-        at = 0
-        for name in free:
-            part = step[at : at + PARAMETERS[name]]
-            at += len(part)
-            if name == "vertex":
-                translation = translation + part
-            elif name == "axis":
-                turn = turn + part
-            else:
-                focal = focal + float(part[0])
+        parts = _parts(step, free)
+        translation, turn = translation + parts.get("vertex", 0.0), turn + parts.get("axis", 0.0)
+        focal = focal + float(parts["focal-length"][0]) if "focal-length" in free else focal
         if not 0.0 < focal < np.inf:
             raise EstimationError(f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer")
         if count == 0 or np.max(np.abs(step)) < CONVERGED_STEP:
@@ -137,16 +130,12 @@ def fit_paraboloid(
     along = covariance_along(covariance, normal)
     carried = _expansion(free, tilts) @ gain
     parameters = gain @ along @ gain.T
+    rotation = from_vector(tilts @ turn) @ nominal.rotation
     return ParaboloidFit(
         translation=translation,
         rotation=tilts @ turn,
         covariance=carried @ along @ carried.T,
-        frame=Transform(
-            nominal.to,
-            nominal.from_,
-            from_vector(tilts @ turn) @ nominal.rotation,
-            nominal.translation + translation,
-        ),
+        frame=Transform(nominal.to, nominal.from_, rotation, nominal.translation + translation),
         local=local,
         deviation=deviation,
         deviation_covariance=without(along, design, gain),
@@ -159,6 +148,12 @@ def fit_paraboloid(
         gain=gain,
         along=along,
     )
+
+
+def _parts(step: np.ndarray, free: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """A step of the parameters by what is free."""
+    ends = np.cumsum([PARAMETERS[name] for name in free])
+    return {name: step[end - PARAMETERS[name] : end] for name, end in zip(free, ends.tolist(), strict=True)}
 
 
 def ordered(free: Sequence[str]) -> tuple[str, ...]:
@@ -247,15 +242,15 @@ def _design(
 
 def _expansion(free: tuple[str, ...], tilts: np.ndarray) -> np.ndarray:
     """(6, p): translation and rotation vector in the outer frame from the parameters."""
-    made = np.zeros((6, sum(PARAMETERS[name] for name in free)))
+    expansion = np.zeros((6, sum(PARAMETERS[name] for name in free)))
     at = 0
     for name in free:
         if name == "vertex":
-            made[:3, at : at + 3] = np.eye(3)
+            expansion[:3, at : at + 3] = np.eye(3)
         elif name == "axis":
-            made[3:, at : at + 2] = tilts
+            expansion[3:, at : at + 2] = tilts
         at += PARAMETERS[name]
-    return made
+    return expansion
 
 
 def _deviation(

@@ -13,7 +13,7 @@ import numpy as np
 from catseye.errors import EstimationError, FrameError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
-from catseye.estimation.quality.robustness import estimate_robustly
+from catseye.estimation.quality.robustness import RobustOptions, estimate_robustly
 from catseye.estimation.shapes.rigid_body import (
     CONVERGED,
     POINTS,
@@ -107,45 +107,55 @@ class Pose:
         return self.motion.apply(x) - x, columns @ self.covariance @ columns.T
 
 
+@dataclass(frozen=True, eq=False)
+class PlaceCovariances:
+    """How well the n places of a group are known in two epochs.
+
+    first    (3n, 3n) m^2, may be singular; None: exact, as a design
+    second   likewise; one of the two at least
+    cross    (3n, 3n) m^2, of the first (rows) with the second (columns), if any
+    """
+
+    first: np.ndarray | None = None
+    second: np.ndarray | None = None
+    cross: np.ndarray | None = None
+
+
 def fit_pose(
     names: Sequence[str],
     first: np.ndarray,
     second: np.ndarray,
     *,
     frame: str,
-    covariance_first: np.ndarray | None = None,
-    covariance_second: np.ndarray | None = None,
-    cross: np.ndarray | None = None,
+    covariance: PlaceCovariances,
     pivot: np.ndarray | None = None,
     robust: str | None = None,
     limit: float = LIMIT,
 ) -> Pose:
     """The rigid motion that takes a group's first places to its second, weighted, with full covariance.
 
-    names               n, of the points
-    first, second       (n, 3) m, in the frame
-    frame               whose axes they are in
-    covariance_first    (3n, 3n) m^2, may be singular; None: exact, as a design
-    covariance_second   likewise; one of the two at least
-    cross               (3n, 3n) m^2, of the first (rows) with the second (columns), if any
-    pivot               (3,) m, about which the rotation is told; the points' mean if None
-    robust              None keeps every point; one of METHODS leaves out points that moved on their own: an L1 start,
-                        then that method's weights, by `quality.robustness.estimate_robustly`; what it
-                        rejects goes whole
-    limit               |w| of a coordinate beyond which `robust` rejects
+    names           n, of the points
+    first, second   (n, 3) m, in the frame
+    frame           whose axes they are in
+    covariance      of the places
+    pivot           (3,) m, about which the rotation is told; the points' mean if None
+    robust          None keeps every point; one of METHODS leaves out points that moved on their own: an L1 start, then
+                    that method's weights, by `quality.robustness.estimate_robustly`; what it rejects goes whole
+    limit           |w| of a coordinate beyond which `robust` rejects
 
     After a robust start the points that stay count fully, so the covariance is that of plain least squares with them;
     that they were chosen is not in it. Raises EstimationError as `fit_transformation`.
     """
     called = tuple(names)
-    if covariance_first is None and covariance_second is None:
+    if covariance.first is None and covariance.second is None:
         raise EstimationError("a pose needs the covariance of one epoch at least, both are missing")
     if robust is not None and robust not in METHODS:
         raise EstimationError(f"robust method {robust!r} is none of {', '.join(METHODS)}")
     x, y = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     size = (3 * len(called), 3 * len(called))
     zero = np.zeros(size)
-    given = [zero if q is None else np.asarray(q, dtype=float) for q in (covariance_first, covariance_second, cross)]
+    known = covariance.first, covariance.second, covariance.cross
+    given = [zero if q is None else np.asarray(q, dtype=float) for q in known]
     if any(q.shape != size for q in given):
         shapes = ", ".join(str(q.shape) for q in given)
         raise EstimationError(f"covariances of {len(called)} points have shapes {shapes} (expected {size})")
@@ -227,11 +237,11 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
         motion = problem.fit(extra)
         return [_fit(problem.linear(motion, extra), motion, problem.spread(motion.matrix), sigma)]
 
-    found = estimate_robustly(solve, [len(sigma)], method=method, start="l1", limit=limit)
-    if found.status != CONVERGED:
-        raise EstimationError(f"the robust pose did not settle: {found.status}")
-    statistic = np.abs(np.nan_to_num(found.statistic[0])).reshape(-1, 3).max(axis=1)
-    keep = np.asarray(~np.any(found.rejected[0].reshape(-1, 3), axis=1))
+    estimate = estimate_robustly(solve, [len(sigma)], options=RobustOptions(method=method, start="l1", limit=limit))
+    if estimate.status != CONVERGED:
+        raise EstimationError(f"the robust pose did not settle: {estimate.status}")
+    statistic = np.abs(np.nan_to_num(estimate.statistic[0])).reshape(-1, 3).max(axis=1)
+    keep = np.asarray(~np.any(estimate.rejected[0].reshape(-1, 3), axis=1))
     if int(keep.sum()) < POINTS["rigid"]:
         raise EstimationError(
             f"a robust pose of {len(keep)} points would leave {int(keep.sum())} (expected 3 or more): the group does "

@@ -83,32 +83,32 @@ def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, tr
     size = float(np.ptp(places, axis=0).max())
     # error contrasts: what the trend cannot touch
     contrast = np.linalg.qr(trend, mode="complete")[0][:, q:]
-    seen, blur = contrast.T @ values, contrast.T @ noise @ contrast
-    spread = max(float(np.std(seen)), LEAST)
+    contrasts, contrast_noise = contrast.T @ values, contrast.T @ noise @ contrast
+    spread = max(float(np.std(contrasts)), LEAST)
     least, most = np.log(LEAST / spread), np.log(1e3)
     shortest = size / (2.0 * np.sqrt(len(places)))
     span = (np.log(shortest / size), np.log(LONGEST))
 
     def cost(parameters: np.ndarray) -> float:
         guess = _roughness(parameters, spread, size)
-        matrix = contrast.T @ guess.covariance(places, places) @ contrast + blur
+        matrix = contrast.T @ guess.covariance(places, places) @ contrast + contrast_noise
         matrix[np.diag_indices_from(matrix)] += guess.own**2 + LEAST**2
         try:
             factor = np.linalg.cholesky(matrix / spread**2)
         except np.linalg.LinAlgError:
             return 1e12
-        white = solve_triangular(factor, seen / spread, lower=True)
+        white = solve_triangular(factor, contrasts / spread, lower=True)
         return float(np.sum(np.log(np.diag(factor))) + 0.5 * white @ white)
 
     starts = [(np.log(0.7), np.log(share), np.log(0.7)) for share in (0.1, 0.5)]
-    found = [
+    minima = [
         minimize(
             cost, start, method="L-BFGS-B", bounds=((least, most), span, (least, most)),
             options={"maxfun": EVALUATIONS},
         )
         for start in starts
     ]  # fmt: skip
-    return _roughness(min(found, key=lambda f: float(f.fun)).x, spread, size)
+    return _roughness(min(minima, key=lambda f: float(f.fun)).x, spread, size)
 
 
 def _roughness(parameters: np.ndarray, spread: float, size: float) -> Roughness:
@@ -116,11 +116,24 @@ def _roughness(parameters: np.ndarray, spread: float, size: float) -> Roughness:
     return Roughness(float(smooth) * spread, float(length) * size, float(own) * spread)
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredField:
+    """A field as it was measured at k points.
+
+    places   (k, 2) m
+    values   (k,) m: what is left when a design and its gain have taken their part
+    noise    (k, k) m^2, covariance of the measurement, before that
+    trend    (k, q), whose columns span those of the design too
+    """
+
+    places: np.ndarray
+    values: np.ndarray
+    noise: np.ndarray
+    trend: np.ndarray
+
+
 def foretell(
-    places: np.ndarray,
-    values: np.ndarray,
-    noise: np.ndarray,
-    trend: np.ndarray,
+    measured: MeasuredField,
     wanted: np.ndarray,
     wanted_trend: np.ndarray,
     *,
@@ -132,10 +145,7 @@ def foretell(
 ) -> Foretold:
     """Best linear unbiased prediction (universal kriging), with the covariance of what it misses.
 
-    places         (k, 2) m, measured
-    values         (k,) m, measured: what is left when `design` and `gain` have taken their part
-    noise          (k, k) m^2, covariance of the measurement, before that
-    trend          (k, q), whose columns span those of `design` too
+    measured       what is known, at k points
     wanted         (m, 2) m
     wanted_trend   (m, q)
     roughness      of the field
@@ -148,6 +158,7 @@ def foretell(
     prediction misses by (K field - field*) + (K - wanted_design gain) noise, which gives its covariance whatever the
     roughness is. Raises EstimationError where the points do not hold the trend.
     """
+    places, values, noise, trend = measured.places, measured.values, measured.noise, measured.trend
     smooth = roughness.covariance(places, places)
     smooth[np.diag_indices_from(smooth)] += roughness.own**2
     between = roughness.covariance(wanted, places)

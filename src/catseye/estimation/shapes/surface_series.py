@@ -89,8 +89,8 @@ def fit_series(
     chosen = np.repeat([name in free for name in PARAMETERS], list(PARAMETERS.values()))
     columns = np.flatnonzero(chosen).astype(np.int64)
     local = np.ascontiguousarray((points - nominal.translation) @ nominal.rotation)
-    found = series(local, variance, weights, columns, float(focal_length), measure == "half-path")
-    return SurfaceSeries(free, *found)
+    arrays = series(local, variance, weights, columns, float(focal_length), measure == "half-path")
+    return SurfaceSeries(free, *arrays)
 
 
 def _plainly(
@@ -107,7 +107,7 @@ def _plainly(
     epochs, k, _ = points.shape
     p = sum(PARAMETERS[name] for name in free)
     local = (points - nominal.translation) @ nominal.rotation
-    made = SurfaceSeries(
+    series = SurfaceSeries(
         free,
         np.full((epochs, p), np.nan),
         np.full((epochs, p, p), np.nan),
@@ -124,14 +124,14 @@ def _plainly(
             )
         except EstimationError as problem:
             text = str(problem)
-            made.status[epoch] = TOO_FEW if "needs" in text else UNHELD if "hold" in text else UNSETTLED
+            series.status[epoch] = TOO_FEW if "needs" in text else UNHELD if "hold" in text else UNSETTLED
             continue
         parts = {
             "vertex": fit.translation,
             "axis": fit.rotation[:2],
             "focal-length": np.array([fit.focal_length - focal_length]),
         }
-        made.parameters[epoch] = np.concatenate([parts[name] for name in free]) if free else []
-        made.covariance[epoch] = fit.parameter_covariance
-        made.deviation[epoch, seen] = fit.deviation
-    return made
+        series.parameters[epoch] = np.concatenate([parts[name] for name in free]) if free else []
+        series.covariance[epoch] = fit.parameter_covariance
+        series.deviation[epoch, seen] = fit.deviation
+    return series

@@ -59,12 +59,15 @@ def _solve(factor, right, p):
 
 
 @njit(cache=True, error_model="numpy")
-def _pass(local, weights, variance, six, columns, focal, squared, what, deviation, normal, spread, right):
+def _pass(local, weights, variance, six, settings, what, deviation, sums):
     """Deviations and the right side of a step; `what` 1: the normal matrix, too; 2: and that of the noise.
 
-    The points that were seen.
+    `settings` are columns, focal and squared of `series`; `sums` the normal matrix, that of the noise and the right
+    side. Returns the number of points that were seen.
     """
-    p, seen = len(columns), 0
+    columns, focal, squared = settings
+    normal, spread, right = sums
+    p, count = len(columns), 0
     f = focal + six[5]
     r = _turned(six[3], six[4])
     half, quarter = 0.5 / f, 0.25 / f
@@ -90,7 +93,7 @@ def _pass(local, weights, variance, six, columns, focal, squared, what, deviatio
         w = weights[i]
         if w == 0.0:
             continue
-        seen += 1
+        count += 1
         gx, gy = -x * half * cos, -y * half * cos
         nx = r[0, 0] * gx + r[0, 1] * gy + r[0, 2] * cos
         ny = r[1, 0] * gx + r[1, 1] * gy + r[1, 2] * cos
@@ -111,7 +114,7 @@ def _pass(local, weights, variance, six, columns, focal, squared, what, deviatio
             for a in range(p):
                 for b in range(a + 1):
                     spread[a, b] += noise * chosen[a] * chosen[b]
-    return seen
+    return count
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,14 +136,13 @@ def series(local, variance, weights, columns, focal, squared):
     points, status = np.zeros(epochs, dtype=np.int64), np.full(epochs, UNSETTLED, dtype=np.int64)
     normal, spread, right = np.empty((p, p)), np.empty((p, p)), np.empty(p)
     size, column = np.empty(p), np.empty(p)
+    settings, sums = (columns, focal, squared), (normal, spread, right)
     for t in range(epochs):
         six = np.zeros(6)
         here, noise, off = local[t], variance[t], deviation[t]
         for turn in range(ITERATIONS):
             # the normal matrix of the first step serves the others: their right sides decide where they end
-            points[t] = _pass(
-                here, weights, noise, six, columns, focal, squared, 1 if turn == 0 else 0, off, normal, spread, right
-            )
+            points[t] = _pass(here, weights, noise, six, settings, 1 if turn == 0 else 0, off, sums)
             if points[t] < p:
                 status[t] = TOO_FEW
                 break
@@ -163,7 +165,7 @@ def series(local, variance, weights, columns, focal, squared):
             continue
         for a in range(p):
             parameters[t, a] = six[columns[a]]
-        _pass(here, weights, noise, six, columns, focal, squared, 2, off, normal, spread, right)
+        _pass(here, weights, noise, six, settings, 2, off, sums)
         if not _scaled(normal, size, p):
             status[t] = UNHELD
             continue

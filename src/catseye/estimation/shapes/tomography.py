@@ -165,9 +165,9 @@ class Tomogram:
 
     def scalar_along(self, lines: Lines) -> Means:
         """Means of the scalar field along lines, or its values at points."""
-        seen = self.observations.lines
+        observed = self.observations.lines
         prior = line_covariance(lines, lines, self.scalar.scales) + self.scalar.u_mean**2
-        cross = line_covariance(lines, seen, self.scalar.scales) + self.scalar.u_mean**2
+        cross = line_covariance(lines, observed, self.scalar.scales) + self.scalar.u_mean**2
         return self._means(np.full(len(prior), self.scalar.mean), prior, cross)
 
     def vector_along(self, lines: Lines, directions: np.ndarray) -> Means:
@@ -177,9 +177,9 @@ class Tomogram:
         """
         if self.vector is None:
             raise EstimationError("no vector field was estimated; give its prior")
-        seen, u2 = self.observations.lines, self.vector.u_mean**2
+        observed, u2 = self.observations.lines, self.vector.u_mean**2
         prior = (line_covariance(lines, lines, self.vector.scales) + u2) * (directions @ directions.T)
-        cross = (line_covariance(lines, seen, self.vector.scales) + u2) * (directions @ seen.directions.T)
+        cross = (line_covariance(lines, observed, self.vector.scales) + u2) * (directions @ observed.directions.T)
         return self._means(np.zeros(len(prior)), prior, cross * self.observations.along)
 
     def _means(self, mean: np.ndarray, prior: np.ndarray, cross: np.ndarray) -> Means:
@@ -250,7 +250,7 @@ def tomogram(observations: LineMeans, scalar: FieldPrior, vector: FieldPrior | N
 
 def _suspects(inverse: np.ndarray, innovation: np.ndarray) -> np.ndarray:
     """One after the other, since a gross error makes its neighbours look bad; at most half of all."""
-    inverse, found = inverse.copy(), []
+    inverse, rejected = inverse.copy(), []
     kept = np.ones(len(innovation), dtype=bool)
     for _ in range(len(innovation) // 2):
         diagonal = np.where(kept, np.diag(inverse), 1.0)
@@ -258,10 +258,10 @@ def _suspects(inverse: np.ndarray, innovation: np.ndarray) -> np.ndarray:
         worst = int(np.argmax(score))
         if score[worst] <= SUSPECT:
             break
-        found.append(worst)
+        rejected.append(worst)
         kept[worst] = False
         inverse -= np.outer(inverse[:, worst], inverse[worst]) / inverse[worst, worst]  # of the matrix without its row
-    return np.array(found, dtype=int)
+    return np.array(rejected, dtype=int)
 
 
 def _correlation(a: Lines, b: Lines, lengths: np.ndarray) -> np.ndarray:

@@ -89,19 +89,19 @@ def factors(term: str) -> list[Callable[[TelescopePosture, float], NDArray[np.fl
     >>> [float(f(posture, 15.0).round(12)) for f in factors("sinE*t^2")]
     [0.5, 100.0]
     """
-    found: list[Callable[[TelescopePosture, float], NDArray[np.float64]]] = []
+    functions: list[Callable[[TelescopePosture, float], NDArray[np.float64]]] = []
     for factor in term.replace(" ", "").split("*"):
         wave, power = WAVE.fullmatch(factor), POWER.fullmatch(factor)
         if wave:
-            found.append(_wave(np.sin if wave[1] == "sin" else np.cos, int(wave[2] or 1), wave[3]))
+            functions.append(_wave(np.sin if wave[1] == "sin" else np.cos, int(wave[2] or 1), wave[3]))
         elif power:
-            found.append(_power(power[1], int(power[2] or 1)))
+            functions.append(_power(power[1], int(power[2] or 1)))
         elif factor != "1":
             raise ValidityError(
                 f"term {term!r}: {factor!r} is not known (expected 1, sinE, cosE, sin2E, sinA, ..., E, E^2, t, t^2, "
                 "joined by *)"
             )
-    return found
+    return functions
 
 
 def _wave(function: np.ufunc, multiple: int, angle: str) -> Callable[[TelescopePosture, float], NDArray[np.float64]]:

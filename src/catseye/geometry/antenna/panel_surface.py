@@ -129,8 +129,8 @@ def panels_under(xy: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndar
     weight, inside = shares(np.repeat(xy[:, None], most, axis=1), quads[near])
     first = np.argmax(inside, axis=1)
     rows = np.arange(len(xy))
-    found = np.where(inside[rows, first], near[rows, first], -1)
-    return found, np.where(found[:, None] < 0, 0.0, weight[rows, first])
+    panel = np.where(inside[rows, first], near[rows, first], -1)
+    return panel, np.where(panel[:, None] < 0, 0.0, weight[rows, first])
 
 
 def warps(xy: np.ndarray) -> np.ndarray:

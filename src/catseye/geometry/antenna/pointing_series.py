@@ -87,8 +87,8 @@ class PointingSeries:
 
         azimuth, elevation   rad, on the sky
         """
-        found = design(azimuth, elevation)[..., columns(self.terms)] @ self.values
-        return np.asarray(found)
+        correction = design(azimuth, elevation)[..., columns(self.terms)] @ self.values
+        return np.asarray(correction)
 
     def covariance_of_correction(self, azimuth: ArrayLike, elevation: ArrayLike) -> Array:
         """(..., 2, 2) rad^2, of `correction` at each direction, from the coefficients' covariance."""

@@ -80,8 +80,8 @@ def misaim(swing: ArrayLike, tip: ArrayLike, *, towards: ArrayLike, ball: ArrayL
     [0.001, 0.0]
     """
     turn = base_from_unit(swing, tip)
-    seen = np.einsum("...ji,...j->...i", turn, np.asarray(towards, dtype=float)) - np.asarray(ball, dtype=float)
-    return np.stack([np.arctan2(seen[..., 0], seen[..., 2]), np.arctan2(seen[..., 1], seen[..., 2])], axis=-1)
+    aim = np.einsum("...ji,...j->...i", turn, np.asarray(towards, dtype=float)) - np.asarray(ball, dtype=float)
+    return np.stack([np.arctan2(aim[..., 0], aim[..., 2]), np.arctan2(aim[..., 1], aim[..., 2])], axis=-1)
 
 
 def _require(good: NDArray[np.bool_], text: str) -> None:

@@ -381,7 +381,7 @@ def _hits(at: NDArray, d: NDArray, half: NDArray, length: float) -> NDArray[np.b
 
 def _edges(at: NDArray, half: NDArray, length: float) -> tuple[NDArray, NDArray]:
     """Unit directions (k, 3) from `at` to both ends of each edge, or of its part within the length."""
-    found = []
+    directions = []
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         for si in (-1.0, 1.0):
@@ -393,8 +393,8 @@ def _edges(at: NDArray, half: NDArray, length: float) -> tuple[NDArray, NDArray]
                 ends = np.stack([a, a])
                 ends[0, axis], ends[1, axis] = max(a[axis] - half[axis], -reach), min(a[axis] + half[axis], reach)
                 if room > 0.0 and ends[0, axis] <= ends[1, axis] and np.all(np.any(ends != 0.0, axis=-1)):
-                    found.append(ends / np.linalg.norm(ends, axis=-1, keepdims=True))
-    both = np.array(found).reshape(-1, 2, 3)
+                    directions.append(ends / np.linalg.norm(ends, axis=-1, keepdims=True))
+    both = np.array(directions).reshape(-1, 2, 3)
     return both[:, 0], both[:, 1]
 
 

@@ -70,8 +70,9 @@ def _rim(at, d, half, length, axis):
 
 
 @_inlined
-def _outline(x, y, z, exact_below, at, half, to_box, limits, corners, edges, counts, middle, d):
-    """As `Outline.clearance`; limits are length, near, radius; d (3,) is room to work in."""
+def _outline(x, y, z, exact_below, box, d):
+    """As `Outline.clearance`, box as in `first_entries`; limits are length, near, radius; d (3,) is room to work in."""
+    at, half, to_box, limits, corners, edges, counts, middle = box
     if limits[1] == 0.0:
         return 0.0
     if limits[1] > limits[0]:
@@ -145,22 +146,8 @@ def first_entries(moves, pointing, cones, boxes, settings, out):
                 if not one >= gap:
                     gap, nearest = one, place[c]
             for b in range(len(at)):
-                one = _outline(
-                    x,
-                    y,
-                    z,
-                    exact_below,
-                    at[b],
-                    half[b],
-                    to_box[b],
-                    limits[b],
-                    corners[b],
-                    edges[b],
-                    counts[b],
-                    middle[b],
-                    d,
-                )
-                one -= margin
+                box = (at[b], half[b], to_box[b], limits[b], corners[b], edges[b], counts[b], middle[b])
+                one = _outline(x, y, z, exact_below, box, d) - margin
                 if rate > 0.0:
                     step = min(step, one / rate)
                 if not one >= gap:

@@ -134,5 +134,5 @@ def _in_mount(normal: ArrayLike, beta: ArrayLike) -> Array:
 
 
 def _read(axes: Array, returned: Array) -> Array:
-    seen = np.einsum("...ij,...j->...i", axes, returned)
-    return seen[..., :2] / seen[..., 2:]
+    beam = np.einsum("...ij,...j->...i", axes, returned)
+    return beam[..., :2] / beam[..., 2:]

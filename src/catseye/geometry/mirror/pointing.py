@@ -225,8 +225,8 @@ def counts(
             answer.reshape(-1, len(table), 2),
         )
         return answer
-    found = aim(station, at)
-    answer[..., 0], answer[..., 1] = found.azimuth_counts, found.elevation_counts
+    aimed = aim(station, at)
+    answer[..., 0], answer[..., 1] = aimed.azimuth_counts, aimed.elevation_counts
     return answer
 
 

@@ -69,8 +69,8 @@ def sun_direction(
     here = _turned(place, sidereal)
     velocity = EARTH_RATE * np.stack([-here[..., 1], here[..., 0], np.zeros_like(here[..., 0])], axis=-1)
     space_from_true = np.swapaxes(true_from_space, -1, -2)
-    seen = _seen_from(tt, _applied(space_from_true, here), _applied(space_from_true, velocity))
-    earth_fixed = _turned(_applied(true_from_space, seen), -sidereal)
+    apparent = _seen_from(tt, _applied(space_from_true, here), _applied(space_from_true, velocity))
+    earth_fixed = _turned(_applied(true_from_space, apparent), -sidereal)
     return _east_north_up(earth_fixed, phi, lam)
 
 

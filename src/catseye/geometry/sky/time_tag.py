@@ -84,14 +84,14 @@ class TimeTag:
         >>> TimeTag.parse("52889.00000000001").nanoseconds.item()
         864
         """
-        found = TEXT.fullmatch(text.strip())
-        if found is None:
+        match = TEXT.fullmatch(text.strip())
+        if match is None:
             shown = text if len(text) <= 40 else f"{text[:40]}..."
             raise ValidityError(f"{shown!r} is not a Modified Julian Day (expected digits such as '52889.12500000000')")
-        digits = found[2] or ""
+        digits = match[2] or ""
         scale = 10 ** len(digits)
         passed = (2 * int(digits or "0") * PER_DAY + scale) // (2 * scale)
-        return TimeTag(np.asarray(int(found[1])), np.asarray(passed))
+        return TimeTag(np.asarray(int(match[1])), np.asarray(passed))
 
     def text(self, decimals: int = MICROSECOND_DECIMALS) -> str:
         """One instant as a decimal MJD, rounded; 11 decimals tell microseconds apart, 14 are read back without loss.

@@ -104,14 +104,14 @@ def sector_jones(corner: Corner, incidence: float, azimuth: float = 0.0) -> Comp
         )
     leave = _out_of(corner, toward)
     frame = np.stack([u, v], axis=1)
-    found = []
+    matrices = []
     for order in ORDERS:
         k, chain = inward, enter
         for face in order:
             k, step = reflection_matrix(k, EDGES[face], corner.mirror)
             chain = step @ chain
-        found.append(frame.T @ leave @ chain @ frame)
-    return np.array(found)
+        matrices.append(frame.T @ leave @ chain @ frame)
+    return np.array(matrices)
 
 
 def sector_shares(corner: Corner, incidence: float, azimuth: float = 0.0, *, aperture: float, height: float) -> Array:

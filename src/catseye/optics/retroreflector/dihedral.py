@@ -47,11 +47,11 @@ def deviations(errors: ArrayLike, index: float = 1.0) -> Array:
     around = np.arange(3) * 2.0 * np.pi / 3.0
     edges = np.sqrt(2.0 / 3.0) * np.stack([np.cos(around), np.sin(around)], axis=-1)  # their part across the axis
     along = -1.0 / np.sqrt(3.0)  # every component of d
-    found = []
+    beams = []
     for i, j, k in ORDERS:
         turned = e[k] * (edges[j] - edges[i]) + e[i] * (edges[k] - edges[j]) + e[j] * (edges[k] - edges[i])
-        found.append(2.0 * along * index * turned)
-    return np.array(found)
+        beams.append(2.0 * along * index * turned)
+    return np.array(beams)
 
 
 def equal_errors(deviation: ArrayLike, index: float = 1.0) -> Array:

@@ -186,8 +186,8 @@ def wrong_glass(height: ArrayLike, *, assumed: ArrayLike, true: ArrayLike) -> Wr
 
     Source: [GOLDMAN00] eqs. 3.9 and 3.10, their difference. Exact.
 
-    >>> found = wrong_glass(0.0381, assumed=1.5274637, true=1.5274752)
-    >>> round(float(found.about_point) * 1e6, 2), round(float(found.about_face) * 1e6, 2)
+    >>> error = wrong_glass(0.0381, assumed=1.5274637, true=1.5274752)
+    >>> round(float(error.about_point) * 1e6, 2), round(float(error.about_face) * 1e6, 2)
     (0.63, 0.44)
     """
     h = np.asarray(height, dtype=float)

@@ -196,11 +196,13 @@ def classify(
         limit, most = limits[name.rstrip("M")], max(aided, naked)
         if name.endswith("M"):
             fits = naked <= limit < aided <= CLASS_3B
-            told = f"{naked * 1e3:.4g} mW through 7 mm at 0.1 m, {aided * 1e3:.4g} mW through 50 mm at 2 m"
+            power = f"{naked * 1e3:.4g} mW through 7 mm at 0.1 m, {aided * 1e3:.4g} mW through 50 mm at 2 m"
         else:
             fits = most <= limit
-            told = f"{most * 1e3:.4g} mW, the more of both measurements,"
-        reasons.append(f"class {name}: {told} {'keeps' if fits else 'does not keep'} the limit of {limit * 1e3:.4g} mW")
+            power = f"{most * 1e3:.4g} mW, the more of both measurements,"
+        reasons.append(
+            f"class {name}: {power} {'keeps' if fits else 'does not keep'} the limit of {limit * 1e3:.4g} mW"
+        )
         if fits:
             break
     else:

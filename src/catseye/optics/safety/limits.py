@@ -84,11 +84,11 @@ def factors(wavelength_um: float, duration: float = 100.0, subtense: float = ALP
     c_b = 1.0 if nm < 450 else 10 ** (0.02 * (min(nm, 600) - 450))
     c_c = 1.0 if nm < 1150 else (10 ** (0.018 * (nm - 1150)) if nm < 1200 else 8 + 10 ** (0.04 * (nm - 1250)))
     longest = 5e-3 if duration < 625e-6 else (0.2 * duration**0.5 if duration <= 0.25 else 0.1)
-    seen = max(subtense, ALPHA_MIN)
-    c_e = seen / ALPHA_MIN if seen <= longest else seen**2 / (longest * ALPHA_MIN)
+    angle = max(subtense, ALPHA_MIN)
+    c_e = angle / ALPHA_MIN if angle <= longest else angle**2 / (longest * ALPHA_MIN)
     gamma = 11e-3 if duration <= 100 else (1.1e-3 * duration**0.5 if duration < 1e4 else 0.11)
     t_1 = 10.0 * 10 ** (0.02 * (min(max(nm, 450), 500) - 450))
-    t_2 = 10.0 * 10 ** ((min(seen, 0.1) - ALPHA_MIN) / 98.5e-3)
+    t_2 = 10.0 * 10 ** ((min(angle, 0.1) - ALPHA_MIN) / 98.5e-3)
     return Factors(c_a, c_b, c_c, c_e, t_1, t_2, 5e-6 if nm < 1050 else 13e-6, longest, gamma)
 
 
@@ -108,16 +108,16 @@ def eye_limits(
     """
     _known(edition)
     f, nm = factors(wavelength_um, duration, subtense), _nanometres(wavelength_um)
-    found = [ExposureLimit("heat on the retina", _heat(nm, duration, f, subtense), PUPIL)]
+    limits = [ExposureLimit("heat on the retina", _heat(nm, duration, f, subtense), PUPIL)]
     chemical = _chemistry(nm, duration, f, subtense)
     if chemical is not None:
-        found.append(ExposureLimit("chemistry on the retina", chemical, PUPIL))
+        limits.append(ExposureLimit("chemistry on the retina", chemical, PUPIL))
     if nm >= 1200 and edition == "ansi2014":
-        found.append(ExposureLimit("heat on the cornea", _cornea(nm, duration), _corneal_aperture(duration)))
+        limits.append(ExposureLimit("heat on the cornea", _cornea(nm, duration), _corneal_aperture(duration)))
     elif nm >= 1200:
         skin = skin_limit(wavelength_um, duration)
-        found.append(ExposureLimit("heat on the front of the eye", skin.irradiance, skin.aperture))
-    return tuple(found)
+        limits.append(ExposureLimit("heat on the front of the eye", skin.irradiance, skin.aperture))
+    return tuple(limits)
 
 
 def eye_mpe(

@@ -102,27 +102,27 @@ def sweep_ratio(
     1.236
     """
     _refuse_sweep(rate, period)
-    found = []
+    ratios = []
     if duration > TIME_BASE:
         given: dict[str, Any] = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
-        found.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))
+        ratios.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))
     for limit in eye_limits(beam.wavelength_um, duration, subtense, edition):
         aperture = viewer.collecting(limit.aperture)
         standing = viewer.transmission * beam.power_within(aperture, distance) / limit.power
         energy, pulse = sweep_pulse(beam, distance, rate, aperture=aperture, transmission=viewer.transmission)
         if pulse >= min(duration, np.inf if period is None else period):
-            found.append(standing)
+            ratios.append(standing)
             continue
         longest = min(duration, factors(beam.wavelength_um, duration, subtense).t_2)
         count, train = (1.0 if period is None else float(np.ceil(t / period)) for t in (duration, longest))
-        found.append(min(standing, count * energy / (duration * limit.power)))
+        ratios.append(min(standing, count * energy / (duration * limit.power)))
         if limit.name == "chemistry on the retina":  # a dose: only the sum counts
             continue
         short = max(pulse, SHORTEST)
         once = {m.name: m.power * short for m in eye_limits(beam.wavelength_um, short, subtense, edition)}
         shrunk = repetition_factor(train, short, subtense, beam.wavelength_um, duration)
-        found.append(min(standing, energy / (once[limit.name] * shrunk)))
-    return max(found)
+        ratios.append(min(standing, energy / (once[limit.name] * shrunk)))
+    return max(ratios)
 
 
 def sweep_hazard_distance(

@@ -98,15 +98,15 @@ def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:
     return path, key, document
 
 
-def worded(error: Any, key: str, found: Any, kind: type[Record]) -> str:
+def worded(error: Any, key: str, parent: Any, kind: type[Record]) -> str:
     """What is wrong with the value found at a place, and what was expected."""
     name, context, value = error["type"], error.get("ctx", {}), error["input"]
     if name == "missing":
         return " is missing (expected a value)"
     if name == "rule":
         return f": {context['text']}" if error["loc"] else context["text"]
-    cell = isinstance(found, str) and isinstance(value, int | float)
-    written = f" = {found if cell and NUMBER.fullmatch(found) else shown(value)}"
+    cell = isinstance(parent, str) and isinstance(value, int | float)
+    written = f" = {parent if cell and NUMBER.fullmatch(parent) else shown(value)}"
     if name == "extra_forbidden":
         known = all_keys(kind)
         close = difflib.get_close_matches(key[:LONGEST_VALUE], known, n=1)

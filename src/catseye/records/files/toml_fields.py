@@ -71,19 +71,19 @@ class Fields:
 
     def tables(self, key: str) -> list["Fields"]:
         """Tables within this one, none if the key is not there."""
-        found = self.take(key, list, "tables", [])
-        if not all(isinstance(table, dict) for table in found):
-            raise self.refuse(f"{key} = {shown(found)} (expected tables)")
-        return [Fields(self.file, f"{self.place}, {key} {i}", table) for i, table in enumerate(found, start=1)]
+        tables = self.take(key, list, "tables", [])
+        if not all(isinstance(table, dict) for table in tables):
+            raise self.refuse(f"{key} = {shown(tables)} (expected tables)")
+        return [Fields(self.file, f"{self.place}, {key} {i}", table) for i, table in enumerate(tables, start=1)]
 
     def keyed(self, stem: str, units: dict[str, float]) -> tuple[str, float] | None:
         """The one key of a stem and its unit's size in SI, or None; refused if there are two."""
         keys = [f"{stem}_{unit}" if stem else unit for unit in units]
         self.asked.update(keys)
-        found = [key for key in keys if key in self.values]
-        if len(found) > 1:
-            raise self.refuse(f"{found[0]} and {found[1]} say the same (expected one of them)")
-        return (found[0], units[found[0].removeprefix(f"{stem}_")]) if found else None
+        present = [key for key in keys if key in self.values]
+        if len(present) > 1:
+            raise self.refuse(f"{present[0]} and {present[1]} say the same (expected one of them)")
+        return (present[0], units[present[0].removeprefix(f"{stem}_")]) if present else None
 
     def quantity(self, stem: str, units: dict[str, float], default: float | None = None) -> float:
         """A number in SI, by whichever unit its key says; angles also as stem_dms = "ddd-mm-ss.s"."""

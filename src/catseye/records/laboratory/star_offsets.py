@@ -74,10 +74,10 @@ def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
     digest   SHA-256, if known
     """
     lines = [(k, row.strip()) for k, row in enumerate(text.replace("\r\n", "\n").split("\n"), start=1)]
-    told = [(k, row) for k, row in lines if row and not row.startswith(COMMENT)]
-    if not told:
+    numbered = [(k, row) for k, row in lines if row and not row.startswith(COMMENT)]
+    if not numbered:
         raise refusal(file, "holds comments only (expected a caption line)")
-    caption, rest = told[0][1], told[1:]
+    caption, rest = numbered[0][1], numbered[1:]
     options = [(k, word) for k, row in rest if row.startswith(OPTION) for word in row.lstrip(": ").split()]
     mount = _refuse_options(file, options)
     body = [(k, row) for k, row in rest if not row.startswith(OPTION)]
@@ -93,7 +93,7 @@ def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
     for (k, _), row in zip(body[1:], rows, strict=True):
         _refuse_row(file, k, row, width)
     table = np.array(rows)
-    found = StarOffsets(
+    offsets = StarOffsets(
         file=file,
         caption=caption,
         options=tuple(word for _, word in options if word != mount),
@@ -107,8 +107,8 @@ def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
         line=tuple(k for k, _ in body[1:]),
         digest=digest,
     )
-    _refuse_far(found)
-    return found
+    _refuse_far(offsets)
+    return offsets
 
 
 def _refuse_options(file: str, options: Sequence[tuple[int, str]]) -> str:
@@ -153,14 +153,14 @@ def _refuse_row(file: str, line: int, row: Sequence[float], width: int) -> None:
             raise refusal(file, f"line {line}, {name} = {value} (expected {low} to {high} degrees)")
 
 
-def _refuse_far(found: StarOffsets) -> None:
-    size = np.hypot(*found.correction.T)
+def _refuse_far(offsets: StarOffsets) -> None:
+    size = np.hypot(*offsets.correction.T)
     worst = int(np.argmax(size))
     if size[worst] > LARGEST_OFFSET:
         raise refusal(
-            found.file,
-            f"line {found.line[worst]}, sky and encoders are {size[worst] / DEGREE:.2f} degrees apart (expected up to "
-            f"{LARGEST_OFFSET / DEGREE:g}: azimuth clockwise from north in both pairs)",
+            offsets.file,
+            f"line {offsets.line[worst]}, sky and encoders are {size[worst] / DEGREE:.2f} degrees apart (expected up "
+            f"to {LARGEST_OFFSET / DEGREE:g}: azimuth clockwise from north in both pairs)",
         )
 
 

@@ -100,8 +100,8 @@ class _Arrays:
         return np.array([self.first + a if a >= 0 else -1 for a in at])
 
     def several(self, roles: Sequence[str]) -> np.ndarray | None:
-        found = [c for c in map(self.columns, roles) if c is not None]
-        return np.stack(found, axis=1) if found else None
+        columns = [c for c in map(self.columns, roles) if c is not None]
+        return np.stack(columns, axis=1) if columns else None
 
     def known(self, key: str, default: float) -> np.ndarray | float:
         if not any(key in row.known for row in self.rows):
@@ -132,8 +132,8 @@ def _zenith_angles(name: str, observed: np.ndarray, covariance: np.ndarray, a: _
 
 
 def _column(a: _Arrays, role: str) -> np.ndarray:
-    found = a.columns(role)
-    return np.full(len(a.rows), -1) if found is None else found
+    columns = a.columns(role)
+    return np.full(len(a.rows), -1) if columns is None else columns
 
 
 def _axes(a: _Arrays) -> np.ndarray:

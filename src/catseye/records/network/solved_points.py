@@ -66,33 +66,33 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     """
     path = Path(path)
     folder, name = (Folder(path), FILE) if path.is_dir() else (Folder(path.parent), path.name)
-    found = _object(folder, name)
-    points, order = found.get("points"), found.get("covariance_order")
+    document = _object(folder, name)
+    points, order = document.get("points"), document.get("covariance_order")
     if not isinstance(points, dict) or not points or not isinstance(order, list):
         raise refusal(name, "has no points with covariance_order (expected coordinates.json of catseye reduce --out)")
     names = tuple(points)
     if order != [f"{n} {axis}" for n in names for axis in "xyz"]:
         raise refusal(name, "covariance_order is not that of points x, y, z (expected as catseye reduce writes it)")
-    if found.get("frame") != "ground":
-        raise refusal(name, f"frame = {shown(found.get('frame'))} (expected 'ground')")
+    if document.get("frame") != "ground":
+        raise refusal(name, f"frame = {shown(document.get('frame'))} (expected 'ground')")
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
-    covariance = _covariance(name, found.get("covariance"), len(order))
+    covariance = _covariance(name, document.get("covariance"), len(order))
     beside = folder.directory / BESIDE
     posture = _posture(_object(folder, BESIDE)) if beside.is_file() else None
     hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
-    return SolvedPoints(str(path), str(found.get("campaign", "")), names, x, covariance, posture, hashes)
+    return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes)
 
 
 def _object(folder: Folder, name: str) -> dict[str, Any]:
     text = folder.text(name)
     try:
-        found = json.loads(text)
+        document = json.loads(text)
     except (ValueError, RecursionError) as problem:
         raise refusal(name, f"is not JSON: {problem}") from problem
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
-        told = shown(found.get("format")) if isinstance(found, dict) else "none"
-        raise refusal(name, f"format = {told} (expected '{FORMAT}', as catseye reduce --out writes it)")
-    return found
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        version = shown(document.get("format")) if isinstance(document, dict) else "none"
+        raise refusal(name, f"format = {version} (expected '{FORMAT}', as catseye reduce --out writes it)")
+    return document
 
 
 def _number(file: str, point: str, row: Any, axis: str) -> float:
@@ -115,11 +115,11 @@ def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
     return 0.5 * (q + q.T)
 
 
-def _posture(found: dict[str, Any]) -> tuple[float, float] | None:
-    told = found.get("nominal_posture")
-    if not isinstance(told, dict):
+def _posture(document: dict[str, Any]) -> tuple[float, float] | None:
+    posture = document.get("nominal_posture")
+    if not isinstance(posture, dict):
         return None
-    angles: list[Any] = [told.get(key) for key in ("azimuth_deg", "elevation_deg")]
+    angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
     if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
-        raise refusal(BESIDE, f"nominal_posture = {shown(told)} (expected azimuth_deg and elevation_deg)")
+        raise refusal(BESIDE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
     return float(angles[0]) * DEGREE, float(angles[1]) * DEGREE

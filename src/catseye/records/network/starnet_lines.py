@@ -88,22 +88,22 @@ def lines_of(text: str) -> list[StarnetLine]:
     >>> [line.words for line in lines_of("M 2-1-3 45-00-00 10.0 90-00-00 & &\\n  & 1.5/1.6  # heights\\n")]
     [['M', '2-1-3', '45-00-00', '10.0', '90-00-00', '&', '&', '1.5/1.6']]
     """
-    found: list[StarnetLine] = []
+    lines: list[StarnetLine] = []
     for number, raw in enumerate(text.splitlines(), start=1):
         body, _, comment = raw.partition("#")
         place = f"line {number}"
         if note := COMMENT.fullmatch(comment):
-            found.append(StarnetLine(place, raw.strip(), [".CATSEYE", note[1].strip()]))
+            lines.append(StarnetLine(place, raw.strip(), [".CATSEYE", note[1].strip()]))
         words = body.partition("'")[0].split()
         if not words:
             continue
         starts = words[0][0].isalpha() or OPTION.match(words[0])
-        if found and found[-1].words[-1] == "&" and not starts:
-            last = found.pop()
-            found.append(StarnetLine(last.place, f"{last.text} {body.strip()}", [*last.words[:-1], *words]))
+        if lines and lines[-1].words[-1] == "&" and not starts:
+            last = lines.pop()
+            lines.append(StarnetLine(last.place, f"{last.text} {body.strip()}", [*last.words[:-1], *words]))
         else:
-            found.append(StarnetLine(place, body.strip(), words))
-    return found
+            lines.append(StarnetLine(place, body.strip(), words))
+    return lines
 
 
 def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:

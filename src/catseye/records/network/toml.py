@@ -255,7 +255,7 @@ class _Reader:
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
         """Role -> parameter: those that the observation names, its ranger's, its set's orientation."""
-        found = dict(self.rangers.get(ends[0], {})) if kind in RANGED else {}
+        parameters = dict(self.rangers.get(ends[0], {})) if kind in RANGED else {}
         for role in ALLOWED.get(kind, ()):
             if not fields.has(role):
                 continue
@@ -265,15 +265,15 @@ class _Reader:
             wanted, unit = ROLE_UNIT[role], self.draft.parameters[self.named[name]].unit
             if (wanted if kind != "inclination" else "rad") != unit:
                 raise fields.refuse(f"{role} = {shown(name)} has the unit {unit} (expected one in {wanted})")
-            if role in found:
+            if role in parameters:
                 raise fields.refuse(f"{role} = {shown(name)}, but ranger {shown(ends[0])} has its own (expected one)")
-            found[role] = self.named[name]
-        if kind == "direction" and "orientation" not in found:
+            parameters[role] = self.named[name]
+        if kind == "direction" and "orientation" not in parameters:
             key = (ends[0], fields.text("set", "1"))
             if key not in self.sets:
                 self.sets[key] = self.draft.parameter(f"orientation {key[0]} set {key[1]}", unit="rad")
-            found["orientation"] = self.sets[key]
-        return found
+            parameters["orientation"] = self.sets[key]
+        return parameters
 
 
 class _AnyColumn(tuple[str, ...]):
@@ -291,11 +291,11 @@ def _rows_of(table: TextColumns, common: dict[str, Any]) -> list[Fields]:
             raise refusal(table.file, f"line 1, column {shown(name)} is there twice (expected each key once)")
         is_text: Callable[[str], bool] = TEXT_KEYS.__contains__
         columns.append(cells if is_text(name) else [float(c) if NUMBER.fullmatch(c) else c for c in cells])
-    found = []
+    rows = []
     for line, row in zip(table.lines, zip(*columns, strict=True), strict=True):
         values = {key: value for key, value in zip(table.cells, row, strict=True) if value != ""}
-        found.append(Fields(table.file, f"{table.file} line {line}", {**common, **values}))
-    return found
+        rows.append(Fields(table.file, f"{table.file} line {line}", {**common, **values}))
+    return rows
 
 
 TEXT_KEYS = (

@@ -250,7 +250,7 @@ def read_recording(path: Path | str, sheet: AcousticSheet) -> Recording | Travel
     raw = _bytes(path)
     digest = hashlib.sha256(raw).hexdigest()
     if raw[:4] in (b"RIFF", b"RF64", b"RIFX"):
-        found = _of_wav(raw, path.name, sheet, digest)
+        recording = _of_wav(raw, path.name, sheet, digest)
     else:
         text = Folder(path.parent).text(path.name)
         header = [name.strip() for name in text.split("\n", 1)[0].split(",")]
@@ -264,10 +264,10 @@ def read_recording(path: Path | str, sheet: AcousticSheet) -> Recording | Travel
             )
         table = columns_of(text, path.name, (), CHANNELS)
         samples: dict[str, np.ndarray] = {name: table.numbers(name) for name in table.cells}
-        found = Recording(path.name, samples, None, None, digest)
-    if not set(found.samples) & {"ab", "ba"}:
+        recording = Recording(path.name, samples, None, None, digest)
+    if not set(recording.samples) & {"ab", "ba"}:
         raise refusal(path.name, "has no channel 'ab' or 'ba' (expected at least one direction of the path)")
-    return found
+    return recording
 
 
 def wav_bytes(samples: np.ndarray, sampling_hz: int) -> bytes:

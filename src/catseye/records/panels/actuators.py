@@ -64,12 +64,12 @@ def read_positions(path: Path | str) -> dict[str, float]:
     path   CSV with the header actuator,position_mm
     """
     path = Path(path)
-    found: dict[str, float] = {}
+    positions: dict[str, float] = {}
     for row, record in enumerate(Folder(path.parent).table(path.name, ActuatorPosition), start=1):
-        if record.actuator in found:
+        if record.actuator in positions:
             raise refusal(path.name, f"row {row}, actuator = {shown(record.actuator)} is given twice (expected once)")
-        found[record.actuator] = record.position_mm
-    return found
+        positions[record.actuator] = record.position_mm
+    return positions
 
 
 def read_corrections(path: Path | str) -> list[ActuatorCorrection]:

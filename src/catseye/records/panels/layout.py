@@ -134,12 +134,12 @@ def layout_of_site(site: SiteFolder) -> PanelLayout:
     Nnn, Pnn from the plane of symmetry, x below and above zero. Design offsets are zero: no public table has them.
     """
     prisms = [(CORNER.fullmatch(name), t) for name, t in site.targets.items() if t.frame == "reflector"]
-    found = [(match, t) for match, t in prisms if match]
-    if not found:
+    corners = [(match, t) for match, t in prisms if match]
+    if not corners:
         raise refusal("targets.toml", "has no prisms DPhhC, DPhhNnn, DPhhPnn (expected the corners of panels)")
-    names = tuple(t.name for _, t in found)
-    xy = np.array([t.position_mm[:2] for _, t in found]) * MILLIMETRE
-    hoop = np.array([int(match[1]) for match, _ in found])
+    names = tuple(t.name for _, t in corners)
+    xy = np.array([t.position_mm[:2] for _, t in corners]) * MILLIMETRE
+    hoop = np.array([int(match[1]) for match, _ in corners])
     angle = np.arctan2(xy[:, 0], xy[:, 1])
     panels, quads = [], []
     for tier in range(int(hoop.min()), int(hoop.max())):

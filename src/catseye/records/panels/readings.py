@@ -150,16 +150,16 @@ def read_maps(directory: Path, layout: PanelLayout) -> dict[str, PanelMap]:
     """
     if not directory.is_dir():
         raise InputError(f"{directory}: is no directory (expected one of maps PANEL.csv)")
-    found, known = {}, set(layout.panels)
+    maps, known = {}, set(layout.panels)
     for path in sorted(directory.iterdir()):
         if path.name.startswith(".") or path.suffix in (".md", ".txt"):
             continue
         if path.suffix != ".csv" or path.stem not in known:
             raise refusal(path.name, f"is no map of a panel (expected a name such as {layout.panels[0]}.csv)")
-        found[path.stem] = _map(path)
-    if not found:
+        maps[path.stem] = _map(path)
+    if not maps:
         raise InputError(f"{directory}: holds no map (expected files such as {layout.panels[0]}.csv)")
-    return found
+    return maps
 
 
 def _map(path: Path) -> PanelMap:

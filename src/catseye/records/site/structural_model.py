@@ -335,11 +335,11 @@ def refuse_narrow(low_deg: float, high_deg: float) -> None:
 
 
 def _bases(model: StructuralModel) -> list[tuple[str, Basis]]:
-    found: list[tuple[str, Basis]] = []
+    bases: list[tuple[str, Basis]] = []
     for entry in model.moving:
         if entry.motion is not None:
-            found.append((f"motion of {entry.name!r}", entry.motion))
-    return found + [(f"shifts of {g.name!r}", g.shifts) for g in model.group if g.shifts is not None]
+            bases.append((f"motion of {entry.name!r}", entry.motion))
+    return bases + [(f"shifts of {g.name!r}", g.shifts) for g in model.group if g.shifts is not None]
 
 
 def _refuse_twice(kind: str, names: list[str]) -> None:

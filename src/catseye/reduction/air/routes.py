@@ -13,7 +13,7 @@ from catseye.atmosphere.index import hygrometer
 from catseye.atmosphere.index.air import MODELS, AirState, air, air_of_vapour, group_partials
 from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import barometer, humidity
-from catseye.atmosphere.weather.condensation import Condensation, condensation
+from catseye.atmosphere.weather.condensation import Condensation, CondensationSpread, condensation
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
@@ -182,15 +182,10 @@ def surface_of(
     )
     # to rounding and the formulas' 0.2 % air may be a little more than saturated; the surface's answer is the same
     relative = np.minimum(state.humidity_percent, 100.0)
-    return condensation(
-        surface_c,
-        state.temperature_c,
-        state.pressure_hpa,
-        relative,
-        u_surface_c=u_surface_c,
-        # the threshold hangs on the vapour alone: its uncertainty, as humidity at a temperature that is exact
-        u_humidity_percent=100.0 * u_vapour / humidity.saturation(state.temperature_c, state.pressure_hpa).pressure_hpa,
-    )
+    # the threshold hangs on the vapour alone: its uncertainty, as humidity at a temperature that is exact
+    u_humidity = 100.0 * u_vapour / humidity.saturation(state.temperature_c, state.pressure_hpa).pressure_hpa
+    u = CondensationSpread(surface_c=u_surface_c, humidity_percent=u_humidity)
+    return condensation(surface_c, state.temperature_c, state.pressure_hpa, relative, u=u)
 
 
 def read(temperature_c: ArrayLike, pressure_hpa: ArrayLike, moisture: Moisture, model: str) -> hygrometer.VapourReading:

@@ -9,6 +9,7 @@ from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.baseline.adjustment import (
     SEPARABLE,
+    BaselineNoise,
     BaselineSolution,
     adjust_baseline,
     places_in_line,
@@ -77,9 +78,9 @@ class BaselineJob:
                 known=self.known,
                 scale=self.known is not None,
                 extra=part,
-                u_centring=self.settings.u_centring_mm * MILLIMETRE,
-                noise=noise,
-                claim=self._specified(keep),
+                before=BaselineNoise(
+                    u_centring=self.settings.u_centring_mm * MILLIMETRE, noise=noise, claim=self._specified(keep)
+                ),
             )
         except EstimationError as problem:
             raise EstimationError(named(str(problem), self.shots.names)) from problem
@@ -110,7 +111,7 @@ class BaselineJob:
             known=self.known,
             scale=True,
             extra=None if terms is None else Extra(terms.names, terms.columns[keep]),
-            noise=Claim(shot, sets, 0.0),
+            before=BaselineNoise(noise=Claim(shot, sets, 0.0)),
         )
 
     def cleaned(

@@ -8,7 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit, LeastSquaresSolution, adjust
-from catseye.estimation.least_squares.robust import CHECKED, adjust_robustly
+from catseye.estimation.least_squares.robust import CHECKED, OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
@@ -214,12 +214,10 @@ def settle_network(
                 x,
                 groups,
                 removable,
-                points=points,
-                advice=advice,
+                outliers=OutlierSearch(points=points, advice=advice, critical=settings.critical),
                 free=free,
                 active=active,
                 names=layout.names,
-                critical=settings.critical,
             )
         elif turn >= TESTED:
             solution = adjust(x, groups, free=free, active=active, names=layout.names)

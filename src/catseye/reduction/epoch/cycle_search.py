@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.constants import SPEED_OF_LIGHT
-from catseye.estimation.ambiguity.search import AmbiguityStatus, Located, locate
+from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, Located, locate
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_slope
@@ -101,7 +101,7 @@ class _Problem:
             self.lengths[chosen],
             period=self.periods[chosen],
             covariance=covariance[np.ix_(chosen, chosen)],
-            wrong=0.0 if wider else WRONG,
+            limits=AmbiguityLimits(wrong=0.0 if wider else WRONG),
         )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution, adjust
-from catseye.estimation.least_squares.robust import adjust_robustly
+from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.records.night.campaign import ObservedSite
@@ -186,10 +186,12 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
             x[at],
             groups,
             removable,
-            points=[part.layout.columns(n) for n in part.places if n in part.layout.points],
+            outliers=OutlierSearch(
+                points=[part.layout.columns(n) for n in part.places if n in part.layout.points],
+                critical=network.settings.critical,
+            ),
             free=np.array(part.layout.free),
             names=part.layout.names,
-            critical=network.settings.critical,
         ).require_converged()
         x = x.copy()
         x[at] = solution.x

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.atmosphere.weather.condensation import Condensation, condensation
+from catseye.atmosphere.weather.condensation import Condensation, CondensationSpread, condensation
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import utc_text
@@ -127,10 +127,12 @@ def dew_risk(
         weather.temperature_c,
         weather.pressure_hpa,
         weather.humidity_percent,
-        u_surface_c=u_surface_c,
-        u_temperature_c=u_temperature_c,
-        u_humidity_percent=u_humidity_percent,
-        covariance_c2=covariance,
+        u=CondensationSpread(
+            surface_c=u_surface_c,
+            temperature_c=u_temperature_c,
+            humidity_percent=u_humidity_percent,
+            covariance_c2=covariance,
+        ),
     )
     state = state._replace(
         margin_k=np.where(known, state.margin_k, np.nan),

@@ -15,7 +15,7 @@ from scipy.special import ndtr
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSquaresSolution, SolverSettings, adjust
 from catseye.estimation.quality.reliability import checked, single_level, w_critical
 from catseye.geometry.antenna.panel_surface import axes
 from catseye.records.panels.instrument import PanelInstrument
@@ -149,7 +149,7 @@ def _left_out(doubt: Doubt) -> Doubt:
 
 
 def _solved(model: PanelModel, active: list[np.ndarray]) -> LeastSquaresSolution:
-    solution = adjust(np.zeros(model.columns.size), model.groups, active=active, iterations=5)
+    solution = adjust(np.zeros(model.columns.size), model.groups, active=active, solver=SolverSettings(iterations=5))
     if not solution.solved:
         raise EstimationError(f"panel corners: {solution.status}")
     return solution.require_converged()

@@ -17,7 +17,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.pose import Pose, fit_pose
+from catseye.estimation.shapes.pose import PlaceCovariances, Pose, fit_pose
 from catseye.estimation.shapes.rigid_body import turned_covariance
 from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
@@ -147,7 +147,7 @@ def pose_of_group(
         before = frame_transform(carrier, _posture_of(earlier, site, carrier)).inverse()
         first, q_first = _into(before, earlier.places(have), earlier.block(have))
     pose = fit_pose(
-        have, first, second, frame=carrier, covariance_first=q_first, covariance_second=q_second, robust=robust
+        have, first, second, frame=carrier, covariance=PlaceCovariances(first=q_first, second=q_second), robust=robust
     )
     kept = np.array([n in set(pose.names) for n in have])
     to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)

@@ -13,7 +13,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.shapes.paraboloid import cosine, design_rows
-from catseye.estimation.shapes.surface_field import Foretold, Roughness, find_roughness, foretell
+from catseye.estimation.shapes.surface_field import Foretold, MeasuredField, Roughness, find_roughness, foretell
 from catseye.optics.zernike import terms, zernike
 from catseye.records.files.refusal import shown
 from catseye.records.panels.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
@@ -102,10 +102,7 @@ def corrections(
     rough = roughness or find_roughness(local, values, noise, trend)
     nominal_design = _parameter_rows(shape, wanted)
     foretold: Foretold = foretell(
-        local,
-        values,
-        noise,
-        trend,
+        MeasuredField(local, values, noise, trend),
         wanted,
         wanted_trend,
         roughness=rough,

@@ -84,8 +84,8 @@ def joint_length(
 
     >>> f = np.array([1500e6, 1500.5e6, 1510e6])
     >>> phases = np.mod(-4 * np.pi * f * 1.000253 * 123.456789 / 299792458.0, 2 * np.pi)
-    >>> found = joint_length(phases, f, u_phase=1e-3, within=(5.0, 200.0), group_index=1.000253)
-    >>> round(float(found.length), 9), JointStatus(int(found.status)).name
+    >>> joint = joint_length(phases, f, u_phase=1e-3, within=(5.0, 200.0), group_index=1.000253)
+    >>> round(float(joint.length), 9), JointStatus(int(joint.status)).name
     (123.456789, 'FOUND')
     """
     f = checked_frequencies(frequencies_hz)
@@ -139,13 +139,13 @@ class _Answer:
     ) -> None:
         """The best and the next set of some shots; u are the phases' standard uncertainties as lengths."""
         low, high = within
-        found = cycle_sets(
+        sets = cycle_sets(
             phase, half, u**-2.0, (min(low * n.min(), low * n.max()), max(high * n.min(), high * n.max()))
         )
         u_length = np.sum(u**-2.0, axis=1) ** -0.5
         slack = SURE * u_length[:, None]
-        inside = found.inside & (found.length >= low * n[:, None] - slack) & (found.length <= high * n[:, None] + slack)
-        square = np.where(inside, found.misfit, np.inf)
+        inside = sets.inside & (sets.length >= low * n[:, None] - slack) & (sets.length <= high * n[:, None] + slack)
+        square = np.where(inside, sets.misfit, np.inf)
         at, first = np.arange(len(rows)), np.argmin(square, axis=1)
         best = square[at, first]
         some = np.isfinite(best)
@@ -162,16 +162,16 @@ class _Answer:
         self.floats[:, rows] = np.where(
             some,
             [
-                found.length[at, first] / n,
+                sets.length[at, first] / n,
                 u_length / n,
                 best,
-                np.where(known_next, found.length[at, second] / n, np.nan),
+                np.where(known_next, sets.length[at, second] / n, np.nan),
                 apart,
                 slip,
             ],
             np.nan,
         )
-        self.cycles[rows] = np.where(some[:, None], found.cycles[at, first], 0.0).astype(np.int64)
+        self.cycles[rows] = np.where(some[:, None], sets.cycles[at, first], 0.0).astype(np.int64)
         fits = some & (best <= _misfit_limit(len(half) - 1))
         sure = slip <= 2.0 * float(beyond(SURE))
         self.status[rows] = np.where(

@@ -212,18 +212,18 @@ class DelayPlan:
         start, low = self._placed(centre, rows.shape[1])
         form = self._form(len(rows))
         step = max(1, BLOCK_SAMPLES // self.stretch)
-        found, status = np.empty((len(rows), 5)), np.empty(len(rows), np.int8)
+        arrivals, status = np.empty((len(rows), 5)), np.empty(len(rows), np.int8)
         with np.errstate(all="ignore"):  # a recording that is not finite, or silent, answers NaN
             for begin in range(0, len(rows), step):
                 part = slice(begin, begin + step)
                 piece = self._cut(rows[part], start[part])
-                found[part], status[part] = form(piece, low[part], self.search, self._ends(piece))
-        found[:, 0] = (found[:, 0] + start) / self.sampling_hz
-        found[:, 1] = np.sqrt(found[:, 1]) / self.sampling_hz
+                arrivals[part], status[part] = form(piece, low[part], self.search, self._ends(piece))
+        arrivals[:, 0] = (arrivals[:, 0] + start) / self.sampling_hz
+        arrivals[:, 1] = np.sqrt(arrivals[:, 1]) / self.sampling_hz
         if status.any():
-            found[status > ECHO, 1] = np.nan
-            found[status >= SILENT] = np.nan
-        delay, u, amplitude, snr, rival = (column.reshape(batch) for column in found.T)
+            arrivals[status > ECHO, 1] = np.nan
+            arrivals[status >= SILENT] = np.nan
+        delay, u, amplitude, snr, rival = (column.reshape(batch) for column in arrivals.T)
         return Delays(delay, u, amplitude, snr, rival, status.reshape(batch))
 
     def correlation(self, recording: ArrayLike, expected: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -288,38 +288,6 @@ class DelayPlan:
 
             return compiled_find
         return find
-
-
-def delay(
-    recordings: ArrayLike,
-    template: ArrayLike,
-    *,
-    sampling_hz: float,
-    expected: ArrayLike,
-    window: float,
-    weighting: str = "plain",
-    band_hz: tuple[float, float] | None = None,
-    noise: ArrayLike | None = None,
-    full_scale: float | None = None,
-) -> Delays:
-    """Arrival time of a known signal in recordings, once; for many calls keep a `DelayPlan`.
-
-    recordings   (..., n), integers or floats
-    template     (m,) samples of the signal from its start
-    expected     s, delay expected in each, (...,) or one for all
-    window, sampling_hz, weighting, band_hz, noise, full_scale   as for `DelayPlan`
-
-    Raises ValidityError as `DelayPlan` does.
-
-    >>> t = np.arange(100) / 8e3
-    >>> tone = np.sin(2 * np.pi * 1e3 * t) * np.sin(np.pi * t / t[-1]) ** 2
-    >>> heard = np.concatenate([np.zeros(400), tone, np.zeros(300)])
-    >>> round(float(delay(heard, tone, sampling_hz=8e3, expected=0.0505, window=2e-3).delay), 9)
-    0.05
-    """
-    plan = DelayPlan(template, sampling_hz=sampling_hz, window=window, weighting=weighting, band_hz=band_hz,
-                     noise=noise, full_scale=full_scale)  # fmt: skip
-    return plan(recordings, expected)
 
 
 def fast_length(least: int) -> int:

@@ -33,7 +33,7 @@ _inlined = njit(error_model="numpy")  # kept with their caller
 
 def find(piece, low, search: PeakSearch, ends):
     """As `peak.find`, its plain form."""
-    found, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
+    arrivals, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
     spectrum, scale = transformed(piece, search)
     padded = np.zeros((len(piece), search.stretch // 2 + 1), np.complex128)
     if search.phases:
@@ -43,8 +43,9 @@ def find(piece, low, search: PeakSearch, ends):
         weights = search.weight[None]
         _weigh(spectrum, search.template, search.weight, padded, search.first)
     correlation = np.fft.irfft(padded, search.stretch)
-    _rows(piece, ends[0], ends[1], spectrum, padded, correlation, low, weights, search, scale, found, status)
-    return found, status
+    spectra = spectrum, padded, correlation, weights
+    _rows(piece, (ends[0], ends[1]), spectra, low, search, scale, (arrivals, status))
+    return arrivals, status
 
 
 @_compiled
@@ -189,7 +190,9 @@ def _strongest_other(c, own, start, height):
 
 
 @_compiled
-def _rows(piece, bottom, top, spectrum, padded, correlation, low, weights, search, scale, found, status):
+def _rows(piece, ends, spectra, low, search, scale, out):
+    spectrum, padded, correlation, weights = spectra
+    arrivals, status = out
     omega, step, lines = (
         search.omega[0],
         search.omega[1] - search.omega[0],
@@ -216,10 +219,10 @@ def _rows(piece, bottom, top, spectrum, padded, correlation, low, weights, searc
             rho = _own(own, second_at + low[b] - inside)
             apart = np.sqrt(snr) * (1.0 - second) / np.sqrt(2.0 * max(1.0 - rho, 1e-12))
         other = _strongest_other(c, own, low[b] - inside, height)
-        damage = _damage(piece[b], bottom, top)
+        damage = _damage(piece[b], ends[0], ends[1])
         status[b] = max(damage, _judged(lag, snr, apart, other, search.least_snr))
         rival = second if apart < TOLD_APART and second > other else other
-        found[b, 0], found[b, 1], found[b, 2], found[b, 3], found[b, 4] = (
+        arrivals[b, 0], arrivals[b, 1], arrivals[b, 2], arrivals[b, 3], arrivals[b, 4] = (
             lag,
             0.5 * squared / bend**2,
             amplitude,

@@ -75,8 +75,8 @@ def find(
     spectrum, scale = transformed(piece, search)
     cross, weight = cross_spectrum(spectrum, search)
     correlation = windowed(cross, low, search)
-    found = measured(spectrum, cross, weight, correlation, low, search, scale)
-    return judged(found, damage, search.least_snr)
+    measures = measured(spectrum, cross, weight, correlation, low, search, scale)
+    return judged(measures, damage, search.least_snr)
 
 
 def transformed(piece: NDArray, search: PeakSearch) -> tuple[NDArray, float]:
@@ -126,10 +126,10 @@ def measured(
 
 
 def judged(
-    found: NDArray[np.float64], damage: NDArray[np.int8], least_snr: float
+    measures: NDArray[np.float64], damage: NDArray[np.int8], least_snr: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
     """The answer of `find`: what is measured, and the gravest status."""
-    lag, variance, amplitude, snr, second, apart, other = found
+    lag, variance, amplitude, snr, second, apart, other = measures
     status = np.zeros(len(lag), np.int8)
     echo = (other > AUDIBLE) & (other**2 * snr > CERTAIN**2)
     near = apart < TOLD_APART

@@ -70,17 +70,17 @@ class Inspection:
 
     def detail(self, buffer: int) -> str:
         """The same without the status."""
-        n, found = self.samples_per_cycle, self.detection
+        n, detection = self.samples_per_cycle, self.detection
         expected = f"a whole number of cycles of {n}" if self.cycles is None else f"{self.cycles} cycles of {n}"
         return TEXTS[BufferStatus(self.status[buffer])].format(
-            amplitude=float(found.amplitude[buffer]),
+            amplitude=float(detection.amplitude[buffer]),
             weakest=self.weakest,
-            cycles=int(found.scatter.cycles[buffer]),
+            cycles=int(detection.scatter.cycles[buffer]),
             n=n,
-            dropped=int(found.scatter.dropped[buffer]),
+            dropped=int(detection.scatter.dropped[buffer]),
             run=shortest_run(n),
-            clipped=int(found.clipped[buffer]),
-            largest=float(found.largest[buffer]),
+            clipped=int(detection.clipped[buffer]),
+            largest=float(detection.largest[buffer]),
             length=int(self.length[buffer]),
             expected=expected,
         )
@@ -128,7 +128,7 @@ def inspect_buffers(
     detect(np.zeros(2 * max(n, 1)), samples_per_cycle, volts_per_code, harmonics=harmonics)
     count = len(buffers)  # type: ignore[arg-type]
     status, length = np.zeros(count, dtype=np.int8), np.full(count, -1, dtype=np.int64)
-    found = _nothing(count, len(tuple(harmonics)))
+    detection = _nothing(count, len(tuple(harmonics)))
     groups: dict[tuple[int, str], list[int]] = {}
     table = buffers if isinstance(buffers, np.ndarray) and buffers.ndim == 2 and buffers.dtype.kind in "iuf" else None
     rows: list[NDArray[np.generic]] = []
@@ -150,8 +150,8 @@ def inspect_buffers(
         block = table if table is not None else np.stack([rows[i] for i in members])
         part = detect(block, n, volts_per_code, converter_ends=converter_ends, harmonics=harmonics)
         status[members] = _judged(part, has_long_run(block, shortest_run(n)), weakest)
-        _put(found, members, part)
-    return Inspection(status, found, length, n, cycles, weakest)
+        _put(detection, members, part)
+    return Inspection(status, detection, length, n, cycles, weakest)
 
 
 def status_of(detection: Detection, *, weakest: float = 0.0) -> NDArray[np.int8]:
@@ -191,15 +191,15 @@ def has_long_run(samples: NDArray[np.generic], run: int) -> NDArray[np.bool_]:
     return answer
 
 
-def _judged(found: Detection, stuck: NDArray[np.bool_], weakest: float) -> NDArray[np.int8]:
+def _judged(detection: Detection, stuck: NDArray[np.bool_], weakest: float) -> NDArray[np.int8]:
     """The gravest status that applies; the conditions stand in order of gravity."""
-    status = np.zeros(found.phasor.shape, dtype=np.int8)
-    status[found.amplitude < weakest] = BufferStatus.WEAK
-    status[~(found.u_phasor > 0.0)] = BufferStatus.NO_SCATTER
-    status[found.scatter.dropped > 0] = BufferStatus.DROPOUT
+    status = np.zeros(detection.phasor.shape, dtype=np.int8)
+    status[detection.amplitude < weakest] = BufferStatus.WEAK
+    status[~(detection.u_phasor > 0.0)] = BufferStatus.NO_SCATTER
+    status[detection.scatter.dropped > 0] = BufferStatus.DROPOUT
     status[stuck] = BufferStatus.STUCK
-    status[found.clipped > 0] = BufferStatus.CLIPPED
-    known = np.isfinite(found.phasor) & np.isfinite(found.largest) & ~np.isinf(found.u_phasor)
+    status[detection.clipped > 0] = BufferStatus.CLIPPED
+    known = np.isfinite(detection.phasor) & np.isfinite(detection.largest) & ~np.isinf(detection.u_phasor)
     status[~known] = BufferStatus.NOT_FINITE
     return status
 

@@ -144,15 +144,15 @@ def detect(
         converter_ends = (limits.min, limits.max)
     fast = _compiled(array, m, compiled)
     buffers = array.reshape(-1, m * n)
-    found = _Codes.of(len(buffers), len(wanted))
+    codes = _Codes.of(len(buffers), len(wanted))
     step = max(1, (16 if fast else 1) * BLOCK_SAMPLES // (m * n))
     with np.errstate(invalid="ignore", over="ignore"):  # NaN, infinity and 1e300 V answer NaN or infinity
         for start in range(0, len(buffers), step):
             block = buffers[start : start + step].reshape(-1, m, n)
-            part = found.rows(start, len(block))
+            part = codes.rows(start, len(block))
             (_fast_block if fast else _plain_block)(block, wanted, part)
             part.count_clipped(block, converter_ends)
-    return found.in_volts(volts_per_code, array.shape[:-1], m, n)
+    return codes.in_volts(volts_per_code, array.shape[:-1], m, n)
 
 
 def phasors(

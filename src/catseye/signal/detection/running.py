@@ -47,8 +47,8 @@ def running_phasor(
 
     >>> j = np.arange(640)
     >>> moving = 1000 * np.cos(2 * np.pi * j / 64 - 0.5 - 0.04 * (j - 319.5) / 64)
-    >>> found = running_phasor(moving, 64, 1e-3, run=0.04)
-    >>> round(abs(found.phasor), 12), round(float(np.angle(found.phasor)), 12)
+    >>> running = running_phasor(moving, 64, 1e-3, run=0.04)
+    >>> round(abs(running.phasor), 12), round(float(np.angle(running.phasor)), 12)
     (1.0, 0.5)
     """
     if not abs(run) < np.pi:

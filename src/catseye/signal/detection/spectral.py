@@ -35,11 +35,11 @@ def bin_phasor(samples: ArrayLike, samples_per_cycle: int) -> NDArray[np.complex
     if length == 0 or length % int(n):
         raise ValidityError(f"a buffer of {length} samples is not a whole number of cycles of {n} samples")
     buffers = array.reshape(-1, length)
-    found = np.empty(len(buffers), dtype=complex)
+    phasor = np.empty(len(buffers), dtype=complex)
     with np.errstate(invalid="ignore"):
         for rows in _blocks(len(buffers), length):
-            found[rows] = np.fft.rfft(buffers[rows], axis=-1)[:, length // int(n)].conj() * (2.0 / length)
-    return found.reshape(array.shape[:-1])
+            phasor[rows] = np.fft.rfft(buffers[rows], axis=-1)[:, length // int(n)].conj() * (2.0 / length)
+    return phasor.reshape(array.shape[:-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +126,8 @@ def _peak(block: NDArray[np.generic]) -> tuple[NDArray[np.float64], NDArray[np.f
     row = np.arange(len(block))
     top, left, right = power[row, peak], power[row, peak - 1], power[row, peak + 1]
     varies = block.min(axis=-1) < block.max(axis=-1)
-    found = np.isfinite(power).all(axis=-1) & varies & (top > 0.0) & (top >= left) & (top >= right)
-    ratio = np.where(found, np.maximum(left, right) / top, 0.5)  # (1 + d)/(2 - d) at d bins from the peak
+    peaked = np.isfinite(power).all(axis=-1) & varies & (top > 0.0) & (top >= left) & (top >= right)
+    ratio = np.where(peaked, np.maximum(left, right) / top, 0.5)  # (1 + d)/(2 - d) at d bins from the peak
     shift = (2.0 * ratio - 1.0) / (1.0 + ratio) * np.where(right >= left, 1.0, -1.0)
     bin_width = TWO_PI / length
     omega = (peak + shift) * bin_width
@@ -141,7 +141,7 @@ def _peak(block: NDArray[np.generic]) -> tuple[NDArray[np.float64], NDArray[np.f
         omega = np.clip(omega + step, (peak - 1.0) * bin_width, (peak + 1.0) * bin_width)
     height = np.einsum("bk,bk->b", weighted, np.exp(-1j * omega[:, None] * time))
     return (
-        np.where(found, omega, np.nan),
-        np.where(found, 2.0 * np.abs(height) / window.sum(), np.nan),
-        np.where(found, -np.angle(height), np.nan),
+        np.where(peaked, omega, np.nan),
+        np.where(peaked, 2.0 * np.abs(height) / window.sum(), np.nan),
+        np.where(peaked, -np.angle(height), np.nan),
     )

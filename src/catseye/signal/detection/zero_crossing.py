@@ -58,8 +58,8 @@ def crossing_phase(
     Raises ValidityError for buffers that are no whole cycles. Source: [PARKER04] section 5.2, first paragraph.
 
     >>> wave = np.cos(2 * np.pi * np.arange(640) / 64 - 2.0)
-    >>> found = crossing_phase(np.minimum(wave, 0.5), 64)  # clipped: the edges part, their average stays
-    >>> [round(float(x), 3) for x in (found.rising, found.falling, found.phase, found.duty)]
+    >>> crossing = crossing_phase(np.minimum(wave, 0.5), 64)  # clipped: the edges part, their average stays
+    >>> [round(float(x), 3) for x in (crossing.rising, crossing.falling, crossing.phase, crossing.duty)]
     [1.891, 2.109, 2.0, 0.535]
     """
     array = _real(samples, hysteresis)
@@ -69,8 +69,8 @@ def crossing_phase(
     if array.shape[-1] == 0 or array.shape[-1] % int(n):
         raise ValidityError(f"a buffer of {array.shape[-1]} samples is not a whole number of cycles of {n} samples")
     buffers = array.reshape(-1, array.shape[-1])
-    found = _edge_phases(buffers, np.full(len(buffers), float(n)), level, hysteresis)
-    return _crossing(*found, array.shape[:-1])
+    edges = _edge_phases(buffers, np.full(len(buffers), float(n)), level, hysteresis)
+    return _crossing(*edges, array.shape[:-1])
 
 
 def phase_between(samples: ArrayLike, reference: ArrayLike, *, hysteresis: float = 0.0) -> Crossing:
@@ -86,8 +86,8 @@ def phase_between(samples: ArrayLike, reference: ArrayLike, *, hysteresis: float
     Raises ValidityError for shapes that do not agree. Source: [PARKER04] section 5.2, first paragraph.
 
     >>> t = np.arange(1000) / 61.7
-    >>> found = phase_between(3 * np.cos(2 * np.pi * t - 2.5), np.cos(2 * np.pi * t - 0.5))
-    >>> round(float(found.phase), 3)
+    >>> crossing = phase_between(3 * np.cos(2 * np.pi * t - 2.5), np.cos(2 * np.pi * t - 0.5))
+    >>> round(float(crossing.phase), 3)
     2.0
     """
     signal, other = _real(samples, hysteresis), _real(reference, hysteresis)

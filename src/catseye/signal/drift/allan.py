@@ -104,13 +104,13 @@ def expected_variance(size: ArrayLike, *, white: float = 0.0, flicker: float = 0
 def _flicker_variance(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Integral of (pi / sin x) 2 sin(m x)^4 / (m sin x)^2 over frequency, x = pi v up to a right angle."""
     x, w = np.polynomial.legendre.leggauss(16)
-    found = np.empty(sizes.shape)
+    variance = np.empty(sizes.shape)
     for k, m in np.ndenumerate(sizes):
         edges = np.linspace(0.0, 0.5, int(m) + 1)  # half a wave of sin(m x) to a piece
         v = (edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + x)).ravel()
         weight = np.tile(0.25 * w / m, int(m))
-        found[k] = np.sum(weight * 2.0 * np.pi * np.sin(m * np.pi * v) ** 4 / (m**2 * np.sin(np.pi * v) ** 3))
-    return found
+        variance[k] = np.sum(weight * 2.0 * np.pi * np.sin(m * np.pi * v) ** 4 / (m**2 * np.sin(np.pi * v) ** 3))
+    return variance
 
 
 def spur_variance(size: ArrayLike, *, amplitude: float, cycles_per_reading: float) -> NDArray:
@@ -148,9 +148,9 @@ def _degrees(kind: str, points: int, m: int) -> float:
     """Equivalent degrees of freedom of an overlapping variance; `points` is one more than the readings."""
     n = float(points)
     if kind == "white":
-        found = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
+        degrees = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
     elif kind == "flicker":
-        found = 2.0 * (n - 2.0) ** 2 / (2.3 * n - 4.9) if m == 1 else 5.0 * n**2 / (4.0 * m * (n + 3.0 * m))
+        degrees = 2.0 * (n - 2.0) ** 2 / (2.3 * n - 4.9) if m == 1 else 5.0 * n**2 / (4.0 * m * (n + 3.0 * m))
     else:
-        found = (n - 2.0) / m * ((n - 1.0) ** 2 - 3.0 * m * (n - 1.0) + 4.0 * m**2) / (n - 3.0) ** 2
-    return max(found, 1.0)
+        degrees = (n - 2.0) / m * ((n - 1.0) ** 2 - 3.0 * m * (n - 1.0) + 4.0 * m**2) / (n - 3.0) ** 2
+    return max(degrees, 1.0)

@@ -97,8 +97,8 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
     than some 4 ordinates (4/(n interval)) are not resolved.
 
     >>> y = np.random.default_rng(1).normal(size=4096) + 0.2 * np.sin(2 * np.pi * 57.0 * np.arange(4096) / 1000)
-    >>> found = noise_spectrum(y, 0.001)
-    >>> round(found.spurs[0].frequency_hz, 1), round(found.spurs[0].amplitude, 1), round(found.white, 1)
+    >>> noise = noise_spectrum(y, 0.001)
+    >>> round(noise.spurs[0].frequency_hz, 1), round(noise.spurs[0].amplitude, 1), round(noise.white, 1)
     (57.0, 0.2, 1.0)
     """
     y = _checked(series, interval, false_alarm)
@@ -209,8 +209,8 @@ def _fit_lines(y: NDArray, time: NDArray, lines: list[float]) -> tuple[NDArray[n
     if not lines:
         return np.zeros(0, dtype=complex), y
     waves = _waves(time, lines)
-    found = np.linalg.lstsq(waves, y, rcond=None)[0]
-    return found[: len(lines)] + 1j * found[len(lines) :], y - waves @ found
+    coefficients = np.linalg.lstsq(waves, y, rcond=None)[0]
+    return coefficients[: len(lines)] + 1j * coefficients[len(lines) :], y - waves @ coefficients
 
 
 def _refined(y: NDArray, time: NDArray, lines: list[float]) -> list[float]:

@@ -41,10 +41,12 @@ def drift_at(
     r = len(reference_time)
     # A random walk from any origin before all times; a flat prior on its level makes the origin irrelevant.
     walk = random_walk**2 * (np.minimum(t[:, None], t) - t.min())
-    seen = walk[:r, :r] + np.diag(np.asarray(reference_variance, dtype=float))
+    reference_covariance = walk[:r, :r] + np.diag(np.asarray(reference_variance, dtype=float))
     # Two references at one time and without noise would repeat each other: a part in 1e12 keeps them apart.
-    seen = seen + np.eye(r) * 1e-12 * max(float(np.trace(seen)) / r, random_walk**2, 1e-30)
-    weight = np.linalg.inv(seen)
+    reference_covariance = reference_covariance + np.eye(r) * 1e-12 * max(
+        float(np.trace(reference_covariance)) / r, random_walk**2, 1e-30
+    )
+    weight = np.linalg.inv(reference_covariance)
     ones = np.ones(r)
     level_variance = 1.0 / (ones @ weight @ ones)
     level = level_variance * (ones @ weight @ np.asarray(reference_phase, dtype=float))

@@ -205,11 +205,11 @@ def _differences(time: ArrayLike, phase: ArrayLike, variance: ArrayLike, series:
     labels = np.zeros(len(t), dtype=int) if series is None else np.unique(np.asarray(series), return_inverse=True)[1]
     blocks = []
     for label in np.unique(labels):
-        mine = np.flatnonzero(labels == label)
-        mine = mine[np.argsort(t[mine], kind="stable")]
-        if len(mine) > 1:
-            step = np.diff(np.eye(len(mine)), axis=0)
-            blocks.append((np.diff(y[mine]), np.diff(t[mine]), (step * v[mine]) @ step.T, step @ step.T))
+        members = np.flatnonzero(labels == label)
+        members = members[np.argsort(t[members], kind="stable")]
+        if len(members) > 1:
+            step = np.diff(np.eye(len(members)), axis=0)
+            blocks.append((np.diff(y[members]), np.diff(t[members]), (step * v[members]) @ step.T, step @ step.T))
     return blocks
 
 

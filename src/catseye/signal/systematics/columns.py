@@ -58,21 +58,21 @@ def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> Li
         if not (np.all(s > 0.0) and np.all(np.isfinite(s))):
             raise ValidityError(f"standard uncertainty {np.min(s)} is not above 0 and finite")
         s = np.broadcast_to(s, y.shape)
-        white, seen = a / s[:, None], y / s
+        white, white_y = a / s[:, None], y / s
     else:
         try:
             factor = np.linalg.cholesky(s)
         except np.linalg.LinAlgError:
             raise ValidityError("the covariance of the readings is not positive definite") from None
-        white, seen = np.linalg.solve(factor, a), np.linalg.solve(factor, y)
+        white, white_y = np.linalg.solve(factor, a), np.linalg.solve(factor, y)
     length = np.linalg.norm(white, axis=0)
     if a.shape[0] < a.shape[1] or np.any(length == 0.0) or np.linalg.cond(white / length) > WORST_CONDITION:
         raise EstimationError(
             f"{len(y)} readings do not tell {a.shape[1]} coefficients apart: leave one out, or spread"
         )
     inverse = np.linalg.pinv(white / length) / length[:, None]
-    coefficient = inverse @ seen
+    coefficient = inverse @ white_y
     degrees = len(y) - a.shape[1]
-    squares = float(np.sum((seen - white @ coefficient) ** 2))
+    squares = float(np.sum((white_y - white @ coefficient) ** 2))
     factor_ = squares / degrees if degrees else float("nan")
     return LinearFit(coefficient, inverse @ inverse.T, y - a @ coefficient, factor_, degrees)

@@ -335,12 +335,12 @@ def _drift(z: Phasors, labels: NDArray[np.int64], count: int) -> float:
     """One less the von Neumann ratio of all sessions, over its standard deviation for white circular noise."""
     steps = squares = variance = 0.0
     for k in range(count):
-        mine = z[labels == k]
-        n = len(mine)
+        phasors = z[labels == k]
+        n = len(phasors)
         if n < 4:
             continue
-        spread = float(np.sum(np.abs(mine - mine.mean()) ** 2))
-        steps += 0.5 * float(np.sum(np.abs(np.diff(mine)) ** 2))
+        spread = float(np.sum(np.abs(phasors - phasors.mean()) ** 2))
+        steps += 0.5 * float(np.sum(np.abs(np.diff(phasors)) ** 2))
         squares += spread
         variance += spread**2 * (n - 2.0) / (2.0 * (n**2 - 1.0))
     return (squares - steps) / np.sqrt(variance) if variance > 0.0 else float("nan")

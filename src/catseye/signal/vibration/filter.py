@@ -162,7 +162,7 @@ class FilterState:
         noise[offsets, offsets] = self.offset_walk**2 * step
         return mean, slope, noise
 
-    def seen(self, window: float = 0.0) -> tuple[Array, Array, Array]:
+    def expected_sample(self, window: float = 0.0) -> tuple[Array, Array, Array]:
         """Displacement (A,) m that a sample of now shows, its derivatives (A, n), and the force's part in a window.
 
         window    s, over which the sample is the mean, its middle now; 0 for an instant
@@ -202,7 +202,7 @@ class FilterState:
             when = time + (k + 0.5) * part - 0.5 * window
             mean, slope, fresh = state._moved(0.0 if abs(when - state.time) < ROUNDING else when - state.time)
             state = replace(state, time=when, mean=mean, covariance=slope @ state.covariance @ slope.T + fresh)
-            shown, rows, inner = state.seen(part)
+            shown, rows, inner = state.expected_sample(part)
             cross = slope @ cross
             shared = rows @ cross / parts
             spread = spread + shared + shared.T + (rows @ state.covariance @ rows.T + inner) / parts**2

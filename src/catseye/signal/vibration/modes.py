@@ -94,19 +94,19 @@ def find_modes(
 def _climbed(theta: Array, t: Array, y: Array, u_sample: float, window: float, count: int) -> tuple[Array, Array]:
     """Parameters of the highest likelihood with the dampings' prior, and their information."""
     scale = np.concatenate([np.full(count, 0.1 / (t[-1] - t[0])), np.full(len(theta) - count, 0.05)])
-    tried, best, found = theta, -np.inf, np.eye(len(theta))
+    tried, best, best_information = theta, -np.inf, np.eye(len(theta))
     step: Array = np.zeros(len(theta))
     for _ in range(PASSES):
         value, gradient, information = _scored(tried, scale, t, y, u_sample, window, count)
         if value > best:
-            theta, best, found = tried, value, information
+            theta, best, best_information = tried, value, information
             wanted = np.asarray(np.linalg.solve(information, gradient), dtype=float)
             reach = np.concatenate([np.full(count, 3.0 / (t[-1] - t[0])), np.full(len(theta) - count, 1.0)])
             step = wanted * min(1.0, float(np.min(reach / np.maximum(np.abs(wanted), 1e-300))))
         else:
             step = 0.5 * step  # too far
-        if float(step @ found @ step) < SETTLED:
-            return theta, found
+        if float(step @ best_information @ step) < SETTLED:
+            return theta, best_information
         tried = theta + step
     raise EstimationError(f"modes did not settle in {PASSES} passes: give fewer modes, near_hz, or a longer stretch")
 
@@ -209,7 +209,7 @@ def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, wi
         if now > 0.5 * (t[0] + t[-1]):  # locked by then
             z = state.quadratures()[0]
             sums += np.einsum("mai,mbi->mab", z, z)
-    found = []
+    correlated = []
     for mode, product in zip(modes, sums, strict=True):
         size = np.sqrt(np.diag(product))
         sigma = np.sqrt(np.diag(mode.covariance))
@@ -218,8 +218,8 @@ def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, wi
         # axes taken as independent count their information twice where they swing together: the scores' own variance
         more = float(np.sqrt(np.sum(correlation**2) / axes))
         spread = {"u_frequency_hz": mode.u_frequency_hz * more, "u_damping": mode.u_damping * more}
-        found.append(replace(mode, covariance=correlation * np.outer(sigma, sigma), **spread))
-    return tuple(found)
+        correlated.append(replace(mode, covariance=correlation * np.outer(sigma, sigma), **spread))
+    return tuple(correlated)
 
 
 def _peak(t: Array, y: Array) -> float:

@@ -103,8 +103,8 @@ def spectrum(
     Source: [WELCH67] (averaging, degrees of freedom), [SCARGLE82] eq. 6 (uneven times). Checked against scipy's.
 
     >>> t = np.arange(512) / 8.0
-    >>> found = spectrum([t], [np.cos(2 * np.pi * 1.0 * t) * 1e-3], stretch=16.0)
-    >>> float(found.frequency_hz[np.argmax(found.density[:, 0])])
+    >>> densities = spectrum([t], [np.cos(2 * np.pi * 1.0 * t) * 1e-3], stretch=16.0)
+    >>> float(densities.frequency_hz[np.argmax(densities.density[:, 0])])
     1.0
     """
     t = [np.asarray(x, dtype=float) for x in times]
@@ -144,7 +144,7 @@ def _waves(
     start: float, length: float, frequency: Array, t: Sequence[Array], y: Sequence[Array], tapered: bool
 ) -> NDArray[np.complex128] | None:
     """(F, A) of one stretch, such that twice |wave|^2 is the density; None where a channel has too few samples."""
-    found = np.empty((len(frequency), len(t)), dtype=complex)
+    waves = np.empty((len(frequency), len(t)), dtype=complex)
     for a, (when, values) in enumerate(zip(t, y, strict=True)):
         low, high = np.searchsorted(when, [start - 1e-9 * length, start + length * (1.0 - 1e-9)])
         if high - low < LEAST:
@@ -153,9 +153,9 @@ def _waves(
         taper = 0.5 - 0.5 * np.cos(TWO_PI * x) if tapered else np.ones_like(x)
         weighted = taper * (part - part.mean())
         for at in np.array_split(np.arange(len(frequency)), max(1, len(frequency) * len(x) // PIECE)):
-            found[at, a] = np.exp(-1j * TWO_PI * np.outer(frequency[at] * length, x)) @ weighted
-        found[:, a] *= np.sqrt(length / len(x) / np.sum(taper**2))
-    return found
+            waves[at, a] = np.exp(-1j * TWO_PI * np.outer(frequency[at] * length, x)) @ weighted
+        waves[:, a] *= np.sqrt(length / len(x) / np.sum(taper**2))
+    return waves
 
 
 def _refuse(t: Sequence[Array], y: Sequence[Array]) -> None:
@@ -184,10 +184,10 @@ class Peak:
     over: float
 
 
-def peaks(found: Spectrum, *, probability: float = 0.999, about_hz: float | None = None) -> tuple[Peak, ...]:
+def peaks(spectrum: Spectrum, *, probability: float = 0.999, about_hz: float | None = None) -> tuple[Peak, ...]:
     """Where the density stands above its surroundings by more than chance makes of it, the highest first.
 
-    found         a spectrum
+    spectrum         a spectrum
     probability   that the highest of all frequencies of a smooth spectrum is not taken for a peak
     about_hz      half width of the surroundings; 12 bandwidths where it is None
 
@@ -196,29 +196,31 @@ def peaks(found: Spectrum, *, probability: float = 0.999, about_hz: float | None
     from scipy.ndimage import median_filter
     from scipy.stats import chi2
 
-    total = found.density.sum(axis=1)
-    step = found.frequency_hz[0]
-    half = max(3, round((12.0 * found.bandwidth_hz if about_hz is None else about_hz) / step))
-    degrees = found.degrees * _effective(found)
+    total = spectrum.density.sum(axis=1)
+    step = spectrum.frequency_hz[0]
+    half = max(3, round((12.0 * spectrum.bandwidth_hz if about_hz is None else about_hz) / step))
+    degrees = spectrum.degrees * _effective(spectrum)
     background = median_filter(total, size=2 * half + 1, mode="nearest") * degrees / chi2.ppf(0.5, degrees)
     limit = chi2.ppf(probability ** (1.0 / max(len(total), 1)), degrees) / degrees
     # the median of so many independent frequencies is itself uncertain: pi/2 the variance of a mean
-    limit *= 1.0 + 2.0 * np.sqrt(np.pi / degrees * found.bandwidth_hz / ((2 * half + 1) * step))
+    limit *= 1.0 + 2.0 * np.sqrt(np.pi / degrees * spectrum.bandwidth_hz / ((2 * half + 1) * step))
     inner = np.arange(1, len(total) - 1)
     tops = inner[(total[inner] > total[inner - 1]) & (total[inner] >= total[inner + 1])]
     tops = tops[total[tops] > limit * background[tops]]
-    made = []
+    tall = []
     for k in tops:
         low, mid, high = np.log(np.maximum(total[k - 1 : k + 2], np.finfo(float).tiny))
         bend = low - 2.0 * mid + high
         shift = float(0.5 * (low - high) / bend) if bend < 0.0 else 0.0
-        made.append(Peak(float(found.frequency_hz[k] + shift * step), float(total[k]), float(total[k] / background[k])))
-    return tuple(sorted(made, key=lambda peak: -peak.density))
+        tall.append(
+            Peak(float(spectrum.frequency_hz[k] + shift * step), float(total[k]), float(total[k] / background[k]))
+        )
+    return tuple(sorted(tall, key=lambda peak: -peak.density))
 
 
-def _effective(found: Spectrum) -> float:
+def _effective(spectrum: Spectrum) -> float:
     """How many independent channels the sum of densities is of: (sum)^2 / sum of squares; 1 where one prevails."""
-    mean = found.density.mean(axis=0)
+    mean = spectrum.density.mean(axis=0)
     return float(mean.sum() ** 2 / np.sum(mean**2))
 
 
@@ -229,8 +231,8 @@ def aliases(frequency_hz: float, rate_hz: float, highest_hz: float) -> tuple[flo
     (2.8, 5.0, 10.6)
     """
     folded = abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
-    found = {round(abs(k * rate_hz + s * folded), 9) for k in range(int(highest_hz / rate_hz) + 2) for s in (-1, 1)}
-    return tuple(sorted(f for f in found if 0.0 < f <= highest_hz))
+    alike = {round(abs(k * rate_hz + s * folded), 9) for k in range(int(highest_hz / rate_hz) + 2) for s in (-1, 1)}
+    return tuple(sorted(f for f in alike if 0.0 < f <= highest_hz))
 
 
 def likely_alias(
@@ -280,22 +282,22 @@ class ModeShape:
     first_share: float
 
 
-def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> ModeShape:
+def shape_at(spectrum: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> ModeShape:
     """The shape of a mode from the cross densities about its frequency.
 
-    found           a spectrum of two channels or more
+    spectrum           a spectrum of two channels or more
     frequency_hz    of the mode
     half_width_hz   of the band; 2 bandwidths where it is None
 
     Source: [BRINCKER01] (singular vectors of the spectral matrix are mode shapes); u of a ratio from its coherence
     c, averaged over K: sqrt((1 - c) / (2 K c)) of it, [BENDAT10] chapter 9; NaN where the coherence is below 0.05.
     """
-    half = 2.0 * found.bandwidth_hz if half_width_hz is None else half_width_hz
-    at = np.abs(found.frequency_hz - frequency_hz) <= half
+    half = 2.0 * spectrum.bandwidth_hz if half_width_hz is None else half_width_hz
+    at = np.abs(spectrum.frequency_hz - frequency_hz) <= half
     if not at.any():
         raise ValidityError(f"no frequency of the spectrum within {half:.6g} Hz of {frequency_hz:.6g} Hz")
-    step = float(found.frequency_hz[0])
-    matrix = found.cross[at].sum(axis=0) * step
+    step = float(spectrum.frequency_hz[0])
+    matrix = spectrum.cross[at].sum(axis=0) * step
     values, vectors = np.linalg.eigh(matrix)
     # matrix = conj(x) x': its eigenvector is the conjugate of the shape
     shape = vectors[:, -1].conj()
@@ -303,7 +305,7 @@ def shape_at(found: Spectrum, frequency_hz: float, *, half_width_hz: float | Non
     shape = shape / shape[top]
     power = np.diag(matrix).real
     coherence = np.abs(matrix[top]) ** 2 / np.maximum(power[top] * power, np.finfo(float).tiny)
-    averages = 0.5 * found.degrees * max(1.0, at.sum() * step / found.bandwidth_hz)
+    averages = 0.5 * spectrum.degrees * max(1.0, at.sum() * step / spectrum.bandwidth_hz)
     safe = np.where(coherence > 0.05, np.minimum(coherence, 1.0), np.nan)
     u = np.abs(shape) * np.sqrt((1.0 - safe) / (2.0 * averages * safe))
     return ModeShape(float(frequency_hz), np.sqrt(np.maximum(power, 0.0)), shape, u, float(values[-1] / values.sum()))

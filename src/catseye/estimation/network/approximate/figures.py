@@ -38,13 +38,13 @@ def _attach_level(search: PlacingSearch) -> bool:
     unplaced, covered = set(search.unplaced.tolist()), set[int]()
     frames = []
     for which, station in (key for key, _ in sets.most_common()):
-        seen = {station, *turned.target[turned.which == which].tolist()}
-        if not (seen & unplaced) - covered:
+        members = {station, *turned.target[turned.which == which].tolist()}
+        if not (members & unplaced) - covered:
             continue
         frame = PlacingSearch(rows, np.full(search.xyz.shape, np.nan), {which: 0.0}, search.bodies)
         frame.xyz[station] = 0.0
         frame.spread()
-        covered |= seen & set(np.flatnonzero(np.isfinite(frame.xyz[:, :2]).all(axis=1)).tolist())
+        covered |= members & set(np.flatnonzero(np.isfinite(frame.xyz[:, :2]).all(axis=1)).tolist())
         if np.isfinite(frame.xyz[:, :2]).all(axis=1).sum() > 1:
             frames.append(frame)
     frames.sort(key=lambda f: -int(np.isfinite(f.xyz).sum()))
@@ -145,23 +145,23 @@ def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
     stations = np.unique(rows.origin)
     targets = np.setdiff1d(group, stations)
     ranges = np.array([[distance.get((a, b), np.nan) for b in targets.tolist()] for a in stations.tolist()])
-    found = _unfolded(ranges, float(np.median(rows.sigma)))
-    if found.status != UNFOLDED:
-        return found.status
-    frame.xyz[stations], frame.xyz[targets] = found.stations, found.targets
-    frame.sides |= set(np.concatenate([stations, targets])[found.side_assumed].tolist())
+    unfolding = _unfolded(ranges, float(np.median(rows.sigma)))
+    if unfolding.status != UNFOLDED:
+        return unfolding.status
+    frame.xyz[stations], frame.xyz[targets] = unfolding.stations, unfolding.targets
+    frame.sides |= set(np.concatenate([stations, targets])[unfolding.side_assumed].tolist())
     frame.spread()
     return ""
 
 
 def _unfolded(ranges: np.ndarray, sigma: float) -> Unfolding:
     """The figure; ranger zeros and scales still unknown may make ranges up to 100 times worse than their sigma."""
-    found = unfold(ranges, sigma)
+    unfolding = unfold(ranges, sigma)
     for factor in (10.0, 100.0):
-        if not found.status.startswith(NO_FIT.split("{")[0]):
+        if not unfolding.status.startswith(NO_FIT.split("{")[0]):
             break
-        found = unfold(ranges, factor * sigma)
-    return found
+        unfolding = unfold(ranges, factor * sigma)
+    return unfolding
 
 
 def _clique(distance: dict[tuple[int, int], float]) -> list[int]:

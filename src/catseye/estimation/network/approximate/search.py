@@ -163,14 +163,14 @@ class PlacingSearch:
         """The orientation of every set with a placed station and target: the median over its longer sights."""
         r = self.rows
         known = np.isfinite(self.xyz[:, :2]).all(axis=1)
-        seen = np.flatnonzero((r.code == BEARING) & known[r.origin] & known[r.target])
-        along = self.xyz[r.target[seen]] - self.xyz[r.origin[seen]] + r.shift[seen]
-        turn = np.arctan2(along[:, 0], along[:, 1]) - r.observed[seen]
-        if not len(seen):
+        bearings = np.flatnonzero((r.code == BEARING) & known[r.origin] & known[r.target])
+        along = self.xyz[r.target[bearings]] - self.xyz[r.origin[bearings]] + r.shift[bearings]
+        turn = np.arctan2(along[:, 0], along[:, 1]) - r.observed[bearings]
+        if not len(bearings):
             return
         far = np.hypot(along[:, 0], along[:, 1])
-        order = np.argsort(r.which[seen], kind="stable")
-        sets, first = np.unique(r.which[seen][order], return_index=True)
+        order = np.argsort(r.which[bearings], kind="stable")
+        sets, first = np.unique(r.which[bearings][order], return_index=True)
         for which, part in zip(sets.tolist(), np.split(order, first[1:]), strict=True):
             if which not in self.given and len(part):
                 part = part[far[part] >= 0.3 * far[part].max()]

@@ -112,31 +112,31 @@ def _table(
 
 def _of_group(group: ObservationGroup, variance: np.ndarray, start: np.ndarray) -> Sightings | None:
     """Rows of all kinds but angles and level planes; None for a kind that cannot place a point by itself."""
-    seen: dict[str, Any] = {"observed": group.observed, "variance": variance, "shift": getattr(group, "shift", None)}
+    common: dict[str, Any] = {"observed": group.observed, "variance": variance, "shift": getattr(group, "shift", None)}
     match group:
         case Distances():
-            return _table(RANGE, group.ends, **seen | {"observed": _length(group, start)})
+            return _table(RANGE, group.ends, **common | {"observed": _length(group, start)})
         case FixedDistances():
-            return _table(RANGE, group.ends, **seen)
+            return _table(RANGE, group.ends, **common)
         case HorizontalDistances():
-            return _table(LEVEL, group.ends, **seen | {"observed": _length(group, start)})
+            return _table(LEVEL, group.ends, **common | {"observed": _length(group, start)})
         case Directions():
-            return _table(BEARING, group.ends, **seen, which=group.orientation)
+            return _table(BEARING, group.ends, **common, which=group.orientation)
         case Azimuths():
-            return _table(BEARING, group.ends, **seen, which=GROUND)
+            return _table(BEARING, group.ends, **common, which=GROUND)
         case ZenithAngles():
-            return _table(ZENITH, group.ends, **seen)
+            return _table(ZENITH, group.ends, **common)
         case Inclinations():
             zenith = np.pi / 2 - group.observed + value(start, group.columns[:, 6])
-            return _table(ZENITH, group.ends, **seen | {"observed": zenith})
+            return _table(ZENITH, group.ends, **common | {"observed": zenith})
         case HeightDifferences():
-            return _table(DIFFERENCE, group.ends, **seen, which=2)
+            return _table(DIFFERENCE, group.ends, **common, which=2)
         case Vectors():
             wide = np.broadcast_to(np.zeros(3) if group.shift is None else group.shift, (len(group.origin), 3))
             axis = np.tile(np.arange(3), len(group.origin))
-            return _table(DIFFERENCE, group.ends, **seen | {"shift": np.repeat(wide, 3, axis=0)}, which=axis)
+            return _table(DIFFERENCE, group.ends, **common | {"shift": np.repeat(wide, 3, axis=0)}, which=axis)
         case ObservedCoordinates():
-            return _table(COORDINATE, (group.point, -1), **seen, which=group.axis)
+            return _table(COORDINATE, (group.point, -1), **common, which=group.axis)
     return None
 
 

@@ -153,13 +153,13 @@ class Ties:
         known = np.full(3, np.nan)
         k = self.code == COORDINATE
         known[self.axis[k]] = self.observed[k]
-        found = list(self._polar())
+        origins = list(self._polar())
         k = self.code == RANGE
-        if k.sum() >= 3 and not found:
+        if k.sum() >= 3 and not origins:
             both = locate(self.anchor[k], self.observed[None, k])[0][0]
-            found = [x for x in both if np.isfinite(x).all()]
-        if found:
-            return np.where(np.isfinite(known), known, np.array(found))
+            origins = [x for x in both if np.isfinite(x).all()]
+        if origins:
+            return np.where(np.isfinite(known), known, np.array(origins))
         about = self.anchor[self.code != COORDINATE]
         middle = np.nan_to_num(about).sum(axis=0) / np.maximum(np.isfinite(about).sum(axis=0), 1)
         angle = np.arange(12) * np.pi / 6 + 0.1

@@ -179,15 +179,15 @@ class NumpyBlocks:
             high = min(low + step, len(self._first) - 1)
             yield slice(low, high), self._sorted[self._first[low] : self._first[high]]
 
-    def _coupling(self, seen: RangeRows, part: slice) -> np.ndarray:
+    def _coupling(self, linear: RangeRows, part: slice) -> np.ndarray:
         """W of some targets: (t, n, 3)."""
         w = np.zeros((part.stop - part.start, self._stations, self.problem.width, 3))
-        share = seen.g[:, :, None] * seen.a[:, None, :]
-        at = (seen.target - part.start, seen.station)
+        share = linear.g[:, :, None] * linear.a[:, None, :]
+        at = (linear.target - part.start, linear.station)
         if self._repeated:
             np.add.at(w, at, share)
         else:
-            used = self.problem.root[seen.rows] > 0.0  # a range left out may repeat a used one
+            used = self.problem.root[linear.rows] > 0.0  # a range left out may repeat a used one
             w[at[0][used], at[1][used]] = share[used]
         return w.reshape(len(w), self._size, 3)
 
@@ -198,20 +198,20 @@ class NumpyBlocks:
         inverse, own, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
         cost = gain = moment = 0.0
         for part, rows in self._chunks():
-            seen = linearise(problem, state, rows, problem.root[rows])
-            v, b = self._targets(seen, part, state)
+            linear = linearise(problem, state, rows, problem.root[rows])
+            v, b = self._targets(linear, part, state)
             inverse[part], condition[part] = invert_targets(v, problem.free_targets[part])
             own[part] = np.einsum("tij,tj->ti", inverse[part], b)
-            w = self._coupling(seen, part)
+            w = self._coupling(linear, part)
             with np.errstate(invalid="ignore"):  # a singular V is judged by its condition
                 flat = np.ascontiguousarray(w.transpose(1, 0, 2)).reshape(self._size, -1)
                 normal -= flat @ (w @ inverse[part]).transpose(0, 2, 1).reshape(-1, self._size)
                 right -= flat @ own[part].ravel()
                 gain += float(np.sum(own[part] * b))
-            self._stations_alone(seen, normal, before, right)
-            cost += float(seen.misclosure @ seen.misclosure)
-            moment += float(np.sum((problem.root[rows] * seen.length) ** 2))
-            if np.any((seen.length == 0.0) & (problem.root[rows] > 0.0)):
+            self._stations_alone(linear, normal, before, right)
+            cost += float(linear.misclosure @ linear.misclosure)
+            moment += float(np.sum((problem.root[rows] * linear.length) ** 2))
+            if np.any((linear.length == 0.0) & (problem.root[rows] > 0.0)):
                 cost = np.nan
         return Reduced((normal + normal.T) / 2, before, right, inverse, own, condition, cost, gain, moment)
 
@@ -219,15 +219,15 @@ class NumpyBlocks:
         """The right side and cost at a state close to that of `old`, whose matrices are kept."""
         right, own, cost, gain, moment = np.zeros(self._size), np.empty_like(old.own), 0.0, 0.0, 0.0
         for part, rows in self._chunks():
-            seen = linearise(self.problem, state, rows, self.problem.root[rows])
-            b = self._targets(seen, part, state)[1]
+            linear = linearise(self.problem, state, rows, self.problem.root[rows])
+            b = self._targets(linear, part, state)[1]
             own[part] = np.einsum("tij,tj->ti", old.inverse[part], b)
-            short = seen.misclosure - np.einsum("ki,ki->k", seen.a, own[seen.target])
+            short = linear.misclosure - np.einsum("ki,ki->k", linear.a, own[linear.target])
             for i in range(self.problem.width):
-                right[i :: self.problem.width] += np.bincount(seen.station, seen.g[:, i] * short, self._stations)
+                right[i :: self.problem.width] += np.bincount(linear.station, linear.g[:, i] * short, self._stations)
             gain += float(np.sum(own[part] * b))
-            cost += float(seen.misclosure @ seen.misclosure)
-            moment += float(np.sum((self.problem.root[rows] * seen.length) ** 2))
+            cost += float(linear.misclosure @ linear.misclosure)
+            moment += float(np.sum((self.problem.root[rows] * linear.length) ** 2))
         return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
 
     def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
@@ -235,46 +235,46 @@ class NumpyBlocks:
         f = own.shape[2]
         out = np.zeros((self._stations, self.problem.width, f))
         for _, rows in self._chunks():
-            seen = linearise(self.problem, at, rows, self.problem.root[rows])
-            along = np.einsum("ki,kif->kf", seen.a, own[seen.target])
+            linear = linearise(self.problem, at, rows, self.problem.root[rows])
+            along = np.einsum("ki,kif->kf", linear.a, own[linear.target])
             for i in range(self.problem.width):
                 for j in range(f):
-                    out[:, i, j] -= np.bincount(seen.station, seen.g[:, i] * along[:, j], self._stations)
+                    out[:, i, j] -= np.bincount(linear.station, linear.g[:, i] * along[:, j], self._stations)
         return out.reshape(self._size, f)
 
-    def _targets(self, seen: RangeRows, part: slice, state: IterationState) -> tuple[np.ndarray, np.ndarray]:
+    def _targets(self, linear: RangeRows, part: slice, state: IterationState) -> tuple[np.ndarray, np.ndarray]:
         """V and the right side of some targets, priors included."""
-        n, at = part.stop - part.start, seen.target - part.start
+        n, at = part.stop - part.start, linear.target - part.start
         v, b = np.empty((n, 3, 3)), np.empty((n, 3))
         for i in range(3):
-            b[:, i] = np.bincount(at, seen.a[:, i] * seen.misclosure, n)
+            b[:, i] = np.bincount(at, linear.a[:, i] * linear.misclosure, n)
             for j in range(i, 3):
-                v[:, i, j] = v[:, j, i] = np.bincount(at, seen.a[:, i] * seen.a[:, j], n)
+                v[:, i, j] = v[:, j, i] = np.bincount(at, linear.a[:, i] * linear.a[:, j], n)
         if self.problem.target_weight is not None and self.problem.target_value is not None:
             weight = self.problem.target_weight[part]
             v += weight
             b += np.einsum("tij,tj->ti", weight, self.problem.target_value[part] - state.targets[part])
         return v, b
 
-    def _stations_alone(self, seen: RangeRows, normal: np.ndarray, before: np.ndarray, right: np.ndarray) -> None:
+    def _stations_alone(self, linear: RangeRows, normal: np.ndarray, before: np.ndarray, right: np.ndarray) -> None:
         """Add the sums of g g' and g misclosure of some ranges."""
         s, p = self._stations, self.problem.width
         first = np.arange(s) * p
         for i in range(p):
-            right[first + i] += np.bincount(seen.station, seen.g[:, i] * seen.misclosure, s)
+            right[first + i] += np.bincount(linear.station, linear.g[:, i] * linear.misclosure, s)
             for j in range(p):
-                normal[first + i, first + j] += np.bincount(seen.station, seen.g[:, i] * seen.g[:, j], s)
-            before[first + i] += np.bincount(seen.station, seen.g[:, i] ** 2, s)
+                normal[first + i, first + j] += np.bincount(linear.station, linear.g[:, i] * linear.g[:, j], s)
+            before[first + i] += np.bincount(linear.station, linear.g[:, i] ** 2, s)
 
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """The targets' step (T, 3) that belongs to a step (n,) of the stations' parameters."""
         moved = np.empty_like(reduced.own)
         by_station = step.reshape(self._stations, -1)
         for part, rows in self._chunks():
-            seen = linearise(self.problem, state, rows, self.problem.root[rows])
-            along = np.einsum("ij,ij->i", seen.g, by_station[seen.station])
-            at, n = seen.target - part.start, part.stop - part.start
-            total = np.stack([np.bincount(at, seen.a[:, i] * along, n) for i in range(3)], axis=1)
+            linear = linearise(self.problem, state, rows, self.problem.root[rows])
+            along = np.einsum("ij,ij->i", linear.g, by_station[linear.station])
+            at, n = linear.target - part.start, part.stop - part.start
+            total = np.stack([np.bincount(at, linear.a[:, i] * along, n) for i in range(3)], axis=1)
             moved[part] = reduced.own[part] - np.einsum("tij,tj->ti", reduced.inverse[part], total)
         return moved
 
@@ -288,15 +288,15 @@ class NumpyBlocks:
         blocks = q.reshape(self._stations, problem.width, self._stations, problem.width)
         for part, rows in self._chunks():
             used = linearise(problem, at, rows, problem.root[rows])
-            seen = linearise(problem, at, rows, 1.0 / problem.sigma[rows])
+            linear = linearise(problem, at, rows, 1.0 / problem.sigma[rows])
             y = -self._coupling(used, part) @ inverse[part]  # dx_target = y' dx_stations + ..., (t, n, 3)
             cross = q @ y
             covariance[part] = inverse[part] + y.transpose(0, 2, 1) @ cross
-            t, s = seen.target - part.start, seen.station
+            t, s = linear.target - part.start, linear.station
             between = cross.reshape(len(y), self._stations, problem.width, 3)[t, s]
-            h[rows] = np.einsum("ki,kij,kj->k", seen.g, blocks[s, :, s, :], seen.g)
-            h[rows] += 2.0 * np.einsum("ki,kij,kj->k", seen.g, between, seen.a)
-            h[rows] += np.einsum("ki,kij,kj->k", seen.a, covariance[seen.target], seen.a)
+            h[rows] = np.einsum("ki,kij,kj->k", linear.g, blocks[s, :, s, :], linear.g)
+            h[rows] += 2.0 * np.einsum("ki,kij,kj->k", linear.g, between, linear.a)
+            h[rows] += np.einsum("ki,kij,kj->k", linear.a, covariance[linear.target], linear.a)
             misclosure[rows] = linearise(problem, answer, rows, 1.0 / problem.sigma[rows]).misclosure
         return Statistics(covariance, *judged(problem, h, misclosure))
 

@@ -380,6 +380,6 @@ class _Iteration:
             everywhere[conditions.points] = own
             h = h + self.blocks.felt(self.at, everywhere)
             gauge = Gauge(motions, null, conditions.points, own @ back.T)
-        carried, seen = null @ back, h.T @ q
-        moved = carried @ seen
-        return q - moved - moved.T + carried @ (seen @ h + spread) @ carried.T, gauge
+        carried, taken = null @ back, h.T @ q
+        moved = carried @ taken
+        return q - moved - moved.T + carried @ (taken @ h + spread) @ carried.T, gauge

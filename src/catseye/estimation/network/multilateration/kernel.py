@@ -56,7 +56,7 @@ class KernelBlocks:
             slots, ends = slots_of(problem.station, first, rows, order, stations, LANES)
         inflation = np.zeros(0) if problem.inflation is None else problem.inflation
         ranges = problem.station, problem.distance, problem.sigma, inflation
-        observed, root, self._index = fill(*ranges, first, rows, order, ends, slots, LANES)
+        observed, root, self._index = fill(ranges, first, rows, order, ends, slots, LANES)
         self._packed = slots, ends, order, observed, root
 
     def reduce(self, state: IterationState) -> Reduced:
@@ -66,7 +66,7 @@ class KernelBlocks:
         normal, before, right = np.zeros((n, n)), np.zeros(n), np.zeros(n)
         inverse, own, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
         cost, gain, moment = _reduce(
-            *self._packed,
+            self._packed,
             (state.stations, state.targets, state.zero, state.scale),
             self._free,
             *self._priors,
@@ -80,21 +80,21 @@ class KernelBlocks:
         """See `NumpyBlocks.follow`."""
         right, own = np.zeros_like(old.right), np.empty_like(old.own)
         points = (state.stations, state.targets, state.zero, state.scale)
-        cost, gain, moment = _follow(*self._packed, points, *self._priors, old.inverse, self.problem.width, right, own)
+        cost, gain, moment = _follow(self._packed, points, *self._priors, old.inverse, self.problem.width, right, own)
         return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
 
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """Back-substitution, as `NumpyBlocks.back`."""
         moved = np.empty((len(self._free), 3))
         points = (state.stations, state.targets, state.zero, state.scale)
-        _back(*self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
+        _back(self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
         return moved
 
     def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
         """Redundancy numbers, as `NumpyBlocks.felt`."""
         out = np.zeros((own.shape[2], self.problem.free_stations.size))
         points = (at.stations, at.targets, at.zero, at.scale)
-        _felt(*self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
+        _felt(self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
         return out.T
 
     def statistics(self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray) -> Statistics:
@@ -106,8 +106,8 @@ class KernelBlocks:
         inflated = self.problem.inflation is not None
         claimed = gather(1.0 / self.problem.sigma, self._index) if inflated else self._packed[-1]
         tests = (NONCENTRALITY, UNCHECKED)
-        layout = (claimed, self._index, self.problem.width)
-        _statistics(*self._packed, *layout, points, ends, inverse, q, tests, covariance, out)
+        claims = (claimed, self._index, self.problem.width)
+        _statistics(self._packed, claims, (points, ends), inverse, q, tests, covariance, out)
         return Statistics(covariance, *out)
 
 
@@ -390,8 +390,9 @@ def _pairs(slots, low, count, rows, local, width, sums):
 
 
 @njit(cache=True, error_model="numpy")
-def _reduce(slots, ends, order, distance, root, points, free, prior_weight, prior_value, width, sums, solved):
+def _reduce(packed, points, free, prior_weight, prior_value, width, sums, solved):
     """Fill the sums (normal, before, right) and what is solved a target; returns cost, b' V^-1 b, sum of (root D)^2."""
+    slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     inverse, own, condition = solved
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
@@ -453,8 +454,9 @@ def _short(row, y, at, width, right):
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(slots, ends, order, distance, root, points, prior_weight, prior_value, inverse, width, right, own):
+def _follow(packed, points, prior_weight, prior_value, inverse, width, right, own):
     """Fill right (n,) and own (t, 3) with V^-1 as it was; returns cost, b' V^-1 b, sum of (root D)^2."""
+    slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
     x, y, v = np.empty(3 * LANES), np.empty(3 * LANES), np.empty(9 * LANES)
@@ -477,8 +479,9 @@ def _follow(slots, ends, order, distance, root, points, prior_weight, prior_valu
 
 
 @njit(cache=True, error_model="numpy")
-def _felt(slots, ends, order, distance, root, points, own, width, out):
+def _felt(packed, points, own, width, out):
     """Fill out (f, n) with minus the sums of g a' own, own (f, t, 3)."""
+    slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
     x, y = np.empty(3 * LANES), np.empty(3 * LANES)
@@ -496,7 +499,7 @@ def _felt(slots, ends, order, distance, root, points, own, width, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _seen(row, step, width, total):
+def _add_along(row, step, width, total):
     """Add a (g . step) of one slot to the sums of its targets."""
     sx, sy, sz = -step[0], -step[1], -step[2]
     s3, s4 = (step[3], step[4]) if width > 3 else (0.0, 0.0)
@@ -509,8 +512,9 @@ def _seen(row, step, width, total):
 
 
 @njit(cache=True, error_model="numpy")
-def _back(slots, ends, order, distance, root, points, inverse, own, step, width, moved):
+def _back(packed, points, inverse, own, step, width, moved):
     """The targets' step V^-1 (b - W' step): `moved` (t, 3)."""
+    slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     row, x, total = np.empty(ROWS * LANES), np.empty(3 * LANES), np.empty(3 * LANES)
     for b in range(len(ends) - 1):
@@ -519,7 +523,7 @@ def _back(slots, ends, order, distance, root, points, inverse, own, step, width,
         for k in range(ends[b], ends[b + 1]):
             s = slots[k]
             _directions(x, stations[s], zero[s], scale[s], distance[k], root[k], row)
-            _seen(row, step[s * width : (s + 1) * width], width, total)
+            _add_along(row, step[s * width : (s + 1) * width], width, total)
         for lane in range(min(LANES, len(order) - b * LANES)):
             t = order[b * LANES + lane]
             for i in range(3):
@@ -688,11 +692,14 @@ def _scatter(index, values, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _statistics(
-    slots, ends, order, distance, root, claimed, index, width, points, answer, inverse, q, tests, covariance, out
-):
-    """Fill the targets' covariance (t, 3, 3) and the four statistics of the ranges, each (m,)."""
-    stations, targets, zero, scale = points
+def _statistics(packed, claims, states, inverse, q, tests, covariance, out):
+    """Fill the targets' covariance (t, 3, 3) and the four statistics of the ranges, each (m,).
+
+    `claims` are root weights as claimed, the ranges' rows and the width; `states` where directions are, and the answer.
+    """
+    slots, ends, order, distance, root = packed
+    claimed, index, width = claims
+    (stations, targets, zero, scale), answer = states
     most = np.max(ends[1:] - ends[:-1])
     rows, f, own = np.empty((most, ROWS * LANES)), np.empty((most, 3 * LANES)), np.empty((most, LANES))
     x, y, m, local = np.empty(3 * LANES), np.empty(3 * LANES), np.empty(6 * LANES), np.empty(6 * LANES)

@@ -66,8 +66,12 @@ def slots_of(station, first, rows, order, stations, lanes):
 
 
 @njit(cache=True, error_model="numpy")
-def fill(station, distance, sigma, inflation, first, rows, order, ends, slots, lanes):
-    """Distance, root weight and row of the range in every slot and lane: (slots, lanes); 0, 0 and -1 without one."""
+def fill(ranges, first, rows, order, ends, slots, lanes):
+    """Distance, root weight and row of the range in every slot and lane: (slots, lanes); 0, 0 and -1 without one.
+
+    `ranges` are station, distance, sigma and inflation, (m,) each.
+    """
+    station, distance, sigma, inflation = ranges
     shape = (len(slots), lanes)
     observed, weight, index = np.zeros(shape), np.zeros(shape), np.full(shape, -1, np.int32)
     for b in range(len(ends) - 1):

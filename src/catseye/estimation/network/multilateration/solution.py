@@ -134,9 +134,9 @@ class RangingSolution:
         place = np.full(len(self.targets), -1)
         place[targets] = np.arange(len(targets))
         rows = np.flatnonzero(place[problem.target] >= 0)
-        seen = linearise(problem, self._at, rows, problem.root[rows])
+        linear = linearise(problem, self._at, rows, problem.root[rows])
         y = np.zeros((len(targets), len(self.stations), self.width, 3))
-        np.add.at(y, (place[seen.target], seen.station), -seen.g[:, :, None] * seen.a[:, None, :])
+        np.add.at(y, (place[linear.target], linear.station), -linear.g[:, :, None] * linear.a[:, None, :])
         return self._inverse[targets] @ y.reshape(len(targets), len(self.covariance), 3).transpose(0, 2, 1)
 
     def joined(self, first: "Mapped", second: "Mapped") -> np.ndarray:

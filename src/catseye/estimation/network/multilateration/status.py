@@ -112,9 +112,9 @@ def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]
 
 def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], part: np.ndarray) -> str:
     """Why the reduced system is singular, `part` (n,) the share of each station parameter in what floats."""
-    found = pieces(problem, names, joined)
-    if len(found) > 1:
-        return PIECES.format(count=len(found), pieces=" and ".join(found[:3]))
+    parts = pieces(problem, names, joined)
+    if len(parts) > 1:
+        return PIECES.format(count=len(parts), pieces=" and ".join(parts[:3]))
     worst = np.argsort(-np.round(part / part.max(), 6), kind="stable")  # roundoff must not change the order
     called = [names.parameter(int(i), problem.width) for i in worst if part[i] > 1e-3 * part.max()]
     return RANK_DEFICIENT.format(names=listed(called))
@@ -128,8 +128,8 @@ def contradiction(problem: Problem, state: IterationState, names: Names, statist
     if median < BELIEVABLE:
         return None
     s = len(problem.free_stations)
-    seen = np.maximum(np.bincount(problem.station[rows], minlength=s), 1)
-    by_station = np.bincount(problem.station[rows], misclosure**2, s) / seen
+    counts = np.maximum(np.bincount(problem.station[rows], minlength=s), 1)
+    by_station = np.bincount(problem.station[rows], misclosure**2, s) / counts
     where = names.station(int(np.argmax(by_station)))
     if statistics is not None:
         i = rows[np.argmax(np.abs(statistics.standardised[rows]))]

@@ -164,9 +164,9 @@ def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> G
     weight = np.linalg.inv(covariance)
     own = np.einsum("kii->ki", weight)
     pv = np.einsum("kij,kj->ki", weight, off)
-    seen = weight @ q
-    visible = np.maximum(own - np.einsum("kij,kji->ki", seen, weight), UNCHECKED * own).ravel()
-    redundancy = 1.0 - np.einsum("kii->ki", seen)
+    leverage = weight @ q
+    visible = np.maximum(own - np.einsum("kij,kji->ki", leverage, weight), UNCHECKED * own).ravel()
+    redundancy = 1.0 - np.einsum("kii->ki", leverage)
     return GroupFit(
         name,
         np.ones(off.size, dtype=bool),

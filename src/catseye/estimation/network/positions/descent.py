@@ -61,20 +61,20 @@ def least_squares_positions(r: Ranges, start: Starts) -> tuple[Descent, np.ndarr
     Undamped steps come first: uphill and down again they pass narrow valleys where damped ones creep. Where they do not
     go smoothly, damped ones go from both mirror images.
     """
-    found = descend(r, start.foot + (start.sign * start.height)[:, None] * start.normal, damped=False)
-    good = found.ended & (found.bend < BENT) & (found.pvv <= np.where(r.count > 3, _most(r.count), 1.0))
-    good &= start.sign * start.height * _over(found, start) > 0.0  # not over to the other image
+    descent = descend(r, start.foot + (start.sign * start.height)[:, None] * start.normal, damped=False)
+    good = descent.ended & (descent.bend < BENT) & (descent.pvv <= np.where(r.count > 3, _most(r.count), 1.0))
+    good &= start.sign * start.height * _over(descent, start) > 0.0  # not over to the other image
     rest = np.flatnonzero(~good)
     status = np.full(len(r.d), PositionStatus.FOUND, dtype=np.int8)
     if len(rest):
         best, status[rest] = _better_image(r.of(rest), start.of(rest))
-        found.put(rest, best)
-    return found, status
+        descent.put(rest, best)
+    return descent, status
 
 
-def _over(found: Descent, start: Starts) -> np.ndarray:
+def _over(descent: Descent, start: Starts) -> np.ndarray:
     """Heights (k,) of the ends over the stations' plane."""
-    return np.sum((found.x - start.foot) * start.normal, axis=1)
+    return np.sum((descent.x - start.foot) * start.normal, axis=1)
 
 
 def _most(count: np.ndarray) -> np.ndarray:
@@ -99,18 +99,18 @@ def _better_image(r: Ranges, start: Starts) -> tuple[Descent, np.ndarray]:
     return best, status
 
 
-def _verdict(r: Ranges, found: Descent) -> np.ndarray:
+def _verdict(r: Ranges, descent: Descent) -> np.ndarray:
     """Status of each descent's end, as if it had been the only one."""
-    apart = np.linalg.norm(found.x[:, None, :] - r.stations, axis=2)
+    apart = np.linalg.norm(descent.x[:, None, :] - r.stations, axis=2)
     at_station = (apart < 4.0 * np.where(r.u < np.inf, r.u, 0.0)).any(axis=1)
-    flat = ~(found.bend < BENT)
+    flat = ~(descent.bend < BENT)
     return np.select(
         [
             flat & at_station,
-            flat & (found.pvv > MISSED**2 * r.count),
+            flat & (descent.pvv > MISSED**2 * r.count),
             flat,
-            ~found.ended,
-            (r.count > 3) & (found.pvv > _most(r.count)),
+            ~descent.ended,
+            (r.count > 3) & (descent.pvv > _most(r.count)),
         ],
         [
             PositionStatus.AT_STATION,

@@ -106,8 +106,8 @@ def positions(
 
     >>> s = np.array([[0.0, 0, 0], [50, 0, 1], [0, 50, 2], [50, 50, 9]])
     >>> d = np.linalg.norm(np.array([20.0, 10, 30]) - s, axis=1)
-    >>> found = positions(s, [d, [30.0, 40, np.nan, np.nan]], np.full(4, 1e-4))
-    >>> np.round(found.x[0], 6).tolist(), found.text(1)
+    >>> points = positions(s, [d, [30.0, 40, np.nan, np.nan]], np.full(4, 1e-4))
+    >>> np.round(points.x[0], 6).tolist(), points.text(1)
     ([20.0, 10.0, 30.0], 'seen by 2 ranges only: three are needed; measure from another station')
     """
     s, targets = _checked(stations, distances, sigma, near)
@@ -194,10 +194,10 @@ def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lane
         return
     ranges, which, lanes = ranges.of(possible), which[possible], lanes[possible]
     start = starts(planes, which, ranges.d, ranges.u, near=chunk.of(possible).near)
-    found, status = descent.least_squares_positions(ranges, start)
+    solution, status = descent.least_squares_positions(ranges, start)
     answered = status <= PositionStatus.CONTRADICTING
-    part.status[lanes], part.pvv[lanes], part.iterations[lanes] = status, found.pvv, found.iterations
-    part.x[lanes[answered]], part.covariance[lanes[answered]] = found.x[answered], found.covariance[answered]
+    part.status[lanes], part.pvv[lanes], part.iterations[lanes] = status, solution.pvv, solution.iterations
+    part.x[lanes[answered]], part.covariance[lanes[answered]] = solution.x[answered], solution.covariance[answered]
 
 
 def _sorted_out(s: np.ndarray, chunk: _Chunk, whole: Planes) -> tuple[descent.Ranges, Planes, np.ndarray, np.ndarray]:

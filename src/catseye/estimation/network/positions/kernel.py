@@ -207,8 +207,12 @@ def _normal_last(m, figure):
 
 
 @_inlined
-def _own_figure(ranges, spread, root, stations, count, flat, figure, m, z, clear):
-    """As `_whole_figure`, each target with the frame of what it sees; not clear where that is a line, or too few."""
+def _own_figure(block, stations, count, flat, figure, m, z, clear):
+    """As `_whole_figure`, each target with the frame of what it sees; not clear where that is a line, or too few.
+
+    `block` are ranges, their spread and the roots of their weights.
+    """
+    ranges, spread, root = block
     _moments(ranges, root, stations, count, figure, m)
     _principal_axes(m, figure)
     _normal_last(m, figure)
@@ -237,15 +241,15 @@ def _closed_start(figure, z, count, near, significant, x, clear):
     which the height then replaces."""
     for j in range(LANES):
         square = -2.0 * z[3, j] / count[j] - z[0, j] * z[0, j] - z[1, j] * z[1, j]
-        told = z[2, j] * z[2, j] > significant * significant * z[4, j]
+        significant_side = z[2, j] * z[2, j] > significant * significant * z[4, j]
         side = (near[0, j] - figure[0, 0, j]) * figure[3, 0, j] + (near[1, j] - figure[0, 1, j]) * figure[3, 1, j]
         side += (near[2, j] - figure[0, 2, j]) * figure[3, 2, j]
-        sign = math.copysign(1.0, z[2, j] if told else side)
+        sign = math.copysign(1.0, z[2, j] if significant_side else side)
         lateral = z[0, j] * z[0, j] * figure[4, 0, j] + z[1, j] * z[1, j] * figure[4, 1, j]
         own = z[2, j] * z[2, j]
-        spread = told and (square < 0.25 * own or own * figure[4, 2, j] < 1.0 / count[j] + lateral)
+        spread = significant_side and (square < 0.25 * own or own * figure[4, 2, j] < 1.0 / count[j] + lateral)
         h = sign * (abs(z[2, j]) if spread else math.sqrt(max(square, 0.0)))
-        clear[j] = clear[j] and h != 0.0 and (told or abs(side) > 0.0)
+        clear[j] = clear[j] and h != 0.0 and (significant_side or abs(side) > 0.0)
         z[4, j] = h
         for c in range(3):
             x[c, j] = figure[0, c, j] + z[0, j] * figure[1, c, j] + z[1, j] * figure[2, c, j] + h * figure[3, c, j]
@@ -346,7 +350,7 @@ def locate(measured, site, limits, answers):
         if whole:
             _whole_figure(ranges, spread, site, figure, z)
         else:
-            _own_figure(ranges, spread, root, site.stations, count, limits.flat, figure, m, z, clear)
+            _own_figure((ranges, spread, root), site.stations, count, limits.flat, figure, m, z, clear)
         _closed_start(figure, z, count, near, limits.significant, at, clear)
         for j in range(lanes):
             answers.good[first + j], answers.ranges[first + j] = False, int(count[j])

@@ -46,15 +46,15 @@ def planes_of(s: np.ndarray, patterns: np.ndarray) -> Planes:
     return Planes(centre, axes, rows, np.sum(q * q, axis=2) / 2, inverse, count, ~held[:, 1])
 
 
-def patterns_of(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def patterns_of(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The distinct rows (p, s) of a table of bools, and which of them each row is."""
-    bits = np.packbits(seen, axis=1)
+    bits = np.packbits(table, axis=1)
     keys = np.zeros((len(bits), -(-bits.shape[1] // 8) * 8), dtype=np.uint8)
     keys[:, : bits.shape[1]] = bits
     words = keys.view(np.uint64)
     words = words[:, 0] if words.shape[1] == 1 else np.ascontiguousarray(words).view(f"V{8 * words.shape[1]}")[:, 0]
     _, index, which = np.unique(words, return_index=True, return_inverse=True)
-    return seen[index], which
+    return table[index], which
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +86,13 @@ def starts(planes: Planes, which: np.ndarray, d: np.ndarray, u: np.ndarray, *, n
     lever = planes.rows[0, 2] if one else planes.rows[which, 2]
     variance = np.sum((lever * d * np.where(u < np.inf, u, 0.0)) ** 2, axis=1)
     square = -2.0 * y.sum(axis=1) / planes.count[which] - z[:, 0] ** 2 - z[:, 1] ** 2
-    told = z[:, 2] ** 2 > SIGNIFICANT**2 * variance
+    sided = z[:, 2] ** 2 > SIGNIFICANT**2 * variance
     bound = np.minimum(planes.inverse[which], 1e200)  # finite, so that nothing times it is nothing
     level = 1.0 / planes.count[which] + np.sum(z[:, :2] ** 2 * bound[:, :2], axis=1)
-    spread = told & ((square < 0.25 * z[:, 2] ** 2) | (z[:, 2] ** 2 * bound[:, 2] < level))
+    spread = sided & ((square < 0.25 * z[:, 2] ** 2) | (z[:, 2] ** 2 * bound[:, 2] < level))
     height = np.where(spread, np.abs(z[:, 2]), np.sqrt(np.maximum(square, 0.0)))
     foot = planes.centre[which] + np.einsum("kc,kca->ka", z[:, :2], planes.axes[which, :2])
     normal, side = planes.axes[which, 2], np.zeros(len(d))
     if near is not None:
         side = np.nan_to_num(np.sign(np.sum((near - planes.centre[which]) * normal, axis=1)))
-    return Starts(foot, height, normal, np.where(told, np.sign(z[:, 2]), side), side)
+    return Starts(foot, height, normal, np.where(sided, np.sign(z[:, 2]), side), side)

@@ -45,9 +45,9 @@ def settle_sides(
     known = known if flat is None else flat
     places, rms = locate(known, table)
     either = _either_side(places, rms, np.isfinite(table).sum(axis=1), sigma=sigma)
-    found = np.isfinite(places[:, 0, 0])
+    placed = np.isfinite(places[:, 0, 0])
     better = np.where(either[:, None], _one_side(known, places, wanted[to]), places[:, 0])
-    wanted[to[found]] = better[found]
+    wanted[to[placed]] = better[placed]
     return either
 
 

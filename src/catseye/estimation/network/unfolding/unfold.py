@@ -69,8 +69,8 @@ def unfold(ranges: np.ndarray, sigma: float, *, seed: int = 0) -> Unfolding:
 
     >>> at = np.random.default_rng(1).uniform(-10, 10, (18, 3))
     >>> ranges = np.linalg.norm(at[:6, None] - at[6:], axis=2)
-    >>> found = unfold(ranges, 1e-3)
-    >>> found.status, bool(np.allclose(np.linalg.norm(found.targets[3] - found.targets[7]),
+    >>> figure = unfold(ranges, 1e-3)
+    >>> figure.status, bool(np.allclose(np.linalg.norm(figure.targets[3] - figure.targets[7]),
     ...                                np.linalg.norm(at[9] - at[13])))
     ('unfolded', True)
     """
@@ -97,16 +97,16 @@ def _fitted(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, si
     """The figure fitted to all ranges between its found points, sides settled, in its own axes; or why it is none."""
     s, t = ranges.shape
     at, to = np.flatnonzero(np.isfinite(stations[:, 0])), np.flatnonzero(np.isfinite(targets[:, 0]))
-    seen, assumed = ranges[np.ix_(at, to)], np.zeros(s + t, dtype=bool)
-    fit = flattest(stations[at], targets[to], seen, sigma=sigma)
+    table, assumed = ranges[np.ix_(at, to)], np.zeros(s + t, dtype=bool)
+    fit = flattest(stations[at], targets[to], table, sigma=sigma)
     if fit.stations.shape[1] == 3:
         stations[at], targets[to] = fit.stations, fit.targets
-        assumed[s + to] = settle_sides(stations[at], targets, to, table=seen.T, sigma=sigma)
-        assumed[at] = settle_sides(targets[to], stations, at, table=seen, sigma=sigma)
-        fit = least_squares(stations[at], targets[to], seen)
+        assumed[s + to] = settle_sides(stations[at], targets, to, table=table.T, sigma=sigma)
+        assumed[at] = settle_sides(targets[to], stations, at, table=table, sigma=sigma)
+        fit = least_squares(stations[at], targets[to], table)
     if fit.rms > FIT * sigma:
         return _none(s, t, NO_FIT.format(rms=fit.rms, sigma=sigma))
-    if loose(fit, seen, sigma):
+    if loose(fit, table, sigma):
         return _none(s, t, LOOSE.format(s=len(at), t=len(to)))
     stations[at], targets[to] = in_space(fit.stations), in_space(fit.targets)
     stations, targets = _oriented(stations, targets)
@@ -119,11 +119,11 @@ def _none(s: int, t: int, status: str) -> Unfolding:
     return Unfolding(*nowhere, np.zeros(s + t, dtype=bool), float("nan"), status)
 
 
-def _complete_part(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _complete_part(measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of a complete part with the most ranges to spare; stations are dropped one at a time."""
     best: tuple[int, np.ndarray, np.ndarray] = (-1, np.zeros(0, int), np.zeros(0, int))
     for turned in (False, True):
-        table = seen.T if turned else seen
+        table = measured.T if turned else measured
         rows = np.arange(len(table))
         while len(rows) >= 3:
             full = np.flatnonzero(table[rows].all(axis=0))
@@ -180,9 +180,9 @@ def _differ(a: FigureFit, b: FigureFit, sigma: float) -> bool:
 
 def _oriented(stations: np.ndarray, targets: np.ndarray) -> Figure:
     """The figure in its own axes, as `Unfolding` states them."""
-    found = stations[np.isfinite(stations[:, 0])]
-    mean = found.mean(axis=0)
-    axes = np.linalg.svd(found - mean)[2]
+    placed = stations[np.isfinite(stations[:, 0])]
+    mean = placed.mean(axis=0)
+    axes = np.linalg.svd(placed - mean)[2]
     axes[2] *= np.sign((np.nanmean(targets, axis=0) - mean) @ axes[2]) or 1.0
     stations, targets = (stations - mean) @ axes.T, (targets - mean) @ axes.T
     if stations[np.isfinite(stations[:, 0])][0, 0] < 0.0:
