@@ -163,22 +163,22 @@ def baseline(
             from catseye.gateways.baseline.files import write_record
 
             day = None if measured_on is None else date.fromisoformat(measured_on)
-            write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
+            write_record(calibration, write, inputs, serial=serial, measured_on=day, by=by, report=report)
 
     try:
-        found, inputs = _calibrated(observations, heights, against, settings, progress)
+        calibration, inputs = _calibrated(observations, heights, against, settings, progress)
         if out is not None:
             from catseye.gateways.baseline.files import write_calibration
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, observations) as directory:
-                write_calibration(found, directory, inputs, progress)
+                write_calibration(calibration, directory, inputs, progress)
                 keep()  # no directory without the record that was asked for, too
         else:
             keep()
     finally:
         progress.clear()
-    _tell(found, json, quiet, out, write)
+    _tell(calibration, json, quiet, out, write)
 
 
 def _calibrated(
@@ -188,8 +188,8 @@ def _calibrated(
     from catseye.records.laboratory.baseline import digest_of, read_baseline, read_heights, read_observations
     from catseye.reduction.baseline.instrument import calibrate_baseline
 
-    seen: BaselineShots = read_observations(observations)
-    inputs = {observations.name: seen.digest}
+    shots: BaselineShots = read_observations(observations)
+    inputs = {observations.name: shots.digest}
     tops: Heights | None = None
     if heights is not None:
         tops = read_heights(heights)
@@ -198,23 +198,23 @@ def _calibrated(
     if against is not None:
         known = read_baseline(against)
         inputs[against.name] = digest_of(against)
-    return calibrate_baseline(seen, tops, known, settings=settings, progress=progress), inputs
+    return calibrate_baseline(shots, tops, known, settings=settings, progress=progress), inputs
 
 
-def _tell(found: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
+def _tell(calibration: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
     from catseye.gateways.baseline.objects import baseline_object, passages, spans
 
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(baseline_object(found)))
+        say(json_line(baseline_object(calibration)))
         return
     if quiet:
         return
-    for passage in passages(found):
+    for passage in passages(calibration):
         say(wrapped(passage.title, passage.text))
-    if len(found.names) <= 12:
-        for a, b, d, u in spans(found):
+    if len(calibration.names) <= 12:
+        for a, b, d, u in spans(calibration):
             say(f"{'':<14}{a:>6} - {b:<6} {d:12.5f} m   u {u * 1e3:.3f} mm")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"))

@@ -132,17 +132,17 @@ def adjust(
             )
             for source in sources
         ]
-        found = [findings(t.solution, scaled=scaled, level=level, pairs=pairs) for t in treated]
+        epochs = [findings(t.solution, scaled=scaled, level=level, pairs=pairs) for t in treated]
         if later is not None:
-            _compared(found, sources, points, level, out, json, quiet, progress)
+            _compared(epochs, sources, points, level, out, json, quiet, progress)
             return
-        if found[0].answered:
-            _write_adjusted(treated[0], found[0], network, out, progress)
+        if epochs[0].answered:
+            _write_adjusted(treated[0], epochs[0], network, out, progress)
     finally:
         progress.clear()
-    if json or found[0].answered:
-        _tell_adjusted(treated[0], found[0], json, quiet, out)
-    if not found[0].answered:
+    if json or epochs[0].answered:
+        _tell_adjusted(treated[0], epochs[0], json, quiet, out)
+    if not epochs[0].answered:
         raise EstimationError(f"{network}: {treated[0].solution.status}")
 
 
@@ -160,7 +160,7 @@ def _read(reader: "Callable[[Path], ObservationNetwork]", source: Path) -> "Obse
 
 
 def _write_adjusted(
-    treated: "AdjustedNetwork", found: "Findings", source: Path, out: Path | None, progress: ProgressLine
+    treated: "AdjustedNetwork", epoch: "Findings", source: Path, out: Path | None, progress: ProgressLine
 ) -> None:
     if out is None:
         return
@@ -168,24 +168,24 @@ def _write_adjusted(
     from catseye.gateways.writers.output import whole_directory
 
     with whole_directory(out, source) as directory:
-        write_network(found, directory, input_hashes(source), progress, treated=treated)
+        write_network(epoch, directory, input_hashes(source), progress, treated=treated)
 
 
-def _tell_adjusted(treated: "AdjustedNetwork", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
+def _tell_adjusted(treated: "AdjustedNetwork", epoch: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
         from catseye.gateways.network.objects import network_json
 
-        say("".join(network_json(found, treated=treated)).rstrip("\n"))
+        say("".join(network_json(epoch, treated=treated)).rstrip("\n"))
         return
     if quiet:
         return
     from catseye.gateways.network.summary import passages, treatment_passages
 
-    for passage in [*passages(found), *treatment_passages(treated, found)]:
+    for passage in [*passages(epoch), *treatment_passages(treated, epoch)]:
         say(wrapped(passage.title, passage.text))
-    if len(found.names) <= 40:
-        for name, x, u in zip(found.names, found.x, found.u, strict=True):
-            axes = zip(found.network.axis_names, x, strict=True)
+    if len(epoch.names) <= 40:
+        for name, x, u in zip(epoch.names, epoch.x, epoch.u, strict=True):
+            axes = zip(epoch.network.axis_names, x, strict=True)
             say(
                 f"{'':<14}{name:<10} "
                 + "  ".join(f"{axis} {value:12.5f}" for axis, value in axes)
@@ -198,7 +198,7 @@ def _tell_adjusted(treated: "AdjustedNetwork", found: "Findings", json: bool, qu
 
 
 def _compared(
-    found: "list[Findings]",
+    epochs: "list[Findings]",
     sources: list[Path],
     points: str | None,
     level: float,
@@ -211,12 +211,12 @@ def _compared(
     from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
     from catseye.gateways.writers.objects import json_line
 
-    for one, source in zip(found, sources, strict=True):
+    for one, source in zip(epochs, sources, strict=True):
         if not one.answered:
             raise EstimationError(f"{source}: {one.solution.status}")
     names = None if points is None else [p.strip() for p in points.split(",") if p.strip()]
-    moved = compare(found[0].solution, found[1].solution, points=names, level=level)
-    compared = ComparedEpochs(found[0], found[1], moved)
+    moved = compare(epochs[0].solution, epochs[1].solution, points=names, level=level)
+    compared = ComparedEpochs(epochs[0], epochs[1], moved)
     if out is not None:
         from catseye.gateways.network.files import input_hashes, write_comparison
         from catseye.gateways.writers.output import whole_directory
@@ -284,11 +284,11 @@ def plan(
         from catseye.records.network.any_file import read_network
         from catseye.reduction.network import measured_on_paper
 
-        read = _read(read_network, network)
+        observed = _read(read_network, network)
         names = None if interest is None else [p.strip() for p in interest.split(",") if p.strip()]
-        worth = planned(read, datum=datum, interest=names, most=most)
+        worth = planned(observed, datum=datum, interest=names, most=most)
         picked = schedule(worth, budget_s=budget_s, shot_s=shot_s) if budget_s is not None else ()
-        runs_made = (
+        scatter = (
             measured_on_paper(
                 worth.solution.network,
                 runs=runs,
@@ -302,30 +302,30 @@ def plan(
             if runs
             else None
         )
-        told = PlanFindings(findings(worth.solution), worth, picked, runs_made)
+        plan_findings = PlanFindings(findings(worth.solution), worth, picked, scatter)
         if out is not None:
             from catseye.gateways.network.files import input_hashes
             from catseye.gateways.network.plan import write_plan
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, network) as directory:
-                write_plan(told, directory, input_hashes(network), progress)
+                write_plan(plan_findings, directory, input_hashes(network), progress)
     finally:
         progress.clear()
-    _tell_plan(told, json, quiet, out)
+    _tell_plan(plan_findings, json, quiet, out)
 
 
-def _tell_plan(told: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
+def _tell_plan(plan_findings: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
         from catseye.gateways.network.plan import plan_json
 
-        say("".join(plan_json(told)).rstrip("\n"))
+        say("".join(plan_json(plan_findings)).rstrip("\n"))
         return
     if quiet:
         return
     from catseye.gateways.network.plan import plan_passages
 
-    for passage in plan_passages(told):
+    for passage in plan_passages(plan_findings):
         say(wrapped(passage.title, passage.text))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, points.csv, candidates.csv, plan.json"))

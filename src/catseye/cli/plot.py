@@ -216,18 +216,18 @@ def _finish(
     from catseye.gateways.writers.objects import json_line
     from catseye.gateways.writers.output import whole_file
 
-    text, told = drawn
+    text, summary = drawn
     for given in inputs:
         if given is not None and given.resolve() == out.resolve():
             raise InputError(f"--out {out}: is an input of this figure (expected another name)")
     with whole_file(out, "--out", MARK) as pieces:
         pieces.append(text.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
     if json:
-        say(json_line({"kind": kind, "written": str(out), **told}))
+        say(json_line({"kind": kind, "written": str(out), **summary}))
     elif not quiet:
-        for line in (*_lines(told), f"written to {out}"):
+        for line in (*_lines(summary), f"written to {out}"):
             say(line)
 
 
-def _lines(told: dict[str, Any]) -> list[str]:
-    return [f"{key.replace('_', ' ')}: {value}" for key, value in told.items() if value not in (None, "")]
+def _lines(summary: dict[str, Any]) -> list[str]:
+    return [f"{key.replace('_', ' ')}: {value}" for key, value in summary.items() if value not in (None, "")]

@@ -167,11 +167,13 @@ def point(
         zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})
     mjd = None if at is None else mjd_of(at)
     place = None if mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
-    found = pointed(stands, mirrors, where)
+    pointings = pointed(stands, mirrors, where)
     station = station_of(stands, mirrors)
-    seen = []
+    sights = []
     if mjd is not None or zones.box:
-        seen = sightings(station, mirrors, found.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones)
+        sights = sightings(
+            station, mirrors, pointings.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones
+        )
     visible = None
     if reflector or facing or solids:
         visible = seen_from(
@@ -182,19 +184,19 @@ def point(
             facing=None if facing is None else np.array(_triple(facing)),
             solids=Solids() if solids is None else read_record(solids, Solids),
             posture=None if posture is None else _angles(posture),
-            reachable=found.allowed | found.prime_allowed,
+            reachable=pointings.allowed | pointings.prime_allowed,
         )
     if write is not None:
         from catseye.gateways.writers.output import whole_file
 
         with whole_file(write, "--write", MARK) as page:
-            page.append(output_dat(found, f"{mirrors.zp} on {stands.monument}"))
+            page.append(output_dat(pointings, f"{mirrors.zp} on {stands.monument}"))
     if json:
         names = {"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp}
-        say(json_line([{**item, **names} for item in pointing_objects(found, seen, visible)]))
+        say(json_line([{**item, **names} for item in pointing_objects(pointings, sights, visible)]))
         return
-    say(pointing_table(found))
+    say(pointing_table(pointings))
     if stands.zp is not None and stands.zp != mirrors.zp:
         say(f"{mirrors.zp} is not the mirror that the record of {stands.monument} names, {stands.zp}")
-    for remark in pointing_remarks(found, seen, visible):
+    for remark in pointing_remarks(pointings, sights, visible):
         say(remark)

@@ -146,15 +146,15 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        made = getattr(importlib.import_module(module), name)
+        head_of = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, SyntaxError) as problem:
         raise InputError(f"--head {factory}: cannot be had: {problem} (expected package.module:factory)") from problem
-    if not callable(made):
+    if not callable(head_of):
         raise InputError(f"--head {factory}: {name} cannot be called (expected a function of a ranger's name)")
     heads: dict[str, RangerHead] = {}
     for ranger in rangers:
         try:
-            head = made(ranger)
+            head = head_of(ranger)
         except (CatseyeError, OSError) as problem:
             raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
         missing = [each for each in dir(RangerHead) if not each.startswith("_") and not hasattr(head, each)]

@@ -179,9 +179,9 @@ def twin_arguments(name: str, world: TwinWords, port_base: int) -> list[str]:
 def listening_of(line: str) -> Listening:
     """Where a child says that it listens. Raises InputError for any other line."""
     try:
-        told = json.loads(line)
-        rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in told["rangers"].items()}
-        feed = None if told["feed"] is None else (str(told["feed"][0]), int(told["feed"][1]))
+        stored = json.loads(line)
+        rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in stored["rangers"].items()}
+        feed = None if stored["feed"] is None else (str(stored["feed"][0]), int(stored["feed"][1]))
     except (ValueError, KeyError, TypeError) as problem:
         raise InputError(f"the twin said {line[:80]!a} (expected where it listens)") from problem
     return Listening(rangers, feed)

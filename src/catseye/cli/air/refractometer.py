@@ -106,12 +106,12 @@ def refractometer(
         changes = {key: value for key, value in given.items() if value is not None}
         progress("calibration", 0, 1)
         known, hashes = read_path_sheet(sheet or readings.with_suffix(".toml"), changes, needed=sheet is not None)
-        found = calibrate_path(read_path_readings(readings, known, hashes))
+        calibration = calibrate_path(read_path_readings(readings, known, hashes))
         if out is not None:
             from catseye.gateways.air.refractometer_report import write_refractometer
 
             with whole_directory(out, readings) as directory:
-                write_refractometer(found, directory, progress)
+                write_refractometer(calibration, directory, progress)
     finally:
         progress.clear()
     from catseye.gateways.air.refractometer_report import passages, refractometer_object
@@ -119,11 +119,11 @@ def refractometer(
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(refractometer_object(found)))
+        say(json_line(refractometer_object(calibration)))
         return
     if quiet:
         return
-    for passage in passages(found):
+    for passage in passages(calibration):
         say(wrapped(passage.title, passage.text))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, group_index.csv, refractometer.json, night.svg"))

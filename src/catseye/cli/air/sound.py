@@ -54,9 +54,9 @@ def sound(
     weather = (temperature_c, pressure_hpa, humidity_percent)
     state = sound_of(*weather, model=model, co2_ppm=co2_ppm)
     u = float(state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm))
-    found = sound_object(state, weather, co2_ppm, u)
+    answer = sound_object(state, weather, co2_ppm, u)
     if json:
-        say(json_line(found))
+        say(json_line(answer))
         return
-    for title, text in sound_rows(found):
+    for title, text in sound_rows(answer):
         say(wrapped(title, text))

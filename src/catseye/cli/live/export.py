@@ -59,8 +59,8 @@ def export(
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        told = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
-        say(json_line(told))
+        summary = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
+        say(json_line(summary))
     elif not quiet:
         rows = ", ".join(f"{count} {name}" for name, count in counts.items())
         say(wrapped("Written to", f"{out}/: run {number}, {rows}."))

@@ -79,8 +79,8 @@ def serve(
         raise typer.BadParameter("a twin that is started again needs ports that stay.", param_hint="'--port-base'")
     if twin and (loopback or addresses is not None or feed is not None or motion_script is not None):
         raise typer.BadParameter("brings its rangers and its feed.", param_hint="'--twin'")
-    made = TwinWords.starting_now if start is not None else TwinWords
-    world = made(mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()))
+    words_of = TwinWords.starting_now if start is not None else TwinWords
+    world = words_of(mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()))
     if twin:
         world.twin(records)  # what it cannot be is refused here
     rangers, source = where_of(

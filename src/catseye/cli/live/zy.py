@@ -101,7 +101,7 @@ def zy(
     if ports is not None and len(names) != 1:
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
     where: Addresses = "loopback" if loopback else port_base
-    told: dict[str, Any] = {
+    options: dict[str, Any] = {
         "addresses": where,
         "host": host,
         "ports": None if ports is None else _pair(ports),
@@ -112,20 +112,20 @@ def zy(
     from catseye.simulator.clock.world_clock import SystemClock
 
     if head is not None:
-        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **told)
+        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **options)
     else:
         from catseye.service.warm import WarmingClock
         from catseye.service.world import TwinWords, twin_heads
 
-        made = TwinWords.starting_now if clock_offset_s is None else TwinWords
+        words_of = TwinWords.starting_now if clock_offset_s is None else TwinWords
         more = {} if clock_offset_s is None else {"offset": clock_offset_s}
-        world = made(
+        world = words_of(
             mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()), **more
         )
         truth, clock = world.twin(records), world.clock()
         warming = None if cold else WarmingClock(clock)
         heads = twin_heads(truth, names, warming or clock)
-        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, **told)
+        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, **options)
     run = LiveRun(lambda: _served(served, lambda at: _say(at, json, quiet), leave_with_stdin))
     run.result()
     leave(run, terminated=0)

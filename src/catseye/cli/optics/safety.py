@@ -61,7 +61,7 @@ def safety(
 
     if scan_period_s is not None and scan_rad_per_s is None:
         raise typer.BadParameter("needs --scan-rad-per-s.", param_hint="'--scan-period-s'")
-    told = safety_object(
+    answer = safety_object(
         Question(
             LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * 1e-3, divergence_mrad * 1e-3, waist_distance),
             edition=edition,
@@ -75,9 +75,9 @@ def safety(
         )
     )
     if json:
-        say(json_line(told))
+        say(json_line(answer))
         return
-    for title, text in safety_passages(told):
+    for title, text in safety_passages(answer):
         say(wrapped(title, text))
-    say("\n" + safety_table(told) + "\n")
-    say(wrapped("Note", told["notice"]))
+    say("\n" + safety_table(answer) + "\n")
+    say(wrapped("Note", answer["notice"]))

@@ -33,12 +33,12 @@ def _one_of(words: str):
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
     try:
-        found = [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if len(found) != count or not all(math.isfinite(v) for v in found):
+        numbers = []
+    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
         raise typer.BadParameter(f"{text!r} is not {what}.")
-    return found
+    return numbers
 
 
 def _pivot(text: str | None) -> str | None:
@@ -159,7 +159,7 @@ def pose(
         progress("fitting", 1, 2)
         chosen = None if points is not None else group or "dish"
         axes = frame or ("reflector" if pointing else "alidade" if tilt else "ground")
-        found = _found(
+        result = _result(
             later,
             before,
             records,
@@ -176,41 +176,41 @@ def pose(
 
             asked = {"group": chosen, "points": points, "frame": axes, "pivot": pivot, "robust": robust}
             with whole_directory(out, epoch) as directory:
-                write_pose(found, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
+                write_pose(result, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
     finally:
         progress.clear()
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(pose_result_object(found)))
+        say(json_line(pose_result_object(result)))
         return
     if quiet:
         return
-    for title, text in pose_words(found):
+    for title, text in pose_words(result):
         say(wrapped(title, text))
-    for name, value, u, unit in pose_rows(found):
+    for name, value, u, unit in pose_rows(result):
         say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-    if found.beam is not None:
+    if result.beam is not None:
         say("\nThe beam (its correction is the opposite)")
-        for name, value, u, unit in beam_rows(found.beam):
+        for name, value, u, unit in beam_rows(result.beam):
             say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-        for name, part in found.beam.terms.items():
+        for name, part in result.beam.terms.items():
             a, b, c = part[0] / ARCSECOND, part[1] / ARCSECOND, part[2] * 1e3
             say(f"{'':<14}{name:<36}{a:+9.3f} {b:+9.3f} arcsec {c:+9.3f} mm")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, points.csv, pose.json"))
 
 
-def _with_posture(points: "SolvedPoints", told: str | None) -> "SolvedPoints":
+def _with_posture(points: "SolvedPoints", posture: str | None) -> "SolvedPoints":
     from dataclasses import replace
 
-    if told is None:
+    if posture is None:
         return points
-    azimuth, elevation = _numbers(told, 2, "AZ,EL in degrees")
+    azimuth, elevation = _numbers(posture, 2, "AZ,EL in degrees")
     return replace(points, posture=(azimuth * DEGREE, elevation * DEGREE))
 
 
-def _found(
+def _result(
     later: "SolvedPoints",
     before: "SolvedPoints | None",
     records: "SiteFolder",
@@ -235,12 +235,12 @@ def _found(
         raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
     site = at_posture(records, *later.posture)
     about = None if pivot is None else np.array(pivot)
-    found = pose_of_group(later, before, site, group=group, points=points, frame=frame, pivot=about, robust=robust)
+    group_pose = pose_of_group(later, before, site, group=group, points=points, frame=frame, pivot=about, robust=robust)
     if tilt is not None:
         x, y, u = (v * ARCSECOND for v in tilt)
-        return PoseResult(pose_with_tilt(found, np.array([x, y]), u), None)
+        return PoseResult(pose_with_tilt(group_pose, np.array([x, y]), u), None)
     if pointing is None:
-        return PoseResult(found, None)
+        return PoseResult(group_pose, None)
     carried = pose_of_group(later, before, site, group=CARRIED[pointing], frame="reflector", robust=robust)
-    cross = cross_covariance(carried, found, site, before)
-    return PoseResult(found, pointing_offset(found.pose, carried.pose, site, cross=cross, optics=pointing))
+    cross = cross_covariance(carried, group_pose, site, before)
+    return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=pointing))

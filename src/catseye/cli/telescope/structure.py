@@ -173,28 +173,28 @@ def _structure(
         e = np.array(asked["elevation_deg"]) * DEGREE
         predicted = fit.predict(e, temperature_c=asked["temperature_c"], way=asked["way"])
         notes += predicted.outside
-    told = structure_object(fit, check, predicted, asked, notes)
+    answer = structure_object(fit, check, predicted, asked, notes)
     if out is not None:
         from catseye.gateways.structure.files import write_structure
         from catseye.gateways.writers.output import whole_directory
 
         with whole_directory(out, source) as directory:
             write_structure(
-                fit, directory, told=told, check=check, predicted=predicted, inputs=given.inputs, progress=progress
+                fit, directory, answer=answer, check=check, predicted=predicted, inputs=given.inputs, progress=progress
             )
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(told))
+        say(json_line(answer))
     elif not quiet:
-        _tell(fit, told, predicted, out)
+        _tell(fit, answer, predicted, out)
 
 
-def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:
+def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:
     import numpy as np
 
     s = fit.series
-    low, high = told["elevation_deg"]
+    low, high = answer["elevation_deg"]
     say(
         wrapped(
             "Structure",
@@ -218,8 +218,8 @@ def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | No
             f"{fit.scatter.u_point * 1e3:.3f} mm of each coordinate are in no function (u).",
         )
     )
-    if told["left_out"] is not None:
-        check = told["left_out"]
+    if answer["left_out"] is not None:
+        check = answer["left_out"]
         say(
             wrapped(
                 "Left out",
@@ -228,13 +228,13 @@ def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | No
             )
         )
     if predicted is not None:
-        for k, e in enumerate(told["prediction"]["elevation_deg"]):
+        for k, e in enumerate(answer["prediction"]["elevation_deg"]):
             for i, name in enumerate(predicted.names):
                 x, y, z = predicted.place[k, i]
                 u_x, u_y, u_z = np.sqrt(np.diag(predicted.covariance[k, i])) * 1e3
                 head = f"At {e:g}°" if i == 0 else ""
                 say(f"{head:<14}{name}  x {x:9.4f}  y {y:9.4f}  z {z:9.4f} m   u {u_x:.3f}, {u_y:.3f}, {u_z:.3f} mm")
-    for note in told["notes"]:
+    for note in answer["notes"]:
         say(wrapped("Note", note))
     if out is not None:
         names = "report.html, structure.json, coefficients.csv, residuals.csv, samplers.fits, provenance.json"
@@ -261,27 +261,27 @@ def _vibration(
         others = [s for s in series if s.ranger == base[0].ranger and s.name != less]
         series = tuple(difference(s, base[0]) for s in others)
     progress("finding modes", 0, 0)
-    found = found_in(series, stretch=stretch_s)
+    vibration = found_in(series, stretch=stretch_s)
     if out is not None:
         from catseye.gateways.structure.files import write_vibration
         from catseye.gateways.writers.output import whole_directory
 
         with whole_directory(out, Path(journal)) as directory:
-            write_vibration(found, directory, zero_mjd=zero_mjd, inputs=inputs, progress=progress)
+            write_vibration(vibration, directory, zero_mjd=zero_mjd, inputs=inputs, progress=progress)
     progress.clear()
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(vibration_object(found)))
+        say(json_line(vibration_object(vibration)))
         return
     if quiet:
         return
-    for s in found.series:
+    for s in vibration.series:
         say(wrapped("Series", f"{s.name}: {len(s.seconds)} ranges, {s.rate_hz:.3f} a second"))
-    for peak in found.peaks[:10]:
+    for peak in vibration.peaks[:10]:
         where = f"{peak.likely_hz:.4g} Hz" if peak.decided else f"{peak.peak.frequency_hz:.4g} Hz, or an alias of it"
         say(wrapped("Peak", f"{where}: {peak.peak.over:.0f} times the background"))
-    for mode in found.modes:
+    for mode in vibration.modes:
         say(
             wrapped(
                 "Mode",
@@ -289,7 +289,7 @@ def _vibration(
                 f"rms {mode.covariance[0, 0] ** 0.5 * 1e6:.1f} µm",
             )
         )
-    for note in found.notes:
+    for note in vibration.notes:
         say(wrapped("Note", note))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, vibration.json, spectra.csv, samplers.fits"))

@@ -149,26 +149,26 @@ def surface(
             positions,
             "axis" if travel == "axis" else "normal",
         )
-        found, hashes = _found(inputs, reading, settings, asked, progress)
+        result, hashes = _result(inputs, reading, settings, asked, progress)
         if out is not None:
             from catseye.gateways.surface.files import write_surface
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, inputs[0]) as directory:
-                write_surface(found, directory, hashes, progress)
-                _keep(found, actuators)  # no directory without the table that was asked for, too
+                write_surface(result, directory, hashes, progress)
+                _keep(result, actuators)  # no directory without the table that was asked for, too
         else:
-            _keep(found, actuators)
+            _keep(result, actuators)
     finally:
         progress.clear()
-    _tell(found, json, quiet, out, actuators)
+    _tell(result, json, quiet, out, actuators)
 
 
-def _keep(found: "SurfaceResult", actuators: Path | None) -> None:
+def _keep(result: "SurfaceResult", actuators: Path | None) -> None:
     if actuators is not None:
         from catseye.gateways.surface.files import write_actuators
 
-        write_actuators(found, actuators)
+        write_actuators(result, actuators)
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ class _Reading:
         return epochs, hashes
 
 
-def _found(
+def _result(
     inputs: list[Path],
     reading: _Reading,
     settings: "ShapeSettings",
@@ -239,7 +239,7 @@ def _found(
     return SurfaceResult(tuple(shapes), change, lookup, table), hashes
 
 
-def _tell(found: "SurfaceResult", json: bool, quiet: bool, out: Path | None, actuators: Path | None) -> None:
+def _tell(result: "SurfaceResult", json: bool, quiet: bool, out: Path | None, actuators: Path | None) -> None:
     from catseye.gateways.surface.objects import (
         actuators_passage,
         change_passages,
@@ -252,23 +252,23 @@ def _tell(found: "SurfaceResult", json: bool, quiet: bool, out: Path | None, act
         from catseye.gateways.surface.files import surface_object
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(surface_object(found)))
+        say(json_line(surface_object(result)))
         return
     if quiet:
         return
     passages = []
-    if found.lookup is not None:
-        passages += lookup_passages(found.lookup)
+    if result.lookup is not None:
+        passages += lookup_passages(result.lookup)
     else:
-        for shape in found.shapes:
+        for shape in result.shapes:
             passages += shape_passages(shape)
-    if found.change is not None:
-        passages += change_passages(found.change)
-    if found.actuators is not None:
-        passages.append(actuators_passage(found.actuators))
+    if result.change is not None:
+        passages += change_passages(result.change)
+    if result.actuators is not None:
+        passages.append(actuators_passage(result.actuators))
     for passage in passages:
         say(wrapped(passage.title, passage.text))
-    for line in term_lines(found.shapes, found.change, found.lookup)[:TERMS_TOLD]:
+    for line in term_lines(result.shapes, result.change, result.lookup)[:TERMS_TOLD]:
         say(f"{'':<14}{line}")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, surface.json, tables of prisms and Zernike terms"))

@@ -126,7 +126,7 @@ def air_plot(
         figure.suptitle(_title(state, here, not_drawn), x=0.01, ha="left", fontweight="bold", fontsize=10.5)
         figure.legend(*_key(pairs), loc="outside lower left", ncols=3)
         text = svg(figure)
-    return text, _told(state, here, parts, not_drawn)
+    return text, _summary(state, here, parts, not_drawn)
 
 
 def _parts(here: AirState, u: dict[str, float]) -> dict[str, float]:
@@ -162,7 +162,7 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
         below.fill_between(x, -whole, whole, color=own, alpha=0.16, lw=0, label="u with the inputs'")
     below.fill_between(x, -formula, formula, color=own, alpha=0.28, lw=0, label="u of the formula")
     below.axhline(0.0, color=own, lw=1.4, label=_name(model))
-    found = set()
+    drawn = set()
     for name in MODELS:
         if name == model:
             continue
@@ -172,9 +172,9 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
             there = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
             other[inside] = air(**there, model=name).group_refractivity / PPM
             below.plot(x, other - index, color=COLOURS[name], lw=1.2, label=_name(name))
-            found.add(name)
+            drawn.add(name)
     below.set_xlabel(variable.label)
-    return found
+    return drawn
 
 
 def _name(model: str) -> str:
@@ -224,11 +224,11 @@ def _draw_parts(figure: Figure, pair, parts: dict[str, float]) -> None:
 
 def _key(pairs) -> tuple[list, list]:
     """Handles and labels of all that is drawn below, once each."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for _, below in pairs[:-1]:
         for handle, label in zip(*below.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return list(found.values()), list(found)
+            handles.setdefault(label, handle)
+    return list(handles.values()), list(handles)
 
 
 def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str:
@@ -241,7 +241,7 @@ def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str
     return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
 
 
-def _told(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
+def _summary(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
     differences = {}
     for name, model in MODELS.items():
         if name != here.model and bool(_inside(model, state, ()).all()):
