@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
+from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.networks import Out, _level
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ def baseline(
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Carrier in vacuum, µm.")] = 0.658,
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 420.0,
     model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
+        str,
+        typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
     ] = "ciddor_hill1999",
     corrected: Annotated[
         bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")

@@ -7,26 +7,11 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.reduction.calibrations.calibration import Calibration
-
-
-KIND_NAMES = (  # as in catseye.reduction.calibrations.kinds, whose import --help spares itself
-    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
-    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
-    "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
-    "monument-place|inclinometer|hydrostatic-level"
-)
-
-
-def _known(kind: str) -> str:
-    from catseye.reduction.calibrations.kinds import KINDS
-
-    if kind not in KINDS:
-        raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
-    return kind
 
 
 @app.command(
@@ -36,7 +21,11 @@ def _known(kind: str) -> str:
 def calibrate(
     kind: Annotated[
         str,
-        typer.Argument(metavar="KIND", callback=_known, help=f"What is calibrated: {KIND_NAMES.replace('|', ', ')}."),
+        typer.Argument(
+            metavar="KIND",
+            callback=one_of(CALIBRATION_KINDS),
+            help=f"What is calibrated: {CALIBRATION_KINDS.replace('|', ', ')}.",
+        ),
     ],
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Table of readings.")],
     sheet: Annotated[

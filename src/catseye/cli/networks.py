@@ -8,6 +8,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
@@ -16,19 +17,7 @@ if TYPE_CHECKING:
     from catseye.gateways.network.plan import PlanFindings
     from catseye.reduction.network import AdjustedNetwork
 
-DATUMS = "free|fixed"
-METHODS = "huber|l1|biweight|igg3"
-COMPONENTS = "rangers|groups"
 SUFFIXES = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
-
-
-def _one_of(words: str) -> Callable[[str | None], str | None]:
-    def check(value: str | None) -> str | None:
-        if value is not None and value not in words.split("|"):
-            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
-        return value
-
-    return check
 
 
 def _level(value: float) -> float:
@@ -48,7 +37,7 @@ Datum = Annotated[
     typer.Option(
         "--datum",
         metavar=DATUMS,
-        callback=_one_of(DATUMS),
+        callback=one_of(DATUMS),
         help="free: nothing held, inner constraints on the marked points; fixed: marked points held. "
         "As the file marks it if not given.",
     ),
@@ -77,14 +66,16 @@ def adjust(
     ] = False,
     robust: Annotated[
         str | None,
-        typer.Option("--robust", metavar=METHODS, callback=_one_of(METHODS), help="Weigh observations robustly."),
+        typer.Option(
+            "--robust", metavar=NETWORK_WEIGHTS, callback=one_of(NETWORK_WEIGHTS), help="Weigh observations robustly."
+        ),
     ] = None,
     components: Annotated[
         str | None,
         typer.Option(
             "--components",
             metavar=COMPONENTS,
-            callback=_one_of(COMPONENTS),
+            callback=one_of(COMPONENTS),
             help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
         ),
     ] = None,

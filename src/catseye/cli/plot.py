@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
+from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.point import time_text
 from catseye.cli.terminal import say
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 
@@ -105,7 +106,7 @@ def air(
     humidity_percent: Annotated[float, typer.Option("--humidity-percent", help="Over liquid water, %.")] = 50.0,
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of vacuum, µm.")] = 0.780,
     model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula of the index.")
+        str, typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula of the index.")
     ] = "ciddor_hill1999",
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,

@@ -8,10 +8,9 @@ import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say
+from catseye.cli.vocabularies import REFLECTORS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
-
-REFLECTORS = "prism|hollow|ball"  # as in catseye.reduction.steering.visibility, whose import --help spares itself
 
 
 def time_text(text: str | None) -> str | None:
@@ -40,12 +39,6 @@ def _triple(text: str) -> list[float]:
     if len(numbers) != 3 or not all(math.isfinite(v) for v in numbers):
         raise typer.BadParameter(f"{text!r} is not x,y,z in metres.")
     return numbers
-
-
-def _kind(name: str | None) -> str | None:
-    if name is not None and name not in REFLECTORS.split("|"):
-        raise typer.BadParameter(f"{name!r} is not one of {', '.join(REFLECTORS.split('|'))}.")
-    return name
 
 
 def _vector(text: str | None) -> str | None:
@@ -115,7 +108,9 @@ def point(
     ] = None,
     reflector: Annotated[
         str | None,
-        typer.Option("--reflector", metavar=REFLECTORS, callback=_kind, help="What stands there: is it visible?"),
+        typer.Option(
+            "--reflector", metavar=REFLECTORS, callback=one_of(REFLECTORS), help="What stands there: is it visible?"
+        ),
     ] = None,
     facing: Annotated[
         str | None,

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, app, known_model, uncertainty
+from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 U = {"callback": uncertainty}
 Temperature = Annotated[float, typer.Option("--temperature-c", help="Air temperature, °C.")]
 Model = Annotated[
-    str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
+    str, typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air.")
 ]
 CarbonDioxide = Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm; only ciddor_hill1999 has it.")]
 

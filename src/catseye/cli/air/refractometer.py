@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app, known_model
+from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 
 SHEET = "as in the sheet if not given"
 
@@ -20,10 +21,6 @@ def _within(low: float, high: float, unit: str) -> Callable[[float | None], floa
         return value
 
     return check
-
-
-def _model(name: str | None) -> str | None:
-    return None if name is None else known_model(name)
 
 
 @app.command(
@@ -45,7 +42,7 @@ def refractometer(
         float | None, typer.Option("--u-path-length-mm", callback=_within(0, 1000, "mm"), help="Of it, mm (1σ).")
     ] = None,
     model: Annotated[
-        str | None, typer.Option("--model", callback=_model, help=f"Formula for the index of air; {SHEET}.")
+        str | None, typer.Option("--model", callback=one_of(AIR_MODELS), help=f"Formula for the index of air; {SHEET}.")
     ] = None,
     wavelength_um: Annotated[
         float | None, typer.Option("--wavelength-um", callback=_within(0.3, 1.7, "µm"), help="Carrier in vacuum, µm.")

@@ -6,18 +6,9 @@ import typer
 
 from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import SOUND_MODELS, one_of
 
-# as in catseye.atmosphere.sound.speed, whose import --help spares itself
-SOUND_MODELS = "parker2004|cramer1993|real_gas"
 U = {"callback": uncertainty}
-
-
-def _known(name: str) -> str:
-    from catseye.atmosphere.sound.speed import MODELS as known
-
-    if name not in known:
-        raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)}.")
-    return name
 
 
 @app.command(
@@ -35,7 +26,7 @@ def sound(
         typer.Option(
             "--model",
             metavar=SOUND_MODELS,
-            callback=_known,
+            callback=one_of(SOUND_MODELS),
             help="Formula; parker2004 is the notes' as printed, real_gas measures temperature.",
         ),
     ] = "parker2004",

@@ -6,14 +6,7 @@ import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say, wrapped
-
-EDITIONS = "iec2014|ansi2014"  # as in catseye.optics.safety.limits, whose import --help spares itself
-
-
-def _known_edition(name: str) -> str:
-    if name not in EDITIONS.split("|"):
-        raise typer.BadParameter(f"{name!r} is not one of {EDITIONS.replace('|', ', ')}.")
-    return name
+from catseye.cli.vocabularies import EDITIONS, one_of
 
 
 @app.command(
@@ -50,7 +43,7 @@ def safety(
         float, typer.Option("--subtense-mrad", help="Angle of the apparent source where the eye is; up to 1.5 a point.")
     ] = 1.5,
     edition: Annotated[
-        str, typer.Option("--edition", metavar=EDITIONS, callback=_known_edition, help="Of the limits.")
+        str, typer.Option("--edition", metavar=EDITIONS, callback=one_of(EDITIONS), help="Of the limits.")
     ] = "iec2014",
     json: Json = False,
 ) -> None:

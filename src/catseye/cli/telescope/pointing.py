@@ -8,6 +8,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import POINTING_TERMS
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from catseye.gateways.pose.pointing_series_objects import Observed
     from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 
-# as in catseye.geometry.antenna.pointing_series, whose import --help spares itself
-TERMS = "IA,IE,CA,NPAE,AW,AN,HZCZ,HZSZ"
+TERMS = POINTING_TERMS.replace("|", ",")
 ZENITH = 89.999  # degrees: nearer, azimuth is not defined
 
 pointing = typer.Typer(

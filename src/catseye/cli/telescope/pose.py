@@ -8,6 +8,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import OPTICS, POSE_FRAMES, POSE_GROUPS, POSE_WEIGHTS, one_of
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 
@@ -16,19 +17,7 @@ if TYPE_CHECKING:
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
 
-# as in catseye.reduction.pose.pose and catseye.estimation.shapes.pose, whose import --help spares itself
-GROUPS, FRAMES = "dish|feed-arm|alidade|subreflector", "ground|alidade|reflector"
-METHODS, OPTICS = "l1|huber|igg3|biweight", "prime|gregorian"
 CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
-
-
-def _one_of(words: str):
-    def check(value: str | None) -> str | None:
-        if value is not None and value not in words.split("|"):
-            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
-        return value
-
-    return check
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
@@ -77,7 +66,9 @@ def pose(
     ] = None,
     group: Annotated[
         str | None,
-        typer.Option("--group", metavar=GROUPS, callback=_one_of(GROUPS), help="What moves as one.  [default: dish]"),
+        typer.Option(
+            "--group", metavar=POSE_GROUPS, callback=one_of(POSE_GROUPS), help="What moves as one.  [default: dish]"
+        ),
     ] = None,
     points: Annotated[
         str | None, typer.Option("--points", metavar="A,B,C,...", help="Points that move as one, instead of a group.")
@@ -85,7 +76,7 @@ def pose(
     frame: Annotated[
         str | None,
         typer.Option(
-            "--frame", metavar=FRAMES, callback=_one_of(FRAMES), help="Axes of the answer.  [default: ground]"
+            "--frame", metavar=POSE_FRAMES, callback=one_of(POSE_FRAMES), help="Axes of the answer.  [default: ground]"
         ),
     ] = None,
     pivot: Annotated[
@@ -99,14 +90,16 @@ def pose(
     ] = None,
     robust: Annotated[
         str | None,
-        typer.Option("--robust", metavar=METHODS, callback=_one_of(METHODS), help="Leave out points that moved alone."),
+        typer.Option(
+            "--robust", metavar=POSE_WEIGHTS, callback=one_of(POSE_WEIGHTS), help="Leave out points that moved alone."
+        ),
     ] = None,
     pointing: Annotated[
         str | None,
         typer.Option(
             "--pointing",
             metavar=OPTICS,
-            callback=_one_of(OPTICS),
+            callback=one_of(OPTICS),
             help="Beam and focus too, from the dish and feed arm (prime) or subreflector (gregorian).",
         ),
     ] = None,

@@ -6,17 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.live.options import one_of
 from catseye.cli.live.replay import RunName, run_of
 from catseye.cli.networks import Out
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import OWN_FUNCTIONS, SERIES_FRAMES, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.structure.epochs import ReadEpochs
     from catseye.reduction.structure.series import Prediction, StructureFit
-
-FRAMES, OWN = "reflector|alidade|ground", "place|each"
 
 
 def _pivot(text: str | None) -> str | None:
@@ -61,7 +59,8 @@ def structure(
     ] = None,
     group: Annotated[str, typer.Option("--group", help="Name of the group, for the report.")] = "group",
     frame: Annotated[
-        str, typer.Option("--frame", metavar=FRAMES, callback=one_of(FRAMES), help="That carries the points.")
+        str,
+        typer.Option("--frame", metavar=SERIES_FRAMES, callback=one_of(SERIES_FRAMES), help="That carries the points."),
     ] = "reflector",
     pivot: Annotated[
         str | None,
@@ -72,7 +71,12 @@ def structure(
     hysteresis: Annotated[bool, typer.Option("--hysteresis", help="Does it matter which way it moved last?")] = False,
     own: Annotated[
         str,
-        typer.Option("--own", metavar=OWN, callback=one_of(OWN), help="Each point: its place, or all functions."),
+        typer.Option(
+            "--own",
+            metavar=OWN_FUNCTIONS,
+            callback=one_of(OWN_FUNCTIONS),
+            help="Each point: its place, or all functions.",
+        ),
     ] = "place",
     scatter: Annotated[
         bool, typer.Option("--scatter/--no-scatter", help="Estimate what is new in each epoch (wind).")

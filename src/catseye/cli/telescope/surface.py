@@ -9,6 +9,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import NUMBERINGS, PARABOLOID_PARTS, PRISM_FRAMES, TRAVELS, one_of
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
@@ -18,25 +19,16 @@ if TYPE_CHECKING:
     from catseye.reduction.surface.actuators import Travel
     from catseye.reduction.surface.shape import Prisms, ShapeSettings
 
-PARTS = ("vertex", "axis", "focal-length")  # as catseye.estimation.shapes.paraboloid, whose import --help spares itself
 TERMS_TOLD = 22  # on a terminal
 
 
 def _free(value: str) -> str:
+    known = PARABOLOID_PARTS.split("|")
     names = [name.strip() for name in value.split(",")] if value != "none" else []
     for name in names:
-        if name not in PARTS:
-            raise typer.BadParameter(f"{name!r} is not one of {', '.join(PARTS)} or none.")
-    return ",".join(name for name in PARTS if name in names)
-
-
-def _one_of(*known: str):
-    def check(value: str) -> str:
-        if value not in known:
-            raise typer.BadParameter(f"{value!r} is not one of {', '.join(known)}.")
-        return value
-
-    return check
+        if name not in known:
+            raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)} or none.")
+    return ",".join(name for name in known if name in names)
 
 
 def _frequencies(values: list[float] | None) -> list[float]:
@@ -80,11 +72,11 @@ def surface(
     ] = None,
     zernike: Annotated[int, typer.Option("--zernike", min=1, max=500, help="How many terms.")] = 15,
     order: Annotated[
-        str, typer.Option("--order", metavar="noll|ansi", callback=_one_of("noll", "ansi"), help="Their numbering.")
+        str, typer.Option("--order", metavar=NUMBERINGS, callback=one_of(NUMBERINGS), help="Their numbering.")
     ] = "noll",
     frame: Annotated[
         str,
-        typer.Option("--frame", metavar="reflector|ground", callback=_one_of("reflector", "ground"), help="Of tables."),
+        typer.Option("--frame", metavar=PRISM_FRAMES, callback=one_of(PRISM_FRAMES), help="Of tables."),
     ] = "reflector",
     azimuth_deg: Annotated[
         float | None, typer.Option("--azimuth-deg", min=-540.0, max=540.0, help="Of tables in the ground frame.")
@@ -105,7 +97,7 @@ def surface(
     ] = None,
     travel: Annotated[
         str,
-        typer.Option("--travel", metavar="normal|axis", callback=_one_of("normal", "axis"), help="Of an actuator."),
+        typer.Option("--travel", metavar=TRAVELS, callback=one_of(TRAVELS), help="Of an actuator."),
     ] = "normal",
     out: Annotated[
         Path | None,
