@@ -1,8 +1,9 @@
 """The command of pointing."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +12,9 @@ from catseye.cli.terminal import say
 from catseye.cli.vocabularies import REFLECTORS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
+
+if TYPE_CHECKING:
+    from catseye.records.site.keep_out import KeepOut
 
 
 def time_text(text: str | None) -> str | None:
@@ -128,18 +132,11 @@ def point(
     """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun, keep-out boxes, visibility."""
     import numpy as np
 
-    from catseye.gateways.steering.pointing_objects import (
-        MARK,
-        output_dat,
-        pointing_objects,
-        pointing_remarks,
-        pointing_table,
-    )
+    from catseye.gateways.steering.pointing_objects import pointing_objects, pointing_remarks, pointing_table
     from catseye.gateways.writers.objects import json_line
     from catseye.geometry.sky.time_tag import mjd_of
     from catseye.records.files.reading import read_record
     from catseye.records.laboratory.coordinate_list import read_coordinates
-    from catseye.records.site.keep_out import KeepOut
     from catseye.records.site.mirror import MirrorGeometry
     from catseye.records.site.monument import MonumentGeometry
     from catseye.records.site.solids import Solids
@@ -150,16 +147,13 @@ def point(
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
     alone = {"--sun-cone-deg": sun_cone_deg, "--latitude-deg": latitude_deg, "--longitude-deg": longitude_deg}
-    for option, value in alone.items():
-        if at is None and value is not None:
-            raise typer.BadParameter("says nothing without --at.", param_hint=f"'{option}'")
-    if posture is not None and solids is None:
-        raise typer.BadParameter("says nothing without --solids.", param_hint="'--posture'")
+    if at is None:
+        _refuse_alone(alone, "--at")
+    if solids is None:
+        _refuse_alone({"--posture": posture}, "--solids")
     stands, mirrors = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
     where = np.array([_triple(text) for text in to or []]) if file is None else read_coordinates(file)
-    zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
-    if sun_cone_deg is not None:
-        zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})
+    zones = _zones(keep_out, sun_cone_deg)
     mjd = None if at is None else mjd_of(at)
     place = None if mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
     pointings = pointed(stands, mirrors, where)
@@ -182,6 +176,7 @@ def point(
             reachable=pointings.allowed | pointings.prime_allowed,
         )
     if write is not None:
+        from catseye.gateways.steering.pointing_objects import MARK, output_dat
         from catseye.gateways.writers.output import whole_file
 
         with whole_file(write, "--write", MARK) as page:
@@ -195,3 +190,20 @@ def point(
         say(f"{mirrors.zp} is not the mirror that the record of {stands.monument} names, {stands.zp}")
     for remark in pointing_remarks(pointings, sights, visible):
         say(remark)
+
+
+def _refuse_alone(values: Mapping[str, Any], needed: str) -> None:
+    for option, value in values.items():
+        if value is not None:
+            raise typer.BadParameter(f"says nothing without {needed}.", param_hint=f"'{option}'")
+
+
+def _zones(keep_out: Path | None, sun_cone_deg: float | None) -> "KeepOut":
+    """What no beam may enter: the boxes of a file, and the Sun's cone, deg, where it is asked for."""
+    from catseye.records.files.reading import read_record
+    from catseye.records.site.keep_out import KeepOut
+
+    zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
+    if sun_cone_deg is None:
+        return zones
+    return zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": sun_cone_deg})})

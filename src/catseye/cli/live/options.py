@@ -14,6 +14,7 @@ from catseye.errors import CatseyeError
 
 if TYPE_CHECKING:
     from catseye.records.site.folder import SiteFolder
+    from catseye.service.coordinator import Orders
     from catseye.service.running import LiveRun
 
 MOTION = "track 145.3 45"
@@ -153,7 +154,7 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
     return SystemClock().now_ns() / PER_DAY
 
 
-def orders_of(*, drop: list[str] | None, **given: Any) -> Any:
+def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
     """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
     from catseye.service.coordinator import Orders
 

@@ -7,18 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.live.groups import TwinOptions, grouped
 from catseye.cli.live.options import (
-    MOTION,
     PORT_BASE,
-    Conditions,
-    Faults,
-    MotionText,
     PortBase,
-    Seed,
     Site,
-    Start,
     leave,
-    mjd_start,
     say_now,
     site_of,
     within,
@@ -54,7 +48,9 @@ def _pair(text: str) -> tuple[int, int]:
     "A person at it: nc 127.0.0.1 24110\n"
     "A real one: catseye zy sites/ours ZY101 --head our.heads:card --host 0.0.0.0 --ports 5240,5241"
 )
+@grouped
 def zy(
+    *,
     site: Site,
     rangers: Annotated[list[str] | None, typer.Argument(metavar="[RANGER ...]", help="Which; all if none.")] = None,
     twin: Annotated[bool, typer.Option("--twin", help="Rangers of the site's twin, with its feed.")] = False,
@@ -62,11 +58,7 @@ def zy(
         str | None,
         typer.Option("--head", metavar="PACKAGE.MODULE:FACTORY", help="A real head: called with the ranger's name."),
     ] = None,
-    seed: Seed = 1,
-    motion: MotionText = MOTION,
-    start: Start = None,
-    conditions: Conditions = "night",
-    fault: Faults = None,
+    simulated: TwinOptions,
     clock_offset_s: Annotated[
         float | None,
         typer.Option(
@@ -115,13 +107,9 @@ def zy(
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **options)
     else:
         from catseye.service.warm import WarmingClock
-        from catseye.service.world import TwinWords, twin_heads
+        from catseye.service.world import twin_heads
 
-        words_of = TwinWords.starting_now if clock_offset_s is None else TwinWords
-        more = {} if clock_offset_s is None else {"offset": clock_offset_s}
-        world = words_of(
-            mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()), **more
-        )
+        world = simulated.world(clock_offset_s)
         truth, clock = world.twin(records), world.clock()
         warming = None if cold else WarmingClock(clock)
         heads = twin_heads(truth, names, warming or clock)

@@ -1,6 +1,7 @@
 """The command of poses."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -133,7 +134,6 @@ def pose(
         raise typer.BadParameter("belongs to --group alidade in the frame alidade.", param_hint="'--tilt'")
     if pointing is not None and (points is not None or frame not in (None, "reflector") or group not in (None, "dish")):
         raise typer.BadParameter("is of the dish in the frame reflector.", param_hint="'--pointing'")
-    from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.network.solved_points import read_solved_points
     from catseye.records.site.folder import read_site
@@ -150,28 +150,30 @@ def pose(
         records = read_site(site)
         inputs = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
         progress("fitting", 1, 2)
-        chosen = None if points is not None else group or "dish"
-        axes = frame or ("reflector" if pointing else "alidade" if tilt else "ground")
-        result = _result(
-            later,
-            before,
-            records,
-            group=chosen,
+        wanted = _Wanted(
+            group=None if points is not None else group or "dish",
             points=None if points is None else [p.strip() for p in points.split(",")],
-            frame=axes,
+            frame=frame or ("reflector" if pointing else "alidade" if tilt else "ground"),
             pivot=None if pivot is None else _numbers(pivot, 3, "x,y,z in metres"),
             robust=robust,
             pointing=pointing,
             tilt=None if tilt is None else _numbers(tilt, 3, "X,Y,U in arc seconds"),
         )
+        result = _result(later, before, records, wanted)
         if out is not None:
             from catseye.gateways.pose.files import write_pose
 
-            asked = {"group": chosen, "points": points, "frame": axes, "pivot": pivot, "robust": robust}
+            asked = {"group": wanted.group, "points": points, "frame": wanted.frame, "pivot": pivot, "robust": robust}
             with whole_directory(out, epoch) as directory:
                 write_pose(result, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
     finally:
         progress.clear()
+    _tell(result, json, quiet, out)
+
+
+def _tell(result: "PoseResult", json: bool, quiet: bool, out: Path | None) -> None:
+    from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
+
     if json:
         from catseye.gateways.writers.objects import json_line
 
@@ -203,18 +205,30 @@ def _with_posture(points: "SolvedPoints", posture: str | None) -> "SolvedPoints"
     return replace(points, posture=(azimuth * DEGREE, elevation * DEGREE))
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Which pose is asked for.
+
+    group      what moves as one, or
+    points     the points that do, by name
+    frame      axes of the answer
+    pivot      of the rotation, m, in the frame; None: the usual one
+    robust     how points that moved alone are left out; None: none is
+    pointing   optics whose beam is derived, too
+    tilt       of an inclinometer, joined: x, y and their u, arc seconds
+    """
+
+    group: str | None
+    points: list[str] | None
+    frame: str
+    pivot: list[float] | None
+    robust: str | None
+    pointing: str | None
+    tilt: list[float] | None
+
+
 def _result(
-    later: "SolvedPoints",
-    before: "SolvedPoints | None",
-    records: "SiteFolder",
-    *,
-    group: str | None,
-    points: list[str] | None,
-    frame: str,
-    pivot: list[float] | None,
-    robust: str | None,
-    pointing: str | None,
-    tilt: list[float] | None,
+    later: "SolvedPoints", before: "SolvedPoints | None", records: "SiteFolder", wanted: _Wanted
 ) -> "PoseResult":
     """The pose, with an inclinometer joined or the beam derived where asked for."""
     import numpy as np
@@ -227,13 +241,22 @@ def _result(
     if later.posture is None:
         raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
     site = at_posture(records, *later.posture)
-    about = None if pivot is None else np.array(pivot)
-    group_pose = pose_of_group(later, before, site, group=group, points=points, frame=frame, pivot=about, robust=robust)
-    if tilt is not None:
-        x, y, u = (v * ARCSECOND for v in tilt)
+    group_pose = pose_of_group(
+        later,
+        before,
+        site,
+        group=wanted.group,
+        points=wanted.points,
+        frame=wanted.frame,
+        pivot=None if wanted.pivot is None else np.array(wanted.pivot),
+        robust=wanted.robust,
+    )
+    if wanted.tilt is not None:
+        x, y, u = (v * ARCSECOND for v in wanted.tilt)
         return PoseResult(pose_with_tilt(group_pose, np.array([x, y]), u), None)
-    if pointing is None:
+    optics = wanted.pointing
+    if optics is None:
         return PoseResult(group_pose, None)
-    carried = pose_of_group(later, before, site, group=CARRIED[pointing], frame="reflector", robust=robust)
+    carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=wanted.robust)
     cross = cross_covariance(carried, group_pose, site, before)
-    return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=pointing))
+    return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))

@@ -31,7 +31,6 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """A calibrated path as `catseye refractometer --json` gives it."""
     sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
-    absolute = calibration.absolute
     counts = Counter(calibration.status)
     return {
         "path": sheet.path,
@@ -61,25 +60,8 @@ def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
         },
         "variance_factor": calibration.variance_factor,
         "degrees_of_freedom": calibration.degrees_of_freedom,
-        "absolute": {
-            "group_index": float(absolute.group_index),
-            "u_group_index": float(absolute.u),
-            "cycles": int(absolute.cycles),
-            "margin": float(absolute.margin),
-            "status": CycleStatus(int(absolute.status)).name.lower(),
-            "path_length_of_weather": calibration.path_length,
-            "u_path_length_of_weather": calibration.u_path_length,
-        },
-        "sections": [
-            {
-                "first_mjd_utc": readings.mjd_utc[s.first],
-                "last_mjd_utc": readings.mjd_utc[s.last],
-                "begins_with": s.reason,
-                "text": s.text,
-                "calibrated": f"index {k + 1}" in calibration.names,
-            }
-            for k, s in enumerate(calibration.followed.sections)
-        ],
+        "absolute": _absolute(calibration),
+        "sections": _sections(calibration),
         "notes": calibration.notes,
         "series": {
             "mjd_utc": readings.mjd_utc,
@@ -90,6 +72,33 @@ def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
             "status": calibration.status,
         },
     }
+
+
+def _absolute(calibration: "PathCalibration") -> dict[str, Any]:
+    absolute = calibration.absolute
+    return {
+        "group_index": float(absolute.group_index),
+        "u_group_index": float(absolute.u),
+        "cycles": int(absolute.cycles),
+        "margin": float(absolute.margin),
+        "status": CycleStatus(int(absolute.status)).name.lower(),
+        "path_length_of_weather": calibration.path_length,
+        "u_path_length_of_weather": calibration.u_path_length,
+    }
+
+
+def _sections(calibration: "PathCalibration") -> list[dict[str, Any]]:
+    readings = calibration.readings
+    return [
+        {
+            "first_mjd_utc": readings.mjd_utc[s.first],
+            "last_mjd_utc": readings.mjd_utc[s.last],
+            "begins_with": s.reason,
+            "text": s.text,
+            "calibrated": f"index {k + 1}" in calibration.names,
+        }
+        for k, s in enumerate(calibration.followed.sections)
+    ]
 
 
 def _parameters(calibration: "PathCalibration") -> dict[str, Any]:

@@ -223,42 +223,6 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
         f"<nav>{links}</nav></header>"
     )
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(plan_findings))
-    cards = [
-        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
-        card(
-            "Weakest point",
-            findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
-            f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
-        ),
-        card(
-            "Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "observations without which a point floats"
-        ),
-        card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
-    ]
-    weakest = table(
-        ("point", "longest axis (mm)", "towards"),
-        [
-            (findings.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(findings, int(i)))
-            for i in plan_findings.weakest[: 5 * LISTED]
-        ],
-        "tnt",
-    )
-    order = np.argsort(-plan_findings.worth, kind="stable")[: 5 * LISTED]
-    holds = table(
-        ("observation", "worth (µm)", "redundancy", "detectable"),
-        [
-            (
-                findings.label(int(k)),
-                "∞" if np.isinf(plan_findings.worth[k]) else f"{plan_findings.worth[k] * 1e6:.4f}",
-                f"{findings.table.redundancy[k]:.3f}",
-                quantity(findings.table.mdb[k], str(findings.table.unit[k]))
-                if np.isfinite(findings.table.mdb[k])
-                else "never",
-            )
-            for k in order
-        ],
-        "tnnn",
-    )
     following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add: none are planned.")
     scheduled = (
         "<h3>In the time given, one after the other</h3>" + _ranges(plan_findings.picked, scheduled=True)
@@ -272,11 +236,16 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
     )
     body = [
         header,
-        section("summary", CONTENTS["summary"], f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
+        section(
+            "summary",
+            CONTENTS["summary"],
+            f'<div class="cards">{"".join(_cards(plan_findings))}</div>',
+            f"<dl>{words}</dl>",
+        ),
         section(
             "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
         ),
-        section("weakest", CONTENTS["weakest"], weakest),
+        section("weakest", CONTENTS["weakest"], _weakest(plan_findings)),
         section(
             "next",
             CONTENTS["next"],
@@ -291,12 +260,61 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
             "observations",
             CONTENTS["observations"],
             paragraph("Worth: how much the mean standard uncertainty would grow were the observation left out."),
-            holds,
+            _worth(plan_findings),
         ),
         section("paper", CONTENTS["paper"], scatter or paragraph("Not asked for (--runs).", "faint")),
         provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
     ]
     return page(f"catseye plan: {name}", "\n".join(body))
+
+
+def _cards(plan_findings: PlanFindings) -> list[str]:
+    findings, plan = plan_findings.findings, plan_findings.plan
+    return [
+        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
+        card(
+            "Weakest point",
+            findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
+            f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
+        ),
+        card(
+            "Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "observations without which a point floats"
+        ),
+        card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
+    ]
+
+
+def _weakest(plan_findings: PlanFindings) -> str:
+    findings, plan = plan_findings.findings, plan_findings.plan
+    return table(
+        ("point", "longest axis (mm)", "towards"),
+        [
+            (findings.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(findings, int(i)))
+            for i in plan_findings.weakest[: 5 * LISTED]
+        ],
+        "tnt",
+    )
+
+
+def _worth(plan_findings: PlanFindings) -> str:
+    """What each observation holds, those of most worth first."""
+    findings = plan_findings.findings
+    order = np.argsort(-plan_findings.worth, kind="stable")[: 5 * LISTED]
+    return table(
+        ("observation", "worth (µm)", "redundancy", "detectable"),
+        [
+            (
+                findings.label(int(k)),
+                "∞" if np.isinf(plan_findings.worth[k]) else f"{plan_findings.worth[k] * 1e6:.4f}",
+                f"{findings.table.redundancy[k]:.3f}",
+                quantity(findings.table.mdb[k], str(findings.table.unit[k]))
+                if np.isfinite(findings.table.mdb[k])
+                else "never",
+            )
+            for k in order
+        ],
+        "tnnn",
+    )
 
 
 def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import FORMAT, PoseResult, beam_rows, pose_result_object, pose_rows, pose_words
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.reduction.pose.pointing_offsets import PointingOffset
 
 HEADER = (
     "point",
@@ -82,7 +84,7 @@ def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -
     from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
 
     drawn = pose_figures(result)
-    group, pose = result.pose, result.pose.pose
+    group = result.pose
     title = f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}"
     header = (
         f"<header><h1>{escape(title)}</h1>"
@@ -90,21 +92,13 @@ def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -
         f"pivot + translation + rotation (first − pivot), turns right-handed</div></header>"
     )
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
-    cards = [
-        card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
-        for k in range(3)
-    ] + [
-        card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
-        for k in range(3)
-    ]
-    kinds = "tnnt"
     body = [
         header,
-        section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
+        section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
         section(
             "pose",
             "Six degrees of freedom",
-            table(("component", "value", "u", "unit"), pose_rows(result), kinds),
+            table(("component", "value", "u", "unit"), pose_rows(result), "tnnt"),
             paragraph("The full covariance is in pose.json; about another pivot, in another frame it follows exactly."),
         ),
         section(
@@ -118,19 +112,7 @@ def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -
         ),
     ]
     if result.beam is not None:
-        terms = [
-            (name, *(f"{part[k] / (ARCSECOND if k < 2 else MILLIMETRE):+.3f}" for k in range(3)))
-            for name, part in result.beam.terms.items()
-        ]
-        body.append(
-            section(
-                "pointing",
-                "Beam and focus",
-                table(("component", "value", "u", "unit"), beam_rows(result.beam), kinds),
-                picture(drawn["terms"], "What the pointing offset is made of; a correction is its opposite."),
-                table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
-            )
-        )
+        body.append(_beam_section(result.beam, drawn["terms"]))
     facts = [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()]
     body.append(
         section(
@@ -141,3 +123,27 @@ def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -
         )
     )
     return page(f"catseye: {title}", "\n".join(body))
+
+
+def _cards(pose: Pose) -> list[str]:
+    return [
+        card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
+        for k in range(3)
+    ] + [
+        card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
+        for k in range(3)
+    ]
+
+
+def _beam_section(beam: PointingOffset, figure: str) -> str:
+    terms = [
+        (name, *(f"{part[k] / (ARCSECOND if k < 2 else MILLIMETRE):+.3f}" for k in range(3)))
+        for name, part in beam.terms.items()
+    ]
+    return section(
+        "pointing",
+        "Beam and focus",
+        table(("component", "value", "u", "unit"), beam_rows(beam), "tnnt"),
+        picture(figure, "What the pointing offset is made of; a correction is its opposite."),
+        table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
+    )
