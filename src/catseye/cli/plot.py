@@ -116,7 +116,7 @@ def air(
     quiet: Quiet = False,
 ) -> None:
     """The index of air against each variable, with its uncertainty and the other models."""
-    from catseye.gateways.air.air_figures import air_plot
+    from catseye.gateways.air.air_figures import StateUncertainty, air_plot
 
     drawn = air_plot(
         temperature_c,
@@ -125,9 +125,7 @@ def air(
         wavelength_um=wavelength_um,
         model=model,
         co2_ppm=co2_ppm,
-        u_temperature_c=u_temperature_c,
-        u_pressure_hpa=u_pressure_hpa,
-        u_humidity_percent=u_humidity_percent,
+        uncertainty=StateUncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent),
     )
     _finish("air", drawn, out, json, quiet)
 

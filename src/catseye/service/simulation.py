@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -14,7 +14,7 @@ from catseye.records.site.folder import SiteFolder
 from catseye.service.book import LiveBook
 from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison
-from catseye.service.coordinator import LiveCoordinator, Orders
+from catseye.service.coordinator import LiveCoordinator, Orders, Peers
 from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.warm import WarmingClock
@@ -88,7 +88,7 @@ class Simulation:
         try:
             at = await _first(heard.get(), twin)
             self.view.tell("starting the coordinator")
-            await self._measure(addresses_of(at), at.feed, self.world.clock(), None, twin)
+            await self._measure(peers_of(at), self.world.clock(), None, twin)
         finally:
             await _ended(twin)
 
@@ -117,14 +117,13 @@ class Simulation:
         try:
             at = await _first(heard.get(), twin)
             self.view.tell("starting the coordinator")
-            await self._measure(addresses_of(at), at.feed, clock, network, twin)
+            await self._measure(peers_of(at), clock, network, twin)
         finally:
             await _ended(twin)
 
     async def _measure(
         self,
-        addresses: Mapping[str, Address],
-        feed: tuple[str, int] | None,
+        peers: Peers,
         clock: Any,
         network: MemoryNetwork | None,
         twin: "asyncio.Task[None]",
@@ -132,8 +131,7 @@ class Simulation:
         running = LiveCoordinator(
             self.site,
             self.orders,
-            addresses=addresses,
-            feed=feed,
+            peers,
             clock=clock,
             seed=self.world.seed,
             network=network,
@@ -187,9 +185,9 @@ def listening_of(line: str) -> Listening:
     return Listening(rangers, feed)
 
 
-def addresses_of(at: Listening) -> dict[str, Address]:
-    """For the coordinator's links."""
-    return {name: Address(host, (first, second)) for name, (host, first, second) in at.rangers.items()}
+def peers_of(at: Listening) -> Peers:
+    """Whom a coordinator connects to: rangers as they listen, and the feed."""
+    return Peers({name: Address(host, (first, second)) for name, (host, first, second) in at.rangers.items()}, at.feed)
 
 
 async def _first(work: Coroutine[Any, Any, Any], *others: "asyncio.Task[Any]") -> Any:

@@ -1,12 +1,8 @@
-"""Groups of options that commands share: on the command line single options, in the command one object."""
+"""Groups of options that the commands of a living site share: the twin, and the coordinator."""
 
-import functools
-import inspect
-from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields, is_dataclass
-from inspect import Parameter
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -34,48 +30,9 @@ from catseye.cli.live.options import (
 )
 
 if TYPE_CHECKING:
-    from catseye.coordinator.link.settings import Address
     from catseye.records.site.folder import SiteFolder
-    from catseye.service.coordinator import Feed, Orders
+    from catseye.service.coordinator import Orders, Peers
     from catseye.service.world import TwinWords
-
-
-def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with each group of options in its signature as the group's single options, in the group's place."""
-    groups: dict[str, type[Any]] = {}
-    parameters: list[Parameter] = []
-    for name, parameter in inspect.signature(command).parameters.items():
-        group: Any = parameter.annotation
-        if is_dataclass(group):
-            groups[name] = group
-            parameters += _options_of(group)
-        else:
-            parameters.append(parameter.replace(kind=Parameter.KEYWORD_ONLY))
-
-    @functools.wraps(command)
-    def run(**given: Any) -> None:
-        built = {
-            name: group(**{option.name: given.pop(option.name) for option in fields(group)})
-            for name, group in groups.items()
-        }
-        command(**given, **built)
-
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
-
-
-def _options_of(group: type[Any]) -> list[Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        Parameter(
-            option.name,
-            Parameter.KEYWORD_ONLY,
-            default=Parameter.empty if option.default is MISSING else option.default,
-            annotation=hints[option.name],
-        )
-        for option in fields(group)
-    ]
 
 
 def _feed(text: str | None) -> str | None:
@@ -171,8 +128,8 @@ class CoordinatorOptions:
             host=self.host,
         )
 
-    def where(self, site: "SiteFolder") -> "tuple[dict[str, Address], Feed]":
-        """Addresses of the rangers, and where weather and telescope are known from."""
+    def peers(self, site: "SiteFolder") -> "Peers":
+        """Rangers and feed that the coordinator connects to."""
         if self.addresses is not None and self.loopback:
             raise typer.BadParameter("says where; --loopback says otherwise.", param_hint="'--addresses'")
         if self.feed is not None and self.motion_script is not None:
@@ -181,6 +138,7 @@ class CoordinatorOptions:
         from catseye.coordinator.link.settings import Address
         from catseye.ranger.addresses import Addresses, feed_address, ranger_addresses
         from catseye.service.addresses import read_addresses
+        from catseye.service.coordinator import Peers
 
         usual: Addresses = "loopback" if self.loopback else self.port_base
         at: tuple[str, int] | None
@@ -190,5 +148,5 @@ class CoordinatorOptions:
             rangers = {n: Address(h, (a, b)) for n, (h, a, b) in ranger_addresses(site, usual).items()}
             at = feed_address(usual)
         if self.motion_script is not None:
-            return rangers, MotionScript.parse(self.motion_script)
-        return rangers, _host_port(self.feed) if self.feed is not None else at
+            return Peers(rangers, MotionScript.parse(self.motion_script))
+        return Peers(rangers, _host_port(self.feed) if self.feed is not None else at)

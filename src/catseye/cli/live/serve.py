@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import Quiet, app
-from catseye.cli.live.groups import CoordinatorOptions, TwinOptions, grouped
+from catseye.cli.live.groups import CoordinatorOptions, TwinOptions
 from catseye.cli.live.options import Site, site_of
 from catseye.cli.live.ziy import LogJson, run_coordinator
+from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
     from catseye.service.logs import LiveLog
@@ -36,20 +37,20 @@ def serve(
     world = simulated.world(offset=0.0 if simulated.start is None else None)
     if twin:
         world.twin(records)  # what it cannot be is refused here
-    where = asked.where(records)
+    peers = asked.peers(records)
 
     async def children(log: "LiveLog") -> None:
         await LiveChild(
             "twin",
             twin_arguments(site, world, asked.port_base),
-            said=lambda line: log.tell("twin", "listens", f"{len(where[0])} rangers and the feed listen"),
+            said=lambda line: log.tell("twin", "listens", f"{len(peers.rangers)} rangers and the feed listen"),
             warned=lambda line: log.tell("twin", "child", line, "warning"),
         ).keep()
 
     run_coordinator(
         records,
         asked.orders(),
-        where,
+        peers,
         offset=world.offset if twin else 0.0,
         seed=simulated.seed if twin else None,
         log_json=log_json,

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catseye.cli.commands import Quiet, app
-from catseye.cli.live.groups import CoordinatorOptions, grouped
+from catseye.cli.live.groups import CoordinatorOptions
 from catseye.cli.live.options import Site, leave, site_of, tell_people, within
+from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping
+    from collections.abc import Callable, Coroutine
 
-    from catseye.coordinator.link.settings import Address
     from catseye.records.site.folder import SiteFolder
-    from catseye.service.coordinator import Feed, Orders
+    from catseye.service.coordinator import Orders, Peers
     from catseye.service.logs import LiveLog
 
 LogJson = Annotated[bool, typer.Option("--log-json", help="The log as one JSON object a line.")]
@@ -38,14 +38,14 @@ def ziy(
 ) -> None:
     """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, tell whoever asks."""
     records = site_of(site)
-    where = asked.where(records)
-    run_coordinator(records, asked.orders(), where, offset=clock_offset_s, log_json=log_json, quiet=quiet)
+    peers = asked.peers(records)
+    run_coordinator(records, asked.orders(), peers, offset=clock_offset_s, log_json=log_json, quiet=quiet)
 
 
 def run_coordinator(
     site: "SiteFolder",
     orders: "Orders",
-    where: "tuple[Mapping[str, Address], Feed]",
+    peers: "Peers",
     *,
     offset: float = 0.0,
     seed: int | None = None,
@@ -55,7 +55,7 @@ def run_coordinator(
 ) -> None:
     """A coordinator with its log on stderr, until a signal.
 
-    where    addresses of the rangers, and where weather and telescope are known from
+    peers    rangers and feed
     offset   s, of its clock against this machine's
     seed     of a simulated site, for the journal
     beside   a coroutine function that runs beside it, told the log: its children
@@ -65,7 +65,6 @@ def run_coordinator(
     from catseye.service.running import LiveRun
     from catseye.simulator.clock.world_clock import SystemClock
 
-    rangers, feed = where
     clock = SystemClock(offset)
     coloured = not log_json and sys.stderr is not None and sys.stderr.isatty()
     log = LiveLog(lambda line: None if quiet else tell_people(line), clock=clock, json=log_json, colour=coloured)
@@ -76,8 +75,7 @@ def run_coordinator(
         running = LiveCoordinator(
             site,
             orders,
-            addresses=rangers,
-            feed=feed,
+            peers,
             clock=clock,
             seed=seed,
             tell=lambda text, alarm: log.tell("journal", "journal", text, "alarm" if alarm else "note"),

@@ -2,12 +2,12 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.live.groups import TwinOptions, grouped
+from catseye.cli.live.groups import TwinOptions
 from catseye.cli.live.options import (
     PORT_BASE,
     PortBase,
@@ -17,12 +17,12 @@ from catseye.cli.live.options import (
     site_of,
     within,
 )
+from catseye.cli.option_groups import grouped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from catseye.ranger.addresses import Addresses
     from catseye.records.site.folder import SiteFolder
     from catseye.service.rangers import Listening, RangersServed
 
@@ -92,19 +92,13 @@ def zy(
     names = _named(records, rangers or [])
     if ports is not None and len(names) != 1:
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
-    where: Addresses = "loopback" if loopback else port_base
-    options: dict[str, Any] = {
-        "addresses": where,
-        "host": host,
-        "ports": None if ports is None else _pair(ports),
-        "files": files,
-    }
-    from catseye.service.rangers import RangersServed, heads_of
+    from catseye.service.rangers import RangersServed, ServedAt, heads_of
     from catseye.service.running import LiveRun
     from catseye.simulator.clock.world_clock import SystemClock
 
+    at = ServedAt("loopback" if loopback else port_base, host, None if ports is None else _pair(ports))
     if head is not None:
-        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **options)
+        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=files)
     else:
         from catseye.service.warm import WarmingClock
         from catseye.service.world import twin_heads
@@ -113,7 +107,7 @@ def zy(
         truth, clock = world.twin(records), world.clock()
         warming = None if cold else WarmingClock(clock)
         heads = twin_heads(truth, names, warming or clock)
-        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, **options)
+        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, at=at, files=files)
     run = LiveRun(lambda: _served(served, lambda at: _say(at, json, quiet), leave_with_stdin))
     run.result()
     leave(run, terminated=0)

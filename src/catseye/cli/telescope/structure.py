@@ -1,5 +1,6 @@
 """The command of the structure: flexible models of groups of points, and vibration."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -14,7 +15,8 @@ from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.structure.epochs import ReadEpochs
-    from catseye.reduction.structure.series import Prediction, StructureFit
+    from catseye.reduction.structure.series import GroupSeries, Prediction, SeriesModel, StructureFit
+    from catseye.reduction.structure.vibration import Vibration
 
 
 def _pivot(text: str | None) -> str | None:
@@ -106,26 +108,37 @@ def structure(
     """Gravity and temperature: how a group of points moves, foretold; and its vibration."""
     if not points:
         raise typer.BadParameter("is needed: a name or a pattern such as 'ZEG*'.", param_hint="'--points'")
-    progress = ProgressLine(quiet)
+    to = _Answer(out, json, quiet, ProgressLine(quiet))
     _refuse(out, [*(sources or []), *([epochs] if epochs else []), *(Path(j) for j in (journal, vibration) if j)])
     try:
         if vibration is not None:
-            _vibration(vibration, points, run, stretch_s, less, out=out, json=json, quiet=quiet, progress=progress)
+            _vibration(vibration, points, run, stretch_s, less, to)
             return
         given = _read(sources, epochs, journal, run, every_s)
+        import numpy as np
+
+        from catseye.reduction.structure.group import group_series
         from catseye.reduction.structure.series import SeriesModel
 
         kind = cast(Literal["place", "each"], own)
         model = SeriesModel(harmonics, temperature, hysteresis, kind, scatter)
-        where = None if pivot is None else [float(v) for v in pivot.split(",")]
+        where = None if pivot is None else np.array([float(v) for v in pivot.split(",")])
         asked = {"elevation_deg": predict or [], "temperature_c": temperature_c, "way": way}
-        _structure(
-            given, points, group, frame, where, correlated=not independent, model=model, folds=folds, asked=asked,
-            out=out, json=json, quiet=quiet, progress=progress,
-            source=Path(journal) if journal else (sources or [epochs or Path()])[0],
-        )  # fmt: skip
+        series = group_series(given.epochs, points, group=group, frame=frame, pivot=where, correlated=not independent)
+        source = Path(journal) if journal else (sources or [epochs or Path()])[0]
+        _structure(given, series, model, folds, asked, source, to)
     finally:
-        progress.clear()
+        to.progress.clear()
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """Where an answer goes: a directory, one JSON object or text; and the line of progress until then."""
+
+    out: Path | None
+    json: bool
+    quiet: bool
+    progress: ProgressLine
 
 
 def _refuse(out: Path | None, inputs: list[Path]) -> None:
@@ -149,10 +162,15 @@ def _read(
 
 
 def _structure(
-    given: "ReadEpochs", points: list[str], group: str, frame: str, pivot: Any,
-    *, correlated: bool, model: Any, folds: int,
-    asked: dict[str, Any], out: Path | None, json: bool, quiet: bool, progress: ProgressLine, source: Path,
-) -> None:  # fmt: skip
+    given: "ReadEpochs",
+    series: "GroupSeries",
+    model: "SeriesModel",
+    folds: int,
+    asked: dict[str, Any],
+    source: Path,
+    to: _Answer,
+) -> None:
+    """The model fitted, checked by epochs left out, foretold where asked; written and told."""
     from dataclasses import replace
 
     import numpy as np
@@ -160,38 +178,42 @@ def _structure(
     from catseye.constants import DEGREE
     from catseye.gateways.structure.objects import structure_object
     from catseye.reduction.structure.check import left_out
-    from catseye.reduction.structure.group import group_series
     from catseye.reduction.structure.series import fit_structure
 
-    series = group_series(given.epochs, points, group=group, frame=frame, pivot=pivot, correlated=correlated)
     notes = given.notes
-    if not correlated:
+    if series.spread.full is None:  # the command was asked to take points as independent
         notes += ("Points of an epoch were taken as independent: what they share makes the claims too small.",)
     if model.temperature and not np.isfinite(np.asarray(series.posture.temperature_c)).any():
         notes += ("No epoch says a temperature: the model has no coefficient of it.",)
         model = replace(model, temperature=False)
     fit = fit_structure(series, model)
-    check = left_out(series, model, folds=folds, progress=progress) if folds else None
+    check = left_out(series, model, folds=folds, progress=to.progress) if folds else None
     predicted = None
     if asked["elevation_deg"]:
         e = np.array(asked["elevation_deg"]) * DEGREE
         predicted = fit.predict(e, temperature_c=asked["temperature_c"], way=asked["way"])
         notes += predicted.outside
     answer = structure_object(fit, check, predicted, asked, notes)
-    if out is not None:
+    if to.out is not None:
         from catseye.gateways.structure.files import write_structure
         from catseye.gateways.writers.output import whole_directory
 
-        with whole_directory(out, source) as directory:
+        with whole_directory(to.out, source) as directory:
             write_structure(
-                fit, directory, answer=answer, check=check, predicted=predicted, inputs=given.inputs, progress=progress
+                fit,
+                directory,
+                answer=answer,
+                check=check,
+                predicted=predicted,
+                inputs=given.inputs,
+                progress=to.progress,
             )
-    if json:
+    if to.json:
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(answer))
-    elif not quiet:
-        _tell(fit, answer, predicted, out)
+    elif not to.quiet:
+        _tell(fit, answer, predicted, to.out)
 
 
 def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:
@@ -246,16 +268,15 @@ def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | 
 
 
 def _vibration(
-    journal: str, points: list[str], run: str | None, stretch_s: float | None, less: str | None,
-    *, out: Path | None, json: bool, quiet: bool, progress: ProgressLine,
-) -> None:  # fmt: skip
+    journal: str, points: list[str], run: str | None, stretch_s: float | None, less: str | None, to: _Answer
+) -> None:
     from catseye.gateways.structure.epochs import read_range_series
     from catseye.gateways.structure.objects import vibration_object
     from catseye.reduction.structure.vibration import difference
     from catseye.reduction.structure.vibration import vibration as found_in
 
     wanted = points if less is None else [*points, less.partition(":")[2]]
-    progress("reading ranges", 0, 0)
+    to.progress("reading ranges", 0, 0)
     series, inputs, zero_mjd = read_range_series(journal, wanted, run=run_of(run))
     if less is not None:
         base = [s for s in series if s.name == less]
@@ -264,22 +285,25 @@ def _vibration(
             raise InputError(f"--less {less}: no such series (the journal has {held})")
         others = [s for s in series if s.ranger == base[0].ranger and s.name != less]
         series = tuple(difference(s, base[0]) for s in others)
-    progress("finding modes", 0, 0)
+    to.progress("finding modes", 0, 0)
     vibration = found_in(series, stretch=stretch_s)
-    if out is not None:
+    if to.out is not None:
         from catseye.gateways.structure.files import write_vibration
         from catseye.gateways.writers.output import whole_directory
 
-        with whole_directory(out, Path(journal)) as directory:
-            write_vibration(vibration, directory, zero_mjd=zero_mjd, inputs=inputs, progress=progress)
-    progress.clear()
-    if json:
+        with whole_directory(to.out, Path(journal)) as directory:
+            write_vibration(vibration, directory, zero_mjd=zero_mjd, inputs=inputs, progress=to.progress)
+    to.progress.clear()
+    if to.json:
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(vibration_object(vibration)))
         return
-    if quiet:
-        return
+    if not to.quiet:
+        _tell_vibration(vibration, to.out)
+
+
+def _tell_vibration(vibration: "Vibration", out: Path | None) -> None:
     for s in vibration.series:
         say(wrapped("Series", f"{s.name}: {len(s.seconds)} ranges, {s.rate_hz:.3f} a second"))
     for peak in vibration.peaks[:10]:

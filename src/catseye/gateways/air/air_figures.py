@@ -4,7 +4,7 @@ The index moves by tens of ppm where its uncertainty is a tenth. So each variabl
 below, enlarged, what the other models differ from the chosen one, over its uncertainty as bands.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,23 @@ VARIABLES = (
 )
 
 
+@dataclass(frozen=True)
+class StateUncertainty:
+    """Standard uncertainties of a state of air, from 0 on, uncorrelated.
+
+    temperature_c      °C
+    pressure_hpa       hPa
+    humidity_percent   % over liquid water
+    """
+
+    temperature_c: float = 0.0
+    pressure_hpa: float = 0.0
+    humidity_percent: float = 0.0
+
+
+CERTAIN = StateUncertainty()
+
+
 def air_plot(
     temperature_c: float,
     pressure_hpa: float,
@@ -79,9 +96,7 @@ def air_plot(
     wavelength_um: float = 0.780,
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
-    u_temperature_c: float = 0.0,
-    u_pressure_hpa: float = 0.0,
-    u_humidity_percent: float = 0.0,
+    uncertainty: StateUncertainty = CERTAIN,
 ) -> tuple[str, dict[str, Any]]:
     """The group index about one state of air as SVG text, and what it says in numbers.
 
@@ -89,14 +104,14 @@ def air_plot(
     wavelength_um   vacuum wavelength, um
     model           a name in MODELS
     co2_ppm         carbon dioxide, ppm, where a model has it
-    u_temperature_c, u_pressure_hpa, u_humidity_percent   standard uncertainties of the state, from 0; uncorrelated
+    uncertainty     of the state
 
     Source: the models'; uncertainty by the law of propagation, [JCGM100] eq. 10. Other models are drawn only where they
     hold, and named in `not_drawn` where they hold nowhere in the figure.
 
     Raises ValidityError for values outside the chosen model's limits, and for uncertainties that are none.
     """
-    u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa, "u_humidity_percent": u_humidity_percent}
+    u = {f"u_{name}": value for name, value in asdict(uncertainty).items()}
     for key, value in u.items():
         UNCERTAINTIES[key].check(value)
     state = {
