@@ -1,18 +1,22 @@
 """The commands of networks: adjust, plan."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.option_groups import grouped
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
     from catseye.estimation.network.model import ObservationNetwork
+    from catseye.estimation.network.monte_carlo import MonteCarloScatter
+    from catseye.estimation.network.plan import Candidate, Plan
     from catseye.gateways.network.findings import Findings
     from catseye.gateways.network.plan import PlanFindings
     from catseye.reduction.network import AdjustedNetwork
@@ -227,36 +231,79 @@ def _compared(
             say(wrapped("Written to", f"{out}/: report.html, displacements.csv, comparison.json, and both epochs"))
 
 
-@app.command(epilog="\b\nExample: catseye plan examples/networks/feed-arm.toml --budget-s 600 --shot-s 5")
-def plan(
-    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
-    datum: Datum = None,
+@dataclass(frozen=True)
+class _Further:
+    """Which points matter, and what further ranges may cost."""
+
     interest: Annotated[
         str | None,
         typer.Option("--interest", metavar="A,B,...", help="Points that matter; all that are not held if not given."),
-    ] = None,
+    ] = None
     budget_s: Annotated[
         float | None,
         typer.Option("--budget-s", callback=_positive, help="Time of every ranger for further ranges, s."),
-    ] = None,
-    shot_s: Annotated[float, typer.Option("--shot-s", callback=_positive, help="Time of one range, s.")] = 5.0,
-    most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20,
-    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1,
+    ] = None
+    shot_s: Annotated[float, typer.Option("--shot-s", callback=_positive, help="Time of one range, s.")] = 5.0
+    most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20
+
+    def plan(self, network: "ObservationNetwork", datum: str | None) -> "tuple[Plan, tuple[Candidate, ...]]":
+        """What the network is worth, and the further ranges that are worth their time most."""
+        from catseye.estimation.network.plan import plan, schedule
+
+        names = None if self.interest is None else [p.strip() for p in self.interest.split(",") if p.strip()]
+        worth = plan(network, datum=datum, interest=names, most=self.most)
+        if self.budget_s is None:
+            return worth, ()
+        return worth, schedule(worth, budget_s=self.budget_s, shot_s=self.shot_s)
+
+
+@dataclass(frozen=True)
+class _OnPaper:
+    """How often the network is measured on paper, and what is wrong with it then."""
+
+    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1
     air_ppm: Annotated[
         float, typer.Option("--air-ppm", min=0.0, help="In the runs: scale error of all ranges together, ppm (1σ).")
-    ] = 0.0,
+    ] = 0.0
     station_ppm: Annotated[
         float, typer.Option("--station-ppm", min=0.0, help="In the runs: scale error of each station's ranges, ppm.")
-    ] = 0.0,
+    ] = 0.0
     refraction: Annotated[
         float,
         typer.Option("--refraction", min=0.0, help="In the runs: spread of the coefficient k of refraction (1σ)."),
-    ] = 0.0,
+    ] = 0.0
     blunders_percent: Annotated[
         float,
         typer.Option("--blunders-percent", min=0.0, max=30.0, help="In the runs: share of gross errors, rejected."),
-    ] = 0.0,
+    ] = 0.0
+
+    def scatter(self, network: "ObservationNetwork", progress: ProgressLine) -> "MonteCarloScatter | None":
+        """How far the runs' coordinates scatter; None where no run was asked for."""
+        from catseye.reduction.network import measured_on_paper
+
+        if not self.runs:
+            return None
+        return measured_on_paper(
+            network,
+            runs=self.runs,
+            seed=self.seed,
+            air_ppm=self.air_ppm,
+            station_ppm=self.station_ppm,
+            refraction=self.refraction,
+            blunders=self.blunders_percent / 100.0,
+            progress=progress,
+        )
+
+
+@app.command(epilog="\b\nExample: catseye plan examples/networks/feed-arm.toml --budget-s 600 --shot-s 5")
+@grouped
+def plan(
+    *,
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
+    datum: Datum = None,
+    asked: _Further,
+    on_paper: _OnPaper,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -268,31 +315,13 @@ def plan(
 
         refuse_output(out, network)
     try:
-        from catseye.estimation.network.plan import plan as planned
-        from catseye.estimation.network.plan import schedule
         from catseye.gateways.network.findings import findings
         from catseye.gateways.network.plan import PlanFindings
         from catseye.records.network.any_file import read_network
-        from catseye.reduction.network import measured_on_paper
 
         observed = _read(read_network, network)
-        names = None if interest is None else [p.strip() for p in interest.split(",") if p.strip()]
-        worth = planned(observed, datum=datum, interest=names, most=most)
-        picked = schedule(worth, budget_s=budget_s, shot_s=shot_s) if budget_s is not None else ()
-        scatter = (
-            measured_on_paper(
-                worth.solution.network,
-                runs=runs,
-                seed=seed,
-                air_ppm=air_ppm,
-                station_ppm=station_ppm,
-                refraction=refraction,
-                blunders=blunders_percent / 100.0,
-                progress=progress,
-            )
-            if runs
-            else None
-        )
+        worth, picked = asked.plan(observed, datum)
+        scatter = on_paper.scatter(worth.solution.network, progress)
         plan_findings = PlanFindings(findings(worth.solution), worth, picked, scatter)
         if out is not None:
             from catseye.gateways.network.files import input_hashes
