@@ -78,7 +78,7 @@ class _Inputs:
 
     @property
     def files(self) -> list[Path]:
-        """All that are given."""
+        """The input files that are given, in the order of the command line."""
         return [path for path in (self.observations, self.heights, self.against) if path is not None]
 
 

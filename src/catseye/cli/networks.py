@@ -56,24 +56,21 @@ Out = Annotated[
 ]
 
 
-@app.command(epilog="\b\nExamples: catseye adjust examples/networks/feed-arm.toml --out feed-arm-report\n"
-             "          catseye adjust epoch-1.gkf epoch-2.gkf --points P1,P2,P3")  # fmt: skip
-def adjust(
-    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
-    later: Annotated[
-        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
-    ] = None,
-    datum: Datum = None,
-    scaled: Scaled = False,
+@dataclass(frozen=True)
+class _Treatment:
+    """How the observations are treated, and what the tests and variances rest on."""
+
+    datum: Datum = None
+    scaled: Scaled = False
     reject: Annotated[
         bool, typer.Option("--reject", help="Leave out observations that the tests reject, one by one.")
-    ] = False,
+    ] = False
     robust: Annotated[
         str | None,
         typer.Option(
             "--robust", metavar=NETWORK_WEIGHTS, callback=one_of(NETWORK_WEIGHTS), help="Weigh observations robustly."
         ),
-    ] = None,
+    ] = None
     components: Annotated[
         str | None,
         typer.Option(
@@ -82,10 +79,36 @@ def adjust(
             callback=one_of(COMPONENTS),
             help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
         ),
-    ] = None,
+    ] = None
     level: Annotated[
         float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
-    ] = 0.05,
+    ] = 0.05
+
+    def adjusted(self, network: "ObservationNetwork", progress: ProgressLine) -> "AdjustedNetwork":
+        """The network by least squares, its observations treated so."""
+        from catseye.reduction.network import adjusted
+
+        return adjusted(
+            network,
+            datum=self.datum,
+            reject=self.reject,
+            robust=self.robust,
+            level=self.level,
+            components=self.components,
+            progress=progress,
+        )
+
+
+@app.command(epilog="\b\nExamples: catseye adjust examples/networks/feed-arm.toml --out feed-arm-report\n"
+             "          catseye adjust epoch-1.gkf epoch-2.gkf --points P1,P2,P3")  # fmt: skip
+@grouped
+def adjust(
+    *,
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
+    later: Annotated[
+        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
+    ] = None,
+    asked: _Treatment,
     relative: Annotated[
         list[str] | None,
         typer.Option("--relative", metavar="A,B", help="Relative ellipsoid of two points; may repeat."),
@@ -98,7 +121,7 @@ def adjust(
     quiet: Quiet = False,
 ) -> None:
     """A network adjusted by least squares, or two epochs of it compared."""
-    if reject and robust is not None:
+    if asked.reject and asked.robust is not None:
         raise typer.BadParameter("cannot go with --reject: either weigh or leave out.", param_hint="'--robust'")
     if points is not None and later is None:
         raise typer.BadParameter("needs a second network to compare with.", param_hint="'--points'")
@@ -113,23 +136,11 @@ def adjust(
     try:
         from catseye.gateways.network.findings import findings
         from catseye.records.network.any_file import read_network
-        from catseye.reduction.network import adjusted
 
-        treated = [
-            adjusted(
-                _read(read_network, source),
-                datum=datum,
-                reject=reject,
-                robust=robust,
-                level=level,
-                components=components,
-                progress=progress,
-            )
-            for source in sources
-        ]
-        epochs = [findings(t.solution, scaled=scaled, level=level, pairs=pairs) for t in treated]
+        treated = [asked.adjusted(_read(read_network, source), progress) for source in sources]
+        epochs = [findings(t.solution, scaled=asked.scaled, level=asked.level, pairs=pairs) for t in treated]
         if later is not None:
-            _compared(epochs, sources, points, level, out, json, quiet, progress)
+            _compared(epochs, sources, points, asked.level, out, json, quiet, progress)
             return
         if epochs[0].answered:
             _write_adjusted(treated[0], epochs[0], network, out, progress)
