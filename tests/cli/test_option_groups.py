@@ -1,7 +1,6 @@
 """A group of options: single options on the command line, one object in the command."""
 
-from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 from typer.testing import CliRunner
@@ -9,9 +8,8 @@ from typer.testing import CliRunner
 from catseye.cli.option_groups import grouped
 
 
-@dataclass(frozen=True)
-class Light:
-    """Light, as asked for."""
+class Light(NamedTuple):
+    """Light, as it is asked for."""
 
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="In vacuum.")]
     colours: Annotated[list[str] | None, typer.Option("--colour")] = None

@@ -1,10 +1,9 @@
 """The command of EDM baselines."""
 
 import math
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -61,8 +60,7 @@ def _modest(value: float) -> float:
     return value
 
 
-@dataclass(frozen=True)
-class _Inputs:
+class _Inputs(NamedTuple):
     """The files that are read."""
 
     observations: Annotated[
@@ -82,8 +80,7 @@ class _Inputs:
         return [path for path in (self.observations, self.heights, self.against) if path is not None]
 
 
-@dataclass(frozen=True)
-class _Settings:
+class _Settings(NamedTuple):
     """How the baseline is calibrated; units are in the names, those without one are m or plain numbers."""
 
     reference_index: Annotated[
@@ -152,8 +149,7 @@ class _Settings:
         )
 
 
-@dataclass(frozen=True)
-class _Provenance:
+class _Provenance(NamedTuple):
     """Who measured the baseline, when, with what."""
 
     serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None

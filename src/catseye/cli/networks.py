@@ -1,9 +1,8 @@
 """The commands of networks: adjust, plan."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -56,8 +55,7 @@ Out = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class _Treatment:
+class _Treatment(NamedTuple):
     """How the observations are treated, and what the tests and variances rest on."""
 
     datum: Datum = None
@@ -242,8 +240,7 @@ def _compared(
             say(wrapped("Written to", f"{out}/: report.html, displacements.csv, comparison.json, and both epochs"))
 
 
-@dataclass(frozen=True)
-class _Further:
+class _Further(NamedTuple):
     """Which points matter, and what further ranges may cost."""
 
     interest: Annotated[
@@ -268,8 +265,7 @@ class _Further:
         return worth, schedule(worth, budget_s=self.budget_s, shot_s=self.shot_s)
 
 
-@dataclass(frozen=True)
-class _OnPaper:
+class _OnPaper(NamedTuple):
     """How often the network is measured on paper, and what is wrong with it then."""
 
     runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -89,8 +88,7 @@ def _refuse_alone(values: Mapping[str, Any], needed: str) -> None:
             raise typer.BadParameter(f"says nothing without {needed}.", param_hint=f"'{option}'")
 
 
-@dataclass(frozen=True)
-class _Forbidden:
+class _Forbidden(NamedTuple):
     """When and where the mirror stands, and what its beam must not meet."""
 
     at: Annotated[
@@ -133,8 +131,7 @@ class _Forbidden:
         return zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": self.sun_cone_deg})})
 
 
-@dataclass(frozen=True)
-class _View:
+class _View(NamedTuple):
     """What stands at the points, and what may hide it."""
 
     reflector: Annotated[

@@ -1,8 +1,7 @@
 """Groups of options that the commands of a living site share: the twin, and the coordinator."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -62,8 +61,7 @@ MotionScriptText = Annotated[
 Host = Annotated[str | None, typer.Option("--host", help="Address of its own port.  [default: 127.0.0.1]")]
 
 
-@dataclass(frozen=True)
-class TwinOptions:
+class TwinOptions(NamedTuple):
     """The twin that `catseye zy` and `catseye serve` are asked for; each field is the option of its name."""
 
     seed: Seed = 1
@@ -86,8 +84,7 @@ class TwinOptions:
         return TwinWords.starting_now(begins, **words) if offset is None else TwinWords(begins, offset=offset, **words)
 
 
-@dataclass(frozen=True)
-class CoordinatorOptions:
+class CoordinatorOptions(NamedTuple):
     """The coordinator that `catseye ziy` and `catseye serve` are asked for; each field is the option of its name."""
 
     port_base: PortBase = PORT_BASE

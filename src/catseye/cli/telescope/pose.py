@@ -1,9 +1,8 @@
 """The command of poses."""
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -205,8 +204,7 @@ def _with_posture(points: "SolvedPoints", posture: str | None) -> "SolvedPoints"
     return replace(points, posture=(azimuth * DEGREE, elevation * DEGREE))
 
 
-@dataclass(frozen=True)
-class _Wanted:
+class _Wanted(NamedTuple):
     """Which pose is asked for.
 
     group      what moves as one, or

@@ -1,8 +1,7 @@
 """The command of the structure: flexible models of groups of points, and vibration."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
 import typer
 
@@ -131,8 +130,7 @@ def structure(
         to.progress.clear()
 
 
-@dataclass(frozen=True)
-class _Answer:
+class _Answer(NamedTuple):
     """Where an answer goes: a directory, one JSON object or text; and the line of progress until then."""
 
     out: Path | None

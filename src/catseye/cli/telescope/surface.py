@@ -1,9 +1,8 @@
 """The command of surface."""
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -45,8 +44,7 @@ def _angles(values: list[float] | None) -> list[float]:
     return values or []
 
 
-@dataclass(frozen=True)
-class _Shape:
+class _Shape(NamedTuple):
     """What is fitted to the prisms and told of the shape."""
 
     free: Annotated[
@@ -77,8 +75,7 @@ class _Shape:
         )
 
 
-@dataclass(frozen=True)
-class _Reading:
+class _Reading(NamedTuple):
     """How the command's input files are read."""
 
     frame: Annotated[
@@ -116,8 +113,7 @@ class _Reading:
         return epochs, hashes
 
 
-@dataclass(frozen=True)
-class _Corrections:
+class _Corrections(NamedTuple):
     """The table of the actuators' corrections, where it is asked for."""
 
     actuators: Annotated[
