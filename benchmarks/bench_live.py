@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.records.site.folder import REFERENCE
-from catseye.service.coordinator import LiveCoordinator, Orders
+from catseye.service.coordinator import LiveCoordinator, Orders, Peers
 from load_scene import LoadChild, load_site, lost_and_doubled
 
 TICK = 864e-6  # s
@@ -73,7 +73,7 @@ async def coordinated(child: LoadChild, site: Any, journal: str, name: str, seco
     targets: dict[str, str] = {}
     before = child.report()["fired"]
     running = LiveCoordinator(
-        site, Orders(journal=journal, port=0), addresses=child.addresses, feed=child.feed, clock=child.clock
+        site, Orders(journal=journal, port=0), Peers(child.addresses, child.feed), clock=child.clock
     )
 
     def entry(entry: Any) -> None:

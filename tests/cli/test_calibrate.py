@@ -110,10 +110,10 @@ def test_an_example_finds_its_truth_and_its_one_wrong_reading_and_its_record_rea
 
 
 def test_every_kind_has_an_example_its_help_and_its_page_of_columns():
-    from catseye.cli.calibrate import KIND_NAMES
+    from catseye.cli.vocabularies import CALIBRATION_KINDS
     from catseye.reduction.calibrations.kinds import KINDS
 
-    assert set(TRUTH) == set(KINDS) == set(KIND_NAMES.split("|"))
+    assert set(TRUTH) == set(KINDS) == set(CALIBRATION_KINDS.split("|"))
     text = (EXAMPLES.parents[1] / "docs" / "formats" / "calibrations.md").read_text(encoding="utf-8")
     for name, kind in KINDS.items():
         for word in (*kind.layout.required, *kind.layout.optional):

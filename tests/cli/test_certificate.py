@@ -7,7 +7,6 @@ import sys
 
 import pytest
 
-from catseye.cli import certificate
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -126,9 +125,3 @@ def test_help_has_examples_and_spares_the_heavy_imports(catseye):
     code = "import sys, catseye.cli.certificate; print({'scipy', 'matplotlib', 'catseye.records'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert done.stdout.strip() == "set()"
-
-
-def test_the_kinds_are_those_of_the_forms():
-    from catseye.gateways.calibrations.field_report_fields import FORMS
-
-    assert list(FORMS) == list(certificate.KINDS)

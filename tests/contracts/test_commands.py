@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 
 from catseye import __version__
 from catseye.atmosphere.index.air import MODELS
-from catseye.cli import commands
 from catseye.cli.commands import app
+from catseye.cli.vocabularies import AIR_MODELS
 from command_scene import command_line
 from process_scene import ends_with_us
 from repository import ROOT
@@ -215,7 +215,7 @@ def test_the_version_is_said():
 
 
 def test_help_names_every_air_model():
-    assert commands.MODELS.split("|") == list(MODELS)
+    assert AIR_MODELS.split("|") == list(MODELS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

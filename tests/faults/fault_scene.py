@@ -16,7 +16,7 @@ from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.coordinator import LiveCoordinator, Orders
 from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
-from catseye.service.simulation import addresses_of
+from catseye.service.simulation import peers_of
 from catseye.service.warm import WarmingClock
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
@@ -109,8 +109,7 @@ async def _night(world: TwinWords, seconds: float) -> Told:
         running = LiveCoordinator(
             site(),
             Orders(port=0),
-            addresses=addresses_of(at),
-            feed=at.feed,
+            peers_of(at),
             clock=clock,
             seed=world.seed,
             network=network,

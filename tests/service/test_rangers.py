@@ -8,7 +8,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.ranger.status import StatusWord
-from catseye.service.rangers import LateSockets, RangersServed
+from catseye.service.rangers import LateSockets, RangersServed, ServedAt
 from catseye.service.warm import WarmingClock
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork
@@ -55,7 +55,7 @@ def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is
 
     async def story():
         served = RangersServed(
-            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, addresses=24_100
+            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, at=ServedAt(24_100)
         )
         heard = asyncio.Queue()
         task = asyncio.create_task(served.serve(heard.put_nowait))

@@ -3,13 +3,15 @@
 import math
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
+from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.networks import Out, _level
+from catseye.cli.option_groups import grouped
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,103 +60,131 @@ def _modest(value: float) -> float:
     return value
 
 
+class _Inputs(NamedTuple):
+    """The files that are read."""
+
+    observations: Annotated[
+        Path, typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: docs/formats/baseline.md.")
+    ]
+    heights: Annotated[
+        Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level without.")
+    ] = None
+    against: Annotated[
+        Path | None,
+        typer.Option("--against", metavar="BASELINE.toml", help="Known pillars: finds the instrument's scale, too."),
+    ] = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The input files that are given, in the order of the command line."""
+        return [path for path in (self.observations, self.heights, self.against) if path is not None]
+
+
+class _Settings(NamedTuple):
+    """How the baseline is calibrated; units are in the names, those without one are m or plain numbers."""
+
+    reference_index: Annotated[
+        float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
+    ] = 1.000286338
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Carrier in vacuum, µm.")] = 0.658
+    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 420.0
+    model: Annotated[
+        str,
+        typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
+    ] = "ciddor_hill1999"
+    corrected: Annotated[
+        bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")
+    ] = False
+    refraction: Annotated[
+        float, typer.Option("--refraction-k", callback=_finite, help="Coefficient of refraction.")
+    ] = 0.13
+    reference_height_m: Annotated[
+        float | None,
+        typer.Option("--reference-height-m", callback=_height, help="Height of the distances; the first pillar's."),
+    ] = None
+    u_temperature_c: Annotated[float, _u("--u-temperature-c", "Common to all shots, °C (1σ).")] = 0.5
+    u_pressure_hpa: Annotated[float, _u("--u-pressure-hpa", "Common to all shots, hPa (1σ).")] = 0.3
+    u_humidity_percent: Annotated[float, _u("--u-humidity-percent", "Common to all shots, % (1σ).")] = 5.0
+    u_scale_ppm: Annotated[float, _u("--u-scale-ppm", "Of the instrument's frequency, without --against (1σ).")] = 1.0
+    u_direction_arcsec: Annotated[
+        float, typer.Option("--u-direction-arcsec", callback=_above_zero, help="Of a set's direction (1σ).")
+    ] = 0.6
+    u_centring_mm: Annotated[float, _u("--u-centring-mm", "Across the line, for directions, mm (1σ).")] = 0.2
+    unit_length_m: Annotated[
+        float | None,
+        typer.Option("--unit-length-m", callback=_above_zero, help="Of cyclic terms: half a wave; none without."),
+    ] = None
+    orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Of cyclic terms.")] = 1
+    specified_mm: Annotated[
+        float, typer.Option("--specified-mm", callback=_above_zero, help="Maker's claim a + b D: a, mm (1σ).")
+    ] = 0.6
+    specified_ppm: Annotated[float, _u("--specified-ppm", "Maker's claim a + b D: b, ppm (1σ).")] = 1.0
+    level: Annotated[float, typer.Option("--level", callback=_level, help="Level of each test.")] = 0.05
+    reject: Annotated[bool, typer.Option("--reject", help="Leave out what the tests reject, one by one.")] = False
+
+    def settings(self) -> "BaselineSettings":
+        """The same for the recipe, in its words."""
+        from catseye.reduction.baseline.lengths import BaselineSettings
+
+        return BaselineSettings(
+            air_model=self.model,
+            wavelength_um=self.wavelength_um,
+            co2_ppm=self.co2_ppm,
+            reference_index=self.reference_index,
+            corrected=self.corrected,
+            refraction=self.refraction,
+            u_temperature_c=self.u_temperature_c,
+            u_pressure_hpa=self.u_pressure_hpa,
+            u_humidity_percent=self.u_humidity_percent,
+            u_scale_ppm=self.u_scale_ppm,
+            u_direction_arcsec=self.u_direction_arcsec,
+            u_centring_mm=self.u_centring_mm,
+            unit_length=self.unit_length_m,
+            orders=self.orders,
+            specified_mm=self.specified_mm,
+            specified_ppm=self.specified_ppm,
+            level=self.level,
+            reject=self.reject,
+            reference_height=self.reference_height_m,
+        )
+
+
+class _Provenance(NamedTuple):
+    """Who measured the baseline, when, with what."""
+
+    serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None
+    measured_on: Annotated[
+        str | None, typer.Option("--measured-on", callback=_day, metavar="YYYY-MM-DD", help=f"Day; {UNKNOWN}.")
+    ] = None
+    by: Annotated[str | None, typer.Option("--by", help=f"Who measured; {UNKNOWN}.")] = None
+    report: Annotated[str | None, typer.Option("--report", help=f"Where it is written up; {UNKNOWN}.")] = None
+
+
 @app.command(
     epilog="\b\nExample: catseye baseline ts30-baseline-observations.csv --heights pillar-heights.csv --write B.toml\n"
     "         catseye baseline ts16-calibration-observations.csv --heights pillar-heights.csv --against B.toml\n"
     "These files: examples/baselines/busselton"
 )
+@grouped
 def baseline(
-    observations: Annotated[
-        Path, typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: docs/formats/baseline.md.")
-    ],
-    heights: Annotated[
-        Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level without.")
-    ] = None,
-    against: Annotated[
-        Path | None,
-        typer.Option("--against", metavar="BASELINE.toml", help="Known pillars: finds the instrument's scale, too."),
-    ] = None,
+    *,
+    read: _Inputs,
     write: Annotated[
         Path | None, typer.Option("--write", metavar="BASELINE.toml", help="Keep the pillars with full covariance.")
     ] = None,
-    reference_index: Annotated[
-        float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
-    ] = 1.000286338,
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Carrier in vacuum, µm.")] = 0.658,
-    co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 420.0,
-    model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
-    ] = "ciddor_hill1999",
-    corrected: Annotated[
-        bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")
-    ] = False,
-    refraction: Annotated[
-        float, typer.Option("--refraction-k", callback=_finite, help="Coefficient of refraction.")
-    ] = 0.13,
-    reference_height_m: Annotated[
-        float | None,
-        typer.Option("--reference-height-m", callback=_height, help="Height of the distances; the first pillar's."),
-    ] = None,
-    u_temperature_c: Annotated[float, _u("--u-temperature-c", "Common to all shots, °C (1σ).")] = 0.5,
-    u_pressure_hpa: Annotated[float, _u("--u-pressure-hpa", "Common to all shots, hPa (1σ).")] = 0.3,
-    u_humidity_percent: Annotated[float, _u("--u-humidity-percent", "Common to all shots, % (1σ).")] = 5.0,
-    u_scale_ppm: Annotated[float, _u("--u-scale-ppm", "Of the instrument's frequency, without --against (1σ).")] = 1.0,
-    u_direction_arcsec: Annotated[
-        float, typer.Option("--u-direction-arcsec", callback=_above_zero, help="Of a set's direction (1σ).")
-    ] = 0.6,
-    u_centring_mm: Annotated[float, _u("--u-centring-mm", "Across the line, for directions, mm (1σ).")] = 0.2,
-    unit_length_m: Annotated[
-        float | None,
-        typer.Option("--unit-length-m", callback=_above_zero, help="Of cyclic terms: half a wave; none without."),
-    ] = None,
-    orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Of cyclic terms.")] = 1,
-    specified_mm: Annotated[
-        float, typer.Option("--specified-mm", callback=_above_zero, help="Maker's claim a + b D: a, mm (1σ).")
-    ] = 0.6,
-    specified_ppm: Annotated[float, _u("--specified-ppm", "Maker's claim a + b D: b, ppm (1σ).")] = 1.0,
-    level: Annotated[float, typer.Option("--level", callback=_level, help="Level of each test.")] = 0.05,
-    reject: Annotated[bool, typer.Option("--reject", help="Leave out what the tests reject, one by one.")] = False,
-    serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None,
-    measured_on: Annotated[
-        str | None, typer.Option("--measured-on", callback=_day, metavar="YYYY-MM-DD", help=f"Day; {UNKNOWN}.")
-    ] = None,
-    by: Annotated[str | None, typer.Option("--by", help=f"Who measured; {UNKNOWN}.")] = None,
-    report: Annotated[str | None, typer.Option("--report", help=f"Where it is written up; {UNKNOWN}.")] = None,
+    asked: _Settings,
+    origin: _Provenance,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
-    from catseye.reduction.baseline.lengths import BaselineSettings
-
-    settings = BaselineSettings(
-        air_model=model,
-        wavelength_um=wavelength_um,
-        co2_ppm=co2_ppm,
-        reference_index=reference_index,
-        corrected=corrected,
-        refraction=refraction,
-        u_temperature_c=u_temperature_c,
-        u_pressure_hpa=u_pressure_hpa,
-        u_humidity_percent=u_humidity_percent,
-        u_scale_ppm=u_scale_ppm,
-        u_direction_arcsec=u_direction_arcsec,
-        u_centring_mm=u_centring_mm,
-        unit_length=unit_length_m,
-        orders=orders,
-        specified_mm=specified_mm,
-        specified_ppm=specified_ppm,
-        level=level,
-        reject=reject,
-        reference_height=reference_height_m,
-    )
-    sources = [p for p in (observations, heights, against) if p is not None]
     if out is not None:
         from catseye.gateways.writers.output import refuse_output
 
-        for source in sources:
+        for source in read.files:
             refuse_output(out, source)
-    if write is not None and any(write.resolve() == source.resolve() for source in sources):
+    if write is not None and any(write.resolve() == source.resolve() for source in read.files):
         raise InputError(f"--write {write}: is an input (expected another file: the same shots would count twice)")
     progress = ProgressLine(quiet)
 
@@ -162,59 +192,67 @@ def baseline(
         if write is not None:
             from catseye.gateways.baseline.files import write_record
 
-            day = None if measured_on is None else date.fromisoformat(measured_on)
-            write_record(found, write, inputs, serial=serial, measured_on=day, by=by, report=report)
+            day = None if origin.measured_on is None else date.fromisoformat(origin.measured_on)
+            write_record(
+                calibration,
+                write,
+                inputs,
+                serial=origin.serial,
+                measured_on=day,
+                by=origin.by,
+                report=origin.report,
+            )
 
     try:
-        found, inputs = _calibrated(observations, heights, against, settings, progress)
+        calibration, inputs = _calibrated(read, asked.settings(), progress)
         if out is not None:
             from catseye.gateways.baseline.files import write_calibration
             from catseye.gateways.writers.output import whole_directory
 
-            with whole_directory(out, observations) as directory:
-                write_calibration(found, directory, inputs, progress)
+            with whole_directory(out, read.observations) as directory:
+                write_calibration(calibration, directory, inputs, progress)
                 keep()  # no directory without the record that was asked for, too
         else:
             keep()
     finally:
         progress.clear()
-    _tell(found, json, quiet, out, write)
+    _tell(calibration, json, quiet, out, write)
 
 
 def _calibrated(
-    observations: Path, heights: Path | None, against: Path | None, settings: "BaselineSettings", progress: ProgressLine
+    read: _Inputs, settings: "BaselineSettings", progress: ProgressLine
 ) -> "tuple[BaselineCalibration, dict[str, str]]":
     """The calibration, and the SHA-256 of each file that was read."""
     from catseye.records.laboratory.baseline import digest_of, read_baseline, read_heights, read_observations
     from catseye.reduction.baseline.instrument import calibrate_baseline
 
-    seen: BaselineShots = read_observations(observations)
-    inputs = {observations.name: seen.digest}
+    shots: BaselineShots = read_observations(read.observations)
+    inputs = {read.observations.name: shots.digest}
     tops: Heights | None = None
-    if heights is not None:
-        tops = read_heights(heights)
-        inputs[heights.name] = tops.digest
+    if read.heights is not None:
+        tops = read_heights(read.heights)
+        inputs[read.heights.name] = tops.digest
     known: Baseline | None = None
-    if against is not None:
-        known = read_baseline(against)
-        inputs[against.name] = digest_of(against)
-    return calibrate_baseline(seen, tops, known, settings=settings, progress=progress), inputs
+    if read.against is not None:
+        known = read_baseline(read.against)
+        inputs[read.against.name] = digest_of(read.against)
+    return calibrate_baseline(shots, tops, known, settings=settings, progress=progress), inputs
 
 
-def _tell(found: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
+def _tell(calibration: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
     from catseye.gateways.baseline.objects import baseline_object, passages, spans
 
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(baseline_object(found)))
+        say(json_line(baseline_object(calibration)))
         return
     if quiet:
         return
-    for passage in passages(found):
+    for passage in passages(calibration):
         say(wrapped(passage.title, passage.text))
-    if len(found.names) <= 12:
-        for a, b, d, u in spans(found):
+    if len(calibration.names) <= 12:
+        for a, b, d, u in spans(calibration):
             say(f"{'':<14}{a:>6} - {b:<6} {d:12.5f} m   u {u * 1e3:.3f} mm")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"))

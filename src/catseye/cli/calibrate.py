@@ -7,26 +7,11 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.reduction.calibrations.calibration import Calibration
-
-
-KIND_NAMES = (  # as in catseye.reduction.calibrations.kinds, whose import --help spares itself
-    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
-    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
-    "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
-    "monument-place|inclinometer|hydrostatic-level"
-)
-
-
-def _known(kind: str) -> str:
-    from catseye.reduction.calibrations.kinds import KINDS
-
-    if kind not in KINDS:
-        raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
-    return kind
 
 
 @app.command(
@@ -36,7 +21,11 @@ def _known(kind: str) -> str:
 def calibrate(
     kind: Annotated[
         str,
-        typer.Argument(metavar="KIND", callback=_known, help=f"What is calibrated: {KIND_NAMES.replace('|', ', ')}."),
+        typer.Argument(
+            metavar="KIND",
+            callback=one_of(CALIBRATION_KINDS),
+            help=f"What is calibrated: {CALIBRATION_KINDS.replace('|', ', ')}.",
+        ),
     ],
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Table of readings.")],
     sheet: Annotated[
@@ -60,15 +49,15 @@ def calibrate(
     from catseye.reduction.calibrations.kinds import calibrate as calibrated
 
     _refuse_outputs(readings, sheet, write, certificate)
-    found = calibrated(kind, readings, sheet, reject=reject)
-    _write(found, write, certificate)
+    calibration = calibrated(kind, readings, sheet, reject=reject)
+    _write(calibration, write, certificate)
     if json:
         from catseye.gateways.calibrations.certificate_record import calibration_object
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(calibration_object(found)))
+        say(json_line(calibration_object(calibration)))
     elif not quiet:
-        _tell(found)
+        _tell(calibration)
         for what, path in (("Record", write), ("Certificate", certificate)):
             if path is not None:
                 say(wrapped(what, str(path)))
@@ -84,7 +73,7 @@ def _refuse_outputs(readings: Path, sheet: Path | None, write: Path | None, cert
         raise InputError(f"--write {write}: is the --certificate too (expected two names)")
 
 
-def _write(found: "Calibration", write: Path | None, certificate: Path | None) -> None:
+def _write(calibration: "Calibration", write: Path | None, certificate: Path | None) -> None:
     """Both files whole; neither is begun when one of them may not be written."""
     from contextlib import ExitStack
     from datetime import UTC, datetime
@@ -95,19 +84,19 @@ def _write(found: "Calibration", write: Path | None, certificate: Path | None) -
     if write is not None:
         from catseye.gateways.calibrations.certificate_record import MARK, calibration_toml
 
-        pages.append((write, "--write", MARK, calibration_toml(found)))
+        pages.append((write, "--write", MARK, calibration_toml(calibration)))
     if certificate is not None:
         from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
         from catseye.gateways.calibrations.certificate import certificate as drawn
 
-        pages.append((certificate, "--certificate", PAGE_MARK, drawn(found, datetime.now(UTC))))
+        pages.append((certificate, "--certificate", PAGE_MARK, drawn(calibration, datetime.now(UTC))))
     with ExitStack() as files:
         for path, option, mark, text in pages:
             files.enter_context(whole_file(path, option, mark)).append(text)
 
 
-def _tell(found: "Calibration") -> None:
+def _tell(calibration: "Calibration") -> None:
     from catseye.gateways.calibrations.certificate import passages
 
-    for title, text in passages(found):
+    for title, text in passages(calibration):
         say(wrapped(title, text))

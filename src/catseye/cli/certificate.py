@@ -7,19 +7,11 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import REPORT_KINDS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.calibrations.field_report_fields import Report
-
-# as in catseye.gateways.calibrations.field_report_fields, whose import --help spares itself
-KINDS = ("monument", "mirror")
-
-
-def _known(kind: str) -> str:
-    if kind not in KINDS:
-        raise typer.BadParameter(f"{kind!r} is not one of {', '.join(KINDS)}.")
-    return kind
 
 
 @app.command(
@@ -28,7 +20,12 @@ def _known(kind: str) -> str:
 )
 def certificate(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", callback=_known, help=f"What the report is of: {' or '.join(KINDS)}.")
+        str,
+        typer.Argument(
+            metavar="KIND",
+            callback=one_of(REPORT_KINDS),
+            help=f"What the report is of: {REPORT_KINDS.replace('|', ' or ')}.",
+        ),
     ],
     record: Annotated[
         Path | None, typer.Argument(metavar="[RECORD.toml]", help="Record that fills it; blank without one.")

@@ -9,13 +9,11 @@ import typer
 
 from catseye import __version__
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.reduction.epoch.settings import ReductionSettings
 
 if TYPE_CHECKING:
     from catseye.reduction.epoch.epoch import Reduction
-
-# as in catseye.atmosphere.index.air, whose import --help spares itself
-MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
 
 ROOMS = (
     *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
@@ -52,15 +50,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-def known_model(name: str) -> str:
-    """The name of a model of the index of air."""
-    from catseye.atmosphere.index.air import MODELS as known
-
-    if name not in known:
-        raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)}.")
-    return name
-
-
 def uncertainty(value: float) -> float:
     """A standard uncertainty: 0 or more."""
     if not (math.isfinite(value) and value >= 0.0):
@@ -69,7 +58,8 @@ def uncertainty(value: float) -> float:
 
 
 AirModel = Annotated[
-    str, typer.Option("--air-model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
+    str,
+    typer.Option("--air-model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]

@@ -50,18 +50,18 @@ def explain(
         settings = ReductionSettings(air_model=air_model)
         with _page(page) as pieces:  # refused before the work, not after it
             night = read_campaign(campaign)
-            found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
+            explanation = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
             if page is not None:
-                pieces.append(_page_of(found, night))
+                pieces.append(_page_of(explanation, night))
     finally:
         progress.clear()
     if json:
         from catseye.gateways.epoch.explain import explanation_object
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(explanation_object(found, seed if monte_carlo else None)))
+        say(json_line(explanation_object(explanation, seed if monte_carlo else None)))
     elif not quiet:
-        _tell(found, page)
+        _tell(explanation, page)
 
 
 def _page(page: Path | None) -> AbstractContextManager[list[str]]:
@@ -73,20 +73,20 @@ def _page(page: Path | None) -> AbstractContextManager[list[str]]:
     return whole_file(page, "--page", MARK)
 
 
-def _page_of(found: "Explanation", night: "Campaign") -> str:
+def _page_of(explanation: "Explanation", night: "Campaign") -> str:
     from datetime import UTC, datetime
 
     from catseye.gateways.epoch.explain_page import explanation_page
 
-    return explanation_page(found, night, datetime.now(UTC))
+    return explanation_page(explanation, night, datetime.now(UTC))
 
 
-def _tell(found: "Explanation", page: Path | None) -> None:
+def _tell(explanation: "Explanation", page: Path | None) -> None:
     from catseye.gateways.epoch.explain import budget_lines, explanation_passages
 
-    for passage in explanation_passages(found):
+    for passage in explanation_passages(explanation):
         say(wrapped(passage.title, passage.text))
-    lines = budget_lines(found)
+    lines = budget_lines(explanation)
     if lines:
         say("\n" + "\n".join(lines))
     if page is not None:

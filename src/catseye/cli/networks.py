@@ -2,33 +2,25 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.option_groups import grouped
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 from catseye.errors import EstimationError, InputError
 
 if TYPE_CHECKING:
     from catseye.estimation.network.model import ObservationNetwork
+    from catseye.estimation.network.monte_carlo import MonteCarloScatter
+    from catseye.estimation.network.plan import Candidate, Plan
     from catseye.gateways.network.findings import Findings
     from catseye.gateways.network.plan import PlanFindings
     from catseye.reduction.network import AdjustedNetwork
 
-DATUMS = "free|fixed"
-METHODS = "huber|l1|biweight|igg3"
-COMPONENTS = "rangers|groups"
 SUFFIXES = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
-
-
-def _one_of(words: str) -> Callable[[str | None], str | None]:
-    def check(value: str | None) -> str | None:
-        if value is not None and value not in words.split("|"):
-            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
-        return value
-
-    return check
 
 
 def _level(value: float) -> float:
@@ -48,7 +40,7 @@ Datum = Annotated[
     typer.Option(
         "--datum",
         metavar=DATUMS,
-        callback=_one_of(DATUMS),
+        callback=one_of(DATUMS),
         help="free: nothing held, inner constraints on the marked points; fixed: marked points held. "
         "As the file marks it if not given.",
     ),
@@ -63,34 +55,58 @@ Out = Annotated[
 ]
 
 
-@app.command(epilog="\b\nExamples: catseye adjust examples/networks/feed-arm.toml --out feed-arm-report\n"
-             "          catseye adjust epoch-1.gkf epoch-2.gkf --points P1,P2,P3")  # fmt: skip
-def adjust(
-    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
-    later: Annotated[
-        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
-    ] = None,
-    datum: Datum = None,
-    scaled: Scaled = False,
+class _Treatment(NamedTuple):
+    """How the observations are treated, and what the tests and variances rest on."""
+
+    datum: Datum = None
+    scaled: Scaled = False
     reject: Annotated[
         bool, typer.Option("--reject", help="Leave out observations that the tests reject, one by one.")
-    ] = False,
+    ] = False
     robust: Annotated[
         str | None,
-        typer.Option("--robust", metavar=METHODS, callback=_one_of(METHODS), help="Weigh observations robustly."),
-    ] = None,
+        typer.Option(
+            "--robust", metavar=NETWORK_WEIGHTS, callback=one_of(NETWORK_WEIGHTS), help="Weigh observations robustly."
+        ),
+    ] = None
     components: Annotated[
         str | None,
         typer.Option(
             "--components",
             metavar=COMPONENTS,
-            callback=_one_of(COMPONENTS),
+            callback=one_of(COMPONENTS),
             help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
         ),
-    ] = None,
+    ] = None
     level: Annotated[
         float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
-    ] = 0.05,
+    ] = 0.05
+
+    def adjusted(self, network: "ObservationNetwork", progress: ProgressLine) -> "AdjustedNetwork":
+        """The network by least squares, its observations treated so."""
+        from catseye.reduction.network import adjusted
+
+        return adjusted(
+            network,
+            datum=self.datum,
+            reject=self.reject,
+            robust=self.robust,
+            level=self.level,
+            components=self.components,
+            progress=progress,
+        )
+
+
+@app.command(epilog="\b\nExamples: catseye adjust examples/networks/feed-arm.toml --out feed-arm-report\n"
+             "          catseye adjust epoch-1.gkf epoch-2.gkf --points P1,P2,P3")  # fmt: skip
+@grouped
+def adjust(
+    *,
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
+    later: Annotated[
+        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
+    ] = None,
+    asked: _Treatment,
     relative: Annotated[
         list[str] | None,
         typer.Option("--relative", metavar="A,B", help="Relative ellipsoid of two points; may repeat."),
@@ -103,7 +119,7 @@ def adjust(
     quiet: Quiet = False,
 ) -> None:
     """A network adjusted by least squares, or two epochs of it compared."""
-    if reject and robust is not None:
+    if asked.reject and asked.robust is not None:
         raise typer.BadParameter("cannot go with --reject: either weigh or leave out.", param_hint="'--robust'")
     if points is not None and later is None:
         raise typer.BadParameter("needs a second network to compare with.", param_hint="'--points'")
@@ -118,31 +134,19 @@ def adjust(
     try:
         from catseye.gateways.network.findings import findings
         from catseye.records.network.any_file import read_network
-        from catseye.reduction.network import adjusted
 
-        treated = [
-            adjusted(
-                _read(read_network, source),
-                datum=datum,
-                reject=reject,
-                robust=robust,
-                level=level,
-                components=components,
-                progress=progress,
-            )
-            for source in sources
-        ]
-        found = [findings(t.solution, scaled=scaled, level=level, pairs=pairs) for t in treated]
+        treated = [asked.adjusted(_read(read_network, source), progress) for source in sources]
+        epochs = [findings(t.solution, scaled=asked.scaled, level=asked.level, pairs=pairs) for t in treated]
         if later is not None:
-            _compared(found, sources, points, level, out, json, quiet, progress)
+            _compared(epochs, sources, points, asked.level, out, json, quiet, progress)
             return
-        if found[0].answered:
-            _write_adjusted(treated[0], found[0], network, out, progress)
+        if epochs[0].answered:
+            _write_adjusted(treated[0], epochs[0], network, out, progress)
     finally:
         progress.clear()
-    if json or found[0].answered:
-        _tell_adjusted(treated[0], found[0], json, quiet, out)
-    if not found[0].answered:
+    if json or epochs[0].answered:
+        _tell_adjusted(treated[0], epochs[0], json, quiet, out)
+    if not epochs[0].answered:
         raise EstimationError(f"{network}: {treated[0].solution.status}")
 
 
@@ -160,7 +164,7 @@ def _read(reader: "Callable[[Path], ObservationNetwork]", source: Path) -> "Obse
 
 
 def _write_adjusted(
-    treated: "AdjustedNetwork", found: "Findings", source: Path, out: Path | None, progress: ProgressLine
+    treated: "AdjustedNetwork", epoch: "Findings", source: Path, out: Path | None, progress: ProgressLine
 ) -> None:
     if out is None:
         return
@@ -168,24 +172,24 @@ def _write_adjusted(
     from catseye.gateways.writers.output import whole_directory
 
     with whole_directory(out, source) as directory:
-        write_network(found, directory, input_hashes(source), progress, treated=treated)
+        write_network(epoch, directory, input_hashes(source), progress, treated=treated)
 
 
-def _tell_adjusted(treated: "AdjustedNetwork", found: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
+def _tell_adjusted(treated: "AdjustedNetwork", epoch: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
         from catseye.gateways.network.objects import network_json
 
-        say("".join(network_json(found, treated=treated)).rstrip("\n"))
+        say("".join(network_json(epoch, treated=treated)).rstrip("\n"))
         return
     if quiet:
         return
     from catseye.gateways.network.summary import passages, treatment_passages
 
-    for passage in [*passages(found), *treatment_passages(treated, found)]:
+    for passage in [*passages(epoch), *treatment_passages(treated, epoch)]:
         say(wrapped(passage.title, passage.text))
-    if len(found.names) <= 40:
-        for name, x, u in zip(found.names, found.x, found.u, strict=True):
-            axes = zip(found.network.axis_names, x, strict=True)
+    if len(epoch.names) <= 40:
+        for name, x, u in zip(epoch.names, epoch.x, epoch.u, strict=True):
+            axes = zip(epoch.network.axis_names, x, strict=True)
             say(
                 f"{'':<14}{name:<10} "
                 + "  ".join(f"{axis} {value:12.5f}" for axis, value in axes)
@@ -198,7 +202,7 @@ def _tell_adjusted(treated: "AdjustedNetwork", found: "Findings", json: bool, qu
 
 
 def _compared(
-    found: "list[Findings]",
+    epochs: "list[Findings]",
     sources: list[Path],
     points: str | None,
     level: float,
@@ -211,12 +215,12 @@ def _compared(
     from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
     from catseye.gateways.writers.objects import json_line
 
-    for one, source in zip(found, sources, strict=True):
+    for one, source in zip(epochs, sources, strict=True):
         if not one.answered:
             raise EstimationError(f"{source}: {one.solution.status}")
     names = None if points is None else [p.strip() for p in points.split(",") if p.strip()]
-    moved = compare(found[0].solution, found[1].solution, points=names, options=ComparisonOptions(level=level))
-    compared = ComparedEpochs(found[0], found[1], moved)
+    moved = compare(epochs[0].solution, epochs[1].solution, points=names, options=ComparisonOptions(level=level))
+    compared = ComparedEpochs(epochs[0], epochs[1], moved)
     if out is not None:
         from catseye.gateways.network.files import input_hashes, write_comparison
         from catseye.gateways.writers.output import whole_directory
@@ -236,36 +240,77 @@ def _compared(
             say(wrapped("Written to", f"{out}/: report.html, displacements.csv, comparison.json, and both epochs"))
 
 
-@app.command(epilog="\b\nExample: catseye plan examples/networks/feed-arm.toml --budget-s 600 --shot-s 5")
-def plan(
-    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
-    datum: Datum = None,
+class _Further(NamedTuple):
+    """Which points matter, and what further ranges may cost."""
+
     interest: Annotated[
         str | None,
         typer.Option("--interest", metavar="A,B,...", help="Points that matter; all that are not held if not given."),
-    ] = None,
+    ] = None
     budget_s: Annotated[
         float | None,
         typer.Option("--budget-s", callback=_positive, help="Time of every ranger for further ranges, s."),
-    ] = None,
-    shot_s: Annotated[float, typer.Option("--shot-s", callback=_positive, help="Time of one range, s.")] = 5.0,
-    most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20,
-    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1,
+    ] = None
+    shot_s: Annotated[float, typer.Option("--shot-s", callback=_positive, help="Time of one range, s.")] = 5.0
+    most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20
+
+    def plan(self, network: "ObservationNetwork", datum: str | None) -> "tuple[Plan, tuple[Candidate, ...]]":
+        """What the network is worth, and the further ranges that are worth their time most."""
+        from catseye.estimation.network.plan import plan, schedule
+
+        names = None if self.interest is None else [p.strip() for p in self.interest.split(",") if p.strip()]
+        worth = plan(network, datum=datum, interest=names, most=self.most)
+        if self.budget_s is None:
+            return worth, ()
+        return worth, schedule(worth, budget_s=self.budget_s, shot_s=self.shot_s)
+
+
+class _OnPaper(NamedTuple):
+    """How often the network is measured on paper, and what is wrong with it then."""
+
+    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1
     air_ppm: Annotated[
         float, typer.Option("--air-ppm", min=0.0, help="In the runs: scale error of all ranges together, ppm (1σ).")
-    ] = 0.0,
+    ] = 0.0
     station_ppm: Annotated[
         float, typer.Option("--station-ppm", min=0.0, help="In the runs: scale error of each station's ranges, ppm.")
-    ] = 0.0,
+    ] = 0.0
     refraction: Annotated[
         float,
         typer.Option("--refraction", min=0.0, help="In the runs: spread of the coefficient k of refraction (1σ)."),
-    ] = 0.0,
+    ] = 0.0
     blunders_percent: Annotated[
         float,
         typer.Option("--blunders-percent", min=0.0, max=30.0, help="In the runs: share of gross errors, rejected."),
-    ] = 0.0,
+    ] = 0.0
+
+    def scatter(self, network: "ObservationNetwork", progress: ProgressLine) -> "MonteCarloScatter | None":
+        """How far the runs' coordinates scatter; None where no run was asked for."""
+        from catseye.reduction.network import measured_on_paper
+
+        if not self.runs:
+            return None
+        return measured_on_paper(
+            network,
+            runs=self.runs,
+            seed=self.seed,
+            air_ppm=self.air_ppm,
+            station_ppm=self.station_ppm,
+            refraction=self.refraction,
+            blunders=self.blunders_percent / 100.0,
+            progress=progress,
+        )
+
+
+@app.command(epilog="\b\nExample: catseye plan examples/networks/feed-arm.toml --budget-s 600 --shot-s 5")
+@grouped
+def plan(
+    *,
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
+    datum: Datum = None,
+    asked: _Further,
+    on_paper: _OnPaper,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -277,55 +322,37 @@ def plan(
 
         refuse_output(out, network)
     try:
-        from catseye.estimation.network.plan import plan as planned
-        from catseye.estimation.network.plan import schedule
         from catseye.gateways.network.findings import findings
         from catseye.gateways.network.plan import PlanFindings
         from catseye.records.network.any_file import read_network
-        from catseye.reduction.network import measured_on_paper
 
-        read = _read(read_network, network)
-        names = None if interest is None else [p.strip() for p in interest.split(",") if p.strip()]
-        worth = planned(read, datum=datum, interest=names, most=most)
-        picked = schedule(worth, budget_s=budget_s, shot_s=shot_s) if budget_s is not None else ()
-        runs_made = (
-            measured_on_paper(
-                worth.solution.network,
-                runs=runs,
-                seed=seed,
-                air_ppm=air_ppm,
-                station_ppm=station_ppm,
-                refraction=refraction,
-                blunders=blunders_percent / 100.0,
-                progress=progress,
-            )
-            if runs
-            else None
-        )
-        told = PlanFindings(findings(worth.solution), worth, picked, runs_made)
+        observed = _read(read_network, network)
+        worth, picked = asked.plan(observed, datum)
+        scatter = on_paper.scatter(worth.solution.network, progress)
+        plan_findings = PlanFindings(findings(worth.solution), worth, picked, scatter)
         if out is not None:
             from catseye.gateways.network.files import input_hashes
             from catseye.gateways.network.plan import write_plan
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, network) as directory:
-                write_plan(told, directory, input_hashes(network), progress)
+                write_plan(plan_findings, directory, input_hashes(network), progress)
     finally:
         progress.clear()
-    _tell_plan(told, json, quiet, out)
+    _tell_plan(plan_findings, json, quiet, out)
 
 
-def _tell_plan(told: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
+def _tell_plan(plan_findings: "PlanFindings", json: bool, quiet: bool, out: Path | None) -> None:
     if json:
         from catseye.gateways.network.plan import plan_json
 
-        say("".join(plan_json(told)).rstrip("\n"))
+        say("".join(plan_json(plan_findings)).rstrip("\n"))
         return
     if quiet:
         return
     from catseye.gateways.network.plan import plan_passages
 
-    for passage in plan_passages(told):
+    for passage in plan_passages(plan_findings):
         say(wrapped(passage.title, passage.text))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, points.csv, candidates.csv, plan.json"))

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, Quiet, app, known_model, uncertainty
+from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.point import time_text
 from catseye.cli.terminal import say
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 
@@ -105,7 +106,7 @@ def air(
     humidity_percent: Annotated[float, typer.Option("--humidity-percent", help="Over liquid water, %.")] = 50.0,
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of vacuum, µm.")] = 0.780,
     model: Annotated[
-        str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula of the index.")
+        str, typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula of the index.")
     ] = "ciddor_hill1999",
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
@@ -115,7 +116,7 @@ def air(
     quiet: Quiet = False,
 ) -> None:
     """The index of air against each variable, with its uncertainty and the other models."""
-    from catseye.gateways.air.air_figures import air_plot
+    from catseye.gateways.air.air_figures import StateUncertainty, air_plot
 
     drawn = air_plot(
         temperature_c,
@@ -124,9 +125,7 @@ def air(
         wavelength_um=wavelength_um,
         model=model,
         co2_ppm=co2_ppm,
-        u_temperature_c=u_temperature_c,
-        u_pressure_hpa=u_pressure_hpa,
-        u_humidity_percent=u_humidity_percent,
+        uncertainty=StateUncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent),
     )
     _finish("air", drawn, out, json, quiet)
 
@@ -216,18 +215,18 @@ def _finish(
     from catseye.gateways.writers.objects import json_line
     from catseye.gateways.writers.output import whole_file
 
-    text, told = drawn
+    text, summary = drawn
     for given in inputs:
         if given is not None and given.resolve() == out.resolve():
             raise InputError(f"--out {out}: is an input of this figure (expected another name)")
     with whole_file(out, "--out", MARK) as pieces:
         pieces.append(text.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
     if json:
-        say(json_line({"kind": kind, "written": str(out), **told}))
+        say(json_line({"kind": kind, "written": str(out), **summary}))
     elif not quiet:
-        for line in (*_lines(told), f"written to {out}"):
+        for line in (*_lines(summary), f"written to {out}"):
             say(line)
 
 
-def _lines(told: dict[str, Any]) -> list[str]:
-    return [f"{key.replace('_', ' ')}: {value}" for key, value in told.items() if value not in (None, "")]
+def _lines(summary: dict[str, Any]) -> list[str]:
+    return [f"{key.replace('_', ' ')}: {value}" for key, value in summary.items() if value not in (None, "")]

@@ -90,8 +90,8 @@ def _say_objects(units: "Units") -> None:
     from catseye.gateways.triplet.objects import triplet_object
     from catseye.gateways.writers.objects import json_line
 
-    told = [triplet_object(found, path.name) for path, found in units]
-    say(json_line(told[0] if len(told) == 1 else told))
+    objects = [triplet_object(reduction, path.name) for path, reduction in units]
+    say(json_line(objects[0] if len(objects) == 1 else objects))
 
 
 def _tell(units: "Units", out: Path | None, blank: Path | None) -> None:
@@ -99,11 +99,11 @@ def _tell(units: "Units", out: Path | None, blank: Path | None) -> None:
     from catseye.gateways.triplet.sheet import text_sheet, verdict
 
     if len(units) == 1:
-        ((path, found),) = units
-        say(text_sheet(found, path.name).rstrip())
-    for path, found in units if len(units) > 1 else ():
-        say(f"{path.name}: triplet {found.measurement.triplet}")
-        for title, text in verdict(found):
+        ((path, reduction),) = units
+        say(text_sheet(reduction, path.name).rstrip())
+    for path, reduction in units if len(units) > 1 else ():
+        say(f"{path.name}: triplet {reduction.measurement.triplet}")
+        for title, text in verdict(reduction):
             say(wrapped(title, text))
     if out is not None:
         say(wrapped("Written to", f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"))

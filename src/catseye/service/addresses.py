@@ -32,17 +32,17 @@ def read_addresses(path: Path, site: SiteFolder) -> tuple[dict[str, Address], tu
     top = Fields(name, "top", values)
     if top.text("format") != FORMAT:
         raise refusal(name, f"format = {shown(values['format'])} (expected {FORMAT!r})")
-    found: dict[str, Address] = {}
+    addresses: dict[str, Address] = {}
     for table in top.tables("ranger"):
         ranger = table.text("name")
         if ranger not in site.rangers:
             raise table.refuse(f"name = {shown(ranger)} is no ranger of the site (expected {', '.join(site.rangers)})")
-        if ranger in found:
+        if ranger in addresses:
             raise table.refuse(f"name = {shown(ranger)} stands there twice (expected once)")
-        found[ranger] = Address(table.text("host"), _ports(table))
-    if not found:
+        addresses[ranger] = Address(table.text("host"), _ports(table))
+    if not addresses:
         raise refusal(name, "names no ranger (expected [[ranger]] with name and host)")
-    return found, None if not top.has("feed") else _feed(top)
+    return addresses, None if not top.has("feed") else _feed(top)
 
 
 def _ports(table: Fields) -> tuple[int, int]:

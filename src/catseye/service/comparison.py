@@ -123,15 +123,15 @@ class TwinComparison:
     def _truth(self, names: list[str], times: Array, answer: Mapping[str, Any]) -> tuple[Array, Array]:
         """Mean true places (n, 3), in each point's own frame and carried to the epoch's instant, ground frame."""
         places = self._twin.points(names, times)
-        told = self._twin.posture(times)
+        posture = self._twin.posture(times)
         own = places.mean(axis=0)
         carried = own.copy()
         for frame in sorted({self._frames[n] for n in names} - {GROUND}):
-            mine = [k for k, n in enumerate(names) if self._frames[n] == frame]
-            back = ground_from(self._site, frame, told.azimuth, told.elevation).inverse()
-            here = np.stack([back.points(places[:, k]) for k in mine], axis=1).mean(axis=0)
+            members = [k for k, n in enumerate(names) if self._frames[n] == frame]
+            back = ground_from(self._site, frame, posture.azimuth, posture.elevation).inverse()
+            here = np.stack([back.points(places[:, k]) for k in members], axis=1).mean(axis=0)
             then = ground_from(self._site, frame, answer["azimuth"], answer["elevation"]).single
-            own[mine], carried[mine] = here, then.points(here)
+            own[members], carried[members] = here, then.points(here)
         return own, carried
 
     def _offsets(self, answer: Mapping[str, Any], own: Mapping[str, Array]) -> tuple[Array, Array, Array]:

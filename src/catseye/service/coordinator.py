@@ -72,6 +72,18 @@ class Orders:
     solids: Path | None = None
 
 
+@dataclass(frozen=True)
+class Peers:
+    """Whom a coordinator connects to.
+
+    rangers   their addresses by name; those that are not in it are not of this coordinator
+    feed      host and port of weather and telescope, a motion known beforehand, or None
+    """
+
+    rangers: Mapping[str, Address]
+    feed: Feed
+
+
 class NoJournal:
     """Nothing is kept: everything is acknowledged at once."""
 
@@ -110,11 +122,10 @@ class WaitingJournal:
 class LiveCoordinator:
     """A site's coordinator, ready to run.
 
-    addresses   of the rangers, by name; those that are not in it are not of this coordinator
-    feed        host and port, a motion known beforehand, or None
-    seed        of a simulated site, for the journal
-    virtual     its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
-    tell        told of the journal's trouble at once, by any thread
+    peers     rangers and feed
+    seed      of a simulated site, for the journal
+    virtual   its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
+    tell      told of the journal's trouble at once, by any thread
 
     Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
     """
@@ -123,18 +134,17 @@ class LiveCoordinator:
         self,
         site: SiteFolder,
         orders: Orders,
+        peers: Peers,
         *,
-        addresses: Mapping[str, Address],
-        feed: Feed,
         clock: Clock,
         seed: int | None = None,
         network: ConnectionMaker | None = None,
         virtual: bool = False,
         tell: Callable[[str, bool], None] = lambda text, alarm: None,
     ):
-        strange = sorted(set(orders.drop) - set(addresses))
+        strange = sorted(set(orders.drop) - set(peers.rangers))
         if strange:
-            raise InputError(f"--drop {strange[0]}: no such ranger here (expected one of {', '.join(addresses)})")
+            raise InputError(f"--drop {strange[0]}: no such ranger here (expected one of {', '.join(peers.rangers)})")
         self.site, self.orders = site, orders
         self.settings = LiveSettings(filter=orders.filter)
         self.live = Live(site, self.settings)
@@ -148,7 +158,7 @@ class LiveCoordinator:
         self._solver = None if virtual else SolverProcess(self.live.site)
         self.ziy = Coordinator(
             site,
-            addresses=addresses,
+            addresses=peers.rangers,
             parts=CoordinatorParts(
                 self.live,
                 self.planner,
@@ -157,7 +167,7 @@ class LiveCoordinator:
                 None if self._solver is None else self._solver.solve,
             ),
             environment=Environment(clock, network, seed or 0),
-            feed=feed,
+            feed=peers.feed,
             mode=orders.mode,
             commands=initialising_commands(site),
         )

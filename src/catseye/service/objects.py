@@ -47,7 +47,7 @@ def simulation_object(
 
 
 def _epoch(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
-    told = {
+    epoch = {
         "number": row["number"],
         "mjd": row["ticks"] / TICKS_PER_DAY,
         "points": row["names"],
@@ -55,8 +55,8 @@ def _epoch(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, A
         "rejected": row["rejected"],
     }
     if compared is None:
-        return told
-    return told | {
+        return epoch
+    return epoch | {
         "compared": compared.points,
         "rms_mm": compared.rms_mm,
         "worst_mm": compared.worst_mm,
@@ -65,8 +65,8 @@ def _epoch(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, A
         "chi2_per_coordinate": compared.chi2,
         "chi2_band": list(compared.band),
         "beam": {
-            key: {"found": found / unit, "u": u / unit, "true": true / unit}
-            for (key, _, unit, _), found, u, true in zip(
+            key: {"found": offset / unit, "u": u / unit, "true": true / unit}
+            for (key, _, unit, _), offset, u, true in zip(
                 OFFSETS, compared.offset, compared.u_offset, compared.true_offset, strict=True
             )
         },
@@ -88,11 +88,11 @@ def epoch_line(compared: EpochComparison) -> str:
 
 def beam_lines(compared: EpochComparison) -> Iterator[str]:
     """Where the beam points since the reference epoch, beside the truth; nothing before."""
-    for (_, name, unit, symbol), found, u, true in zip(
+    for (_, name, unit, symbol), offset, u, true in zip(
         OFFSETS, compared.offset, compared.u_offset, compared.true_offset, strict=True
     ):
-        if math.isfinite(found):
-            yield f"{name:<21} {found / unit:+7.3f} ± {u / unit:.3f} {symbol}   true {true / unit:+7.3f} {symbol}"
+        if math.isfinite(offset):
+            yield f"{name:<21} {offset / unit:+7.3f} ± {u / unit:.3f} {symbol}   true {true / unit:+7.3f} {symbol}"
 
 
 def summary(
@@ -100,7 +100,7 @@ def summary(
 ) -> list[tuple[str, str]]:
     """Title and text of each passage."""
     bad = {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD}
-    told = [
+    passages = [
         (
             "Shots",
             f"{sum(book.statuses.values())} by {rangers} rangers in {seconds:.0f} s, all acknowledged; "
@@ -109,12 +109,12 @@ def summary(
         )
     ]
     if not book.epochs:
-        told.append(("Epochs", "none was solved: the time was too short (expected half a minute at least)."))
+        passages.append(("Epochs", "none was solved: the time was too short (expected half a minute at least)."))
     compared = list(book.comparisons.values())
     if compared:
         last = compared[-1]
         inside = sum(each.fits for each in compared)
-        told.append(
+        passages.append(
             (
                 "Truth",
                 f"{len(book.epochs)} epochs. The last, {epoch_line(last)}. In {inside} of {len(compared)} epochs "
@@ -123,19 +123,21 @@ def summary(
         )
         lines = list(beam_lines(last))
         if lines:
-            told.append(("Beam", "; ".join(" ".join(line.split()) for line in lines) + ", since the reference epoch."))
+            passages.append(
+                ("Beam", "; ".join(" ".join(line.split()) for line in lines) + ", since the reference epoch.")
+            )
     counts = book.troubles.counts
     worst = sorted(counts.items(), key=lambda pair: (pair[0][1] in OF_THE_LINE, -pair[1]))[:TOLD]
     if worst:
-        told.append(
+        passages.append(
             (
                 "Noticed",
                 "; ".join(f"{book.troubles.texts[key]}" + (f" ({n} times)" if n > 1 else "") for key, n in worst) + ".",
             )
         )
     if world.faults:
-        told.append(("Faults", "on command: " + "; ".join(world.faults) + "."))
-    told.append(
+        passages.append(("Faults", "on command: " + "; ".join(world.faults) + "."))
+    passages.append(
         ("Journal", f"{journal}: catseye replay {journal}" if journal else "none was kept (--journal FILE keeps it).")
     )
-    return told
+    return passages

@@ -63,6 +63,23 @@ class LateSockets(Sockets):
                 ) from problem
 
 
+@dataclass(frozen=True)
+class ServedAt:
+    """Where rangers shall listen.
+
+    addresses   "loopback", a port base, 0 for any free ports
+    host        of all ports; None: as `addresses` says
+    ports       of the one ranger that is served; None: as `addresses` says
+    """
+
+    addresses: Addresses = PORT_BASE
+    host: str | None = None
+    ports: tuple[int, int] | None = None
+
+
+USUAL_PORTS = ServedAt()
+
+
 class RangersServed:
     """Rangers on TCP, with the twin's feed where there is a twin.
 
@@ -70,9 +87,7 @@ class RangersServed:
     heads       by ranger; only these are served
     clock       of the twin, or of the machine
     twin        whose faults and feed count; None: real heads, no feed
-    addresses   "loopback", a port base, 0 for any free ports
-    host        of all ports; None: as `addresses` says
-    ports       of the one ranger that is served; None: as `addresses` says
+    at          where they listen
     files       folder of initialisation files; None: a temporary one
     warming     the heads' clock: with it the rangers are ready before anybody connects
     """
@@ -84,9 +99,7 @@ class RangersServed:
         *,
         clock: Clock,
         twin: Twin | None = None,
-        addresses: Addresses = PORT_BASE,
-        host: str | None = None,
-        ports: tuple[int, int] | None = None,
+        at: ServedAt = USUAL_PORTS,
         files: Path | None = None,
         network: ConnectionMaker | None = None,
         warming: WarmingClock | None = None,
@@ -100,17 +113,17 @@ class RangersServed:
             heads,
             world_faults=FaultBoard() if twin is None else twin.faults,
             seconds=lambda: (clock.now_ns() - begun) * 1e-9 if twin is None else twin.seconds(clock.now_ns()),
-            addresses=addresses,
+            addresses=at.addresses,
             files=files,
             network=network,
         )
         for name, (usual, *both) in list(self._served.addresses.items()):
-            first, second = ports or both
-            self._served.addresses[name] = (host or usual, first, second)
+            first, second = at.ports or both
+            self._served.addresses[name] = (at.host or usual, first, second)
         self._feed: SiteFeed | None = None
-        self._feed_at = feed_address(addresses) if addresses else (feed_address()[0], 0)
-        if host is not None:
-            self._feed_at = (host, self._feed_at[1])
+        self._feed_at = feed_address(at.addresses) if at.addresses else (feed_address()[0], 0)
+        if at.host is not None:
+            self._feed_at = (at.host, self._feed_at[1])
         if twin is not None:
             stations = tuple(station.name for station in site.site.weather_station)
             self._feed = SiteFeed(site.site.campaign.name, stations, twin, clock, network=network)
@@ -146,15 +159,15 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        made = getattr(importlib.import_module(module), name)
+        head_of = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, SyntaxError) as problem:
         raise InputError(f"--head {factory}: cannot be had: {problem} (expected package.module:factory)") from problem
-    if not callable(made):
+    if not callable(head_of):
         raise InputError(f"--head {factory}: {name} cannot be called (expected a function of a ranger's name)")
     heads: dict[str, RangerHead] = {}
     for ranger in rangers:
         try:
-            head = made(ranger)
+            head = head_of(ranger)
         except (CatseyeError, OSError) as problem:
             raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
         missing = [each for each in dir(RangerHead) if not each.startswith("_") and not hasattr(head, each)]

@@ -31,8 +31,8 @@ class Moved:
 
 
 @dataclass
-class ReplayFound:
-    """What came of it.
+class ReplayOutcome:
+    """What came of a run that was replayed: counts of what is the same, and how far points moved.
 
     run            that was replayed
     calibrations   folder of other records, None for the run's own
@@ -60,7 +60,7 @@ class ReplayFound:
         return self.epochs == self.same_epochs and self.shots == self.same_shots
 
 
-def replayed(journal: str, which: int | str | None, calibrations: Path | None, progress: Progress) -> ReplayFound:
+def replayed(journal: str, which: int | str | None, calibrations: Path | None, progress: Progress) -> ReplayOutcome:
     """A run again, with its own records or others.
 
     Raises InputError: no such journal, run or folder; a run that does not say how it was reduced; nothing solved in it.
@@ -76,29 +76,29 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, p
         total = sum(1 for _ in reader.solutions(run.run))
         if not total:
             raise InputError(f"journal {reader.place}: run {run.run} holds no epoch (expected one at least)")
-        found = ReplayFound(run, calibrations)
+        outcome = ReplayOutcome(run, calibrations)
         off: dict[str, list[np.ndarray]] = defaultdict(list)
         for each in replay(reader, run.run, made):
-            progress("epochs", found.epochs, total)
-            _count(found, each)
-            _compare(found, each, off)
-    found.moved = {name: _moved(np.array(rows) / MILLIMETRE) for name, rows in sorted(off.items())}
-    return found
+            progress("epochs", outcome.epochs, total)
+            _count(outcome, each)
+            _compare(outcome, each, off)
+    outcome.moved = {name: _moved(np.array(rows) / MILLIMETRE) for name, rows in sorted(off.items())}
+    return outcome
 
 
-def _count(found: ReplayFound, each: Replayed) -> None:
-    found.epochs += 1
-    found.shots += each.shots
-    found.same_epochs += each.stored.same(each.new)
-    found.same_shots += each.shots - len(each.differing)
-    if not each.same and not found.first:
+def _count(outcome: ReplayOutcome, each: Replayed) -> None:
+    outcome.epochs += 1
+    outcome.shots += each.shots
+    outcome.same_epochs += each.stored.same(each.new)
+    outcome.same_shots += each.shots - len(each.differing)
+    if not each.same and not outcome.first:
         what = "a shot" if each.differing else "its solution"
-        found.first = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
+        outcome.first = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
 
 
-def _compare(found: ReplayFound, each: Replayed, off: dict[str, list[np.ndarray]]) -> None:
+def _compare(outcome: ReplayOutcome, each: Replayed, off: dict[str, list[np.ndarray]]) -> None:
     before, after = _places(each.stored), _places(each.new)
-    found.lost += len(set(before) - set(after))
+    outcome.lost += len(set(before) - set(after))
     for name in set(before) & set(after):
         off[name].append(after[name] - before[name])
 
@@ -113,48 +113,48 @@ def _moved(rows: np.ndarray) -> Moved:
     return Moved((float(mean[0]), float(mean[1]), float(mean[2])), float(np.linalg.norm(rows, axis=1).max()), len(rows))
 
 
-def replay_object(found: ReplayFound) -> dict[str, Any]:
+def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
     """What `catseye replay --json` prints."""
     return {
-        "run": found.run.run,
-        "uuid": found.run.uuid,
-        "site": found.run.site,
-        "calibrations": None if found.calibrations is None else str(found.calibrations),
-        "epochs": found.epochs,
-        "epochs_same": found.same_epochs,
-        "shots": found.shots,
-        "shots_same": found.same_shots,
-        "same": found.same,
-        "first_difference": found.first or None,
+        "run": outcome.run.run,
+        "uuid": outcome.run.uuid,
+        "site": outcome.run.site,
+        "calibrations": None if outcome.calibrations is None else str(outcome.calibrations),
+        "epochs": outcome.epochs,
+        "epochs_same": outcome.same_epochs,
+        "shots": outcome.shots,
+        "shots_same": outcome.same_shots,
+        "same": outcome.same,
+        "first_difference": outcome.first or None,
         "points": {
             name: {"mean_mm": list(m.mean_mm), "largest_mm": m.largest_mm, "epochs": m.epochs}
-            for name, m in found.moved.items()
+            for name, m in outcome.moved.items()
         },
-        "points_lost": found.lost,
+        "points_lost": outcome.lost,
     }
 
 
-def replay_passages(found: ReplayFound) -> list[tuple[str, str]]:
+def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     """What a replay came to: title and text of each passage."""
-    run = found.run
-    told = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {found.shots} shots.")]
-    if found.same:
-        told.append(("Epochs", f"{found.epochs} the same bit for bit, and all {found.shots} shots."))
-        return told
-    told.append(
+    run = outcome.run
+    passages = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {outcome.shots} shots.")]
+    if outcome.same:
+        passages.append(("Epochs", f"{outcome.epochs} the same bit for bit, and all {outcome.shots} shots."))
+        return passages
+    passages.append(
         (
             "Epochs",
-            f"{found.same_epochs} of {found.epochs} the same bit for bit, {found.same_shots} of {found.shots} shots; "
-            f"the first that differs is {found.first}.",
+            f"{outcome.same_epochs} of {outcome.epochs} the same bit for bit, {outcome.same_shots} of {outcome.shots} "
+            f"shots; the first that differs is {outcome.first}.",
         )
     )
-    if found.calibrations is None and not run.buffers:
-        told.append(("Why", "the run kept no samples (catseye ziy --keep-buffers keeps them)."))
-    for name, m in sorted(found.moved.items(), key=lambda pair: -pair[1].largest_mm)[:TOLD]:
+    if outcome.calibrations is None and not run.buffers:
+        passages.append(("Why", "the run kept no samples (catseye ziy --keep-buffers keeps them)."))
+    for name, m in sorted(outcome.moved.items(), key=lambda pair: -pair[1].largest_mm)[:TOLD]:
         x, y, z = m.mean_mm
-        told.append(
+        passages.append(
             (name, f"{x:+.3f}, {y:+.3f}, {z:+.3f} mm on the mean of {m.epochs} epochs, at most {m.largest_mm:.3f} mm")
         )
-    if len(found.moved) > TOLD:
-        told.append(("And", f"{len(found.moved) - TOLD} more points, which moved less (--json has them)."))
-    return told
+    if len(outcome.moved) > TOLD:
+        passages.append(("And", f"{len(outcome.moved) - TOLD} more points, which moved less (--json has them)."))
+    return passages

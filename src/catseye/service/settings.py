@@ -31,31 +31,31 @@ def live_settings(stored: Mapping[str, Any], place: str) -> LiveSettings:
     >>> live_settings(settings_object(LiveSettings(u_flexure_mm=7.0)), "run 1").u_flexure_mm
     7.0
     """
-    told = stored.get(KEY)
-    if not isinstance(told, Mapping):
+    live = stored.get(KEY)
+    if not isinstance(live, Mapping):
         raise InputError(f"{place}: does not say how it was reduced (expected {KEY!r} in its settings)")
-    found = _filled(LiveSettings(), told, place, KEY)
-    if found.filter not in FILTERS:
-        raise InputError(f"{place}: live.filter = {found.filter!r} (expected one of {', '.join(FILTERS)})")
-    return found
+    settings = _filled(LiveSettings(), live, place, KEY)
+    if settings.filter not in FILTERS:
+        raise InputError(f"{place}: live.filter = {settings.filter!r} (expected one of {', '.join(FILTERS)})")
+    return settings
 
 
-def _filled(usual: Any, told: Mapping[str, Any], place: str, where: str) -> Any:
+def _filled(usual: Any, given: Mapping[str, Any], place: str, where: str) -> Any:
     """A dataclass like the usual one, with what is told in place of its own."""
     known = {each.name: getattr(usual, each.name) for each in fields(usual)}
-    strange = sorted(set(told) - set(known))
+    strange = sorted(set(given) - set(known))
     if strange:
         raise InputError(f"{place}: {where}.{strange[0]} is not known (expected a journal of this version or older)")
-    return type(usual)(**{name: _value(known[name], told[name], place, f"{where}.{name}") for name in told})
+    return type(usual)(**{name: _value(known[name], given[name], place, f"{where}.{name}") for name in given})
 
 
-def _value(usual: Any, told: Any, place: str, where: str) -> Any:
-    if is_dataclass(usual) and isinstance(told, Mapping):
-        return _filled(usual, told, place, where)
-    if isinstance(usual, Mapping) and isinstance(told, Mapping):
-        return {str(name): float(value) for name, value in told.items()}
-    if isinstance(usual, float) and isinstance(told, float | int) and not isinstance(told, bool):
-        return float(told)
-    if type(told) is type(usual):
-        return told
-    raise InputError(f"{place}: {where} = {told!r} (expected something like {usual!r})")
+def _value(usual: Any, given: Any, place: str, where: str) -> Any:
+    if is_dataclass(usual) and isinstance(given, Mapping):
+        return _filled(usual, given, place, where)
+    if isinstance(usual, Mapping) and isinstance(given, Mapping):
+        return {str(name): float(value) for name, value in given.items()}
+    if isinstance(usual, float) and isinstance(given, float | int) and not isinstance(given, bool):
+        return float(given)
+    if type(given) is type(usual):
+        return given
+    raise InputError(f"{place}: {where} = {given!r} (expected something like {usual!r})")

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -14,7 +14,7 @@ from catseye.records.site.folder import SiteFolder
 from catseye.service.book import LiveBook
 from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison
-from catseye.service.coordinator import LiveCoordinator, Orders
+from catseye.service.coordinator import LiveCoordinator, Orders, Peers
 from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.warm import WarmingClock
@@ -88,7 +88,7 @@ class Simulation:
         try:
             at = await _first(heard.get(), twin)
             self.view.tell("starting the coordinator")
-            await self._measure(addresses_of(at), at.feed, self.world.clock(), None, twin)
+            await self._measure(peers_of(at), self.world.clock(), None, twin)
         finally:
             await _ended(twin)
 
@@ -117,14 +117,13 @@ class Simulation:
         try:
             at = await _first(heard.get(), twin)
             self.view.tell("starting the coordinator")
-            await self._measure(addresses_of(at), at.feed, clock, network, twin)
+            await self._measure(peers_of(at), clock, network, twin)
         finally:
             await _ended(twin)
 
     async def _measure(
         self,
-        addresses: Mapping[str, Address],
-        feed: tuple[str, int] | None,
+        peers: Peers,
         clock: Any,
         network: MemoryNetwork | None,
         twin: "asyncio.Task[None]",
@@ -132,8 +131,7 @@ class Simulation:
         running = LiveCoordinator(
             self.site,
             self.orders,
-            addresses=addresses,
-            feed=feed,
+            peers,
             clock=clock,
             seed=self.world.seed,
             network=network,
@@ -179,17 +177,17 @@ def twin_arguments(name: str, world: TwinWords, port_base: int) -> list[str]:
 def listening_of(line: str) -> Listening:
     """Where a child says that it listens. Raises InputError for any other line."""
     try:
-        told = json.loads(line)
-        rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in told["rangers"].items()}
-        feed = None if told["feed"] is None else (str(told["feed"][0]), int(told["feed"][1]))
+        stored = json.loads(line)
+        rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in stored["rangers"].items()}
+        feed = None if stored["feed"] is None else (str(stored["feed"][0]), int(stored["feed"][1]))
     except (ValueError, KeyError, TypeError) as problem:
         raise InputError(f"the twin said {line[:80]!a} (expected where it listens)") from problem
     return Listening(rangers, feed)
 
 
-def addresses_of(at: Listening) -> dict[str, Address]:
-    """For the coordinator's links."""
-    return {name: Address(host, (first, second)) for name, (host, first, second) in at.rangers.items()}
+def peers_of(at: Listening) -> Peers:
+    """Whom a coordinator connects to: rangers as they listen, and the feed."""
+    return Peers({name: Address(host, (first, second)) for name, (host, first, second) in at.rangers.items()}, at.feed)
 
 
 async def _first(work: Coroutine[Any, Any, Any], *others: "asyncio.Task[Any]") -> Any:

@@ -152,7 +152,7 @@ def _received(pipe: Any) -> bytes:
 
 
 def _exactly(pipe: BinaryIO, count: int) -> bytes:
-    found = pipe.read(count)
-    if len(found) < count:
-        raise EOFError(f"{len(found)} bytes of {count}")
-    return found
+    content = pipe.read(count)
+    if len(content) < count:
+        raise EOFError(f"{len(content)} bytes of {count}")
+    return content

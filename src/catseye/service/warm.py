@@ -74,9 +74,9 @@ async def warm(
 
     Raises InputError: a command, or the search for an index, is refused.
     """
-    told = initialising_commands(site)
+    commands = initialising_commands(site)
     for name, ranger in rangers.items():
-        for request in Preparation.of(told(name)).requests:
+        for request in Preparation.of(commands(name)).requests:
             answer = ranger.work_of(CLIENT, request)
             if not isinstance(answer, tuple):
                 raise InputError(f"{name}: {request.command} takes time (expected what is done at once)")
@@ -105,13 +105,13 @@ class _Asked:
         """What it answers; f = 0 where it does not within s of its own time."""
         self._tid += 1
         until = self._clock.now_ns() + round(timeout * PER_SECOND)
-        told = self._ranger.receive(CLIENT, format_request(replace(request, tid=self._tid)))
+        replies = self._ranger.receive(CLIENT, format_request(replace(request, tid=self._tid)))
         while True:
-            for out in told:
+            for out in replies:
                 if out.reply.tid == self._tid or out.reply.command == "LINE":
                     return out.reply
             if self._clock.now_ns() >= until:
                 return Reply(request.command, False, ("no reply",), 0, None)
-            told = self._ranger.turn()
-            if not told:
+            replies = self._ranger.turn()
+            if not replies:
                 self._clock.advance(STEP)

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.atmosphere.index.air import MODELS, air, group_refractivity
 from catseye.errors import ValidityError
-from catseye.gateways.air.air_figures import NAMES, VARIABLES, _draw, air_plot
+from catseye.gateways.air.air_figures import NAMES, VARIABLES, StateUncertainty, _draw, air_plot
 from catseye.gateways.writers.drawing import Figure
 
 USUAL = {"u_temperature_c": 0.2, "u_pressure_hpa": 0.3, "u_humidity_percent": 3.0}
@@ -16,7 +16,7 @@ USUAL = {"u_temperature_c": 0.2, "u_pressure_hpa": 0.3, "u_humidity_percent": 3.
 
 @pytest.fixture(scope="module")
 def usual():
-    return air_plot(20.0, 933.0, 50.0, **USUAL)
+    return air_plot(20.0, 933.0, 50.0, uncertainty=StateUncertainty(0.2, 0.3, 3.0))
 
 
 def test_every_variable_and_every_model_is_named_in_the_figure(usual):
@@ -36,7 +36,7 @@ def test_every_variable_and_every_model_is_named_in_the_figure(usual):
 
 
 def test_the_same_state_gives_the_same_figure(usual):
-    assert air_plot(20.0, 933.0, 50.0, **USUAL)[0] == usual[0]
+    assert air_plot(20.0, 933.0, 50.0, uncertainty=StateUncertainty(0.2, 0.3, 3.0))[0] == usual[0]
 
 
 def test_what_it_tells_is_what_the_models_say(usual):
@@ -108,8 +108,8 @@ def test_bands_are_one_u_to_each_side_and_lines_are_other_less_chosen():
         ({"pressure_hpa": 101_325.0}, "pressure 101325 hPa is outside"),
         ({"humidity_percent": np.nan}, "relative humidity is not a number"),
         ({"wavelength_um": 10.6}, "wavelength 10.6 um is outside"),
-        ({"u_temperature_c": -0.1}, "u of temperature -0.1 C is outside"),
-        ({"u_pressure_hpa": np.nan}, "u of pressure is not a number"),
+        ({"uncertainty": StateUncertainty(temperature_c=-0.1)}, "u of temperature -0.1 C is outside"),
+        ({"uncertainty": StateUncertainty(pressure_hpa=np.nan)}, "u of pressure is not a number"),
         ({"model": "edlen"}, "air model 'edlen' is unknown"),
     ],
 )

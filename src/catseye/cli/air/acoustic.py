@@ -8,16 +8,8 @@ import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import THERMOMETRY_MODELS, one_of
 from catseye.errors import InputError
-
-# as in catseye.atmosphere.sound.speed, whose import --help spares itself
-SOUND_MODELS = "real_gas|cramer1993|parker2004"
-
-
-def _known_sound(name: str) -> str:
-    if name not in SOUND_MODELS.split("|"):
-        raise typer.BadParameter(f"{name!r} is not one of {SOUND_MODELS.replace('|', ', ')}.")
-    return name
 
 
 @app.command(
@@ -41,7 +33,12 @@ def acoustic(
     ] = None,
     model: Annotated[
         str,
-        typer.Option("--model", metavar=SOUND_MODELS, callback=_known_sound, help="Formula for the speed of sound."),
+        typer.Option(
+            "--model",
+            metavar=THERMOMETRY_MODELS,
+            callback=one_of(THERMOMETRY_MODELS),
+            help="Formula for the speed of sound.",
+        ),
     ] = "real_gas",
     air_model: AirModel = "ciddor_hill1999",
     json: Json = False,

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from catseye.cli.commands import MODELS, Json, app, known_model, uncertainty
+from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 U = {"callback": uncertainty}
 Temperature = Annotated[float, typer.Option("--temperature-c", help="Air temperature, °C.")]
 Model = Annotated[
-    str, typer.Option("--model", metavar=MODELS, callback=known_model, help="Formula for the index of air.")
+    str, typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air.")
 ]
 CarbonDioxide = Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm; only ciddor_hill1999 has it.")]
 
@@ -111,15 +112,15 @@ def air(
         u_co2_ppm=u_co2_ppm,
         formula=IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm),
     )
-    found = air_object(state, wavelength_um, u)
+    answer = air_object(state, wavelength_um, u)
     if surface_c is not None:
         u_weather = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
         surface = surface_of(state, moisture, surface_c, u_surface_c=u_surface_c, **u_weather)
-        found["condensation"] = surface._asdict()
+        answer["condensation"] = surface._asdict()
     if json:
-        say(json_line(found))
+        say(json_line(answer))
         return
-    for name, value in _rows(found):
+    for name, value in _rows(answer):
         say(wrapped(name, value))
     if surface_c is not None:
         say(wrapped("surface", surface.lines()[0]))
@@ -130,11 +131,11 @@ def _moisture(given: dict[str, float | None], u_of: dict[str, tuple[float, tuple
     from catseye.reduction.air.routes import HYGROMETERS as kinds
     from catseye.reduction.air.routes import Moisture
 
-    said = [kind for kind in kinds if given[kind] is not None]
-    if len(said) != 1:
+    given_kinds = [kind for kind in kinds if given[kind] is not None]
+    if len(given_kinds) != 1:
         ways = ", ".join(f"--{kind.replace('_', '-')}" for kind in kinds)
-        raise typer.BadParameter(f"give one of {ways}{', not several' if said else ''}.", param_hint="humidity")
-    kind = said[0]
+        raise typer.BadParameter(f"give one of {ways}{', not several' if given_kinds else ''}.", param_hint="humidity")
+    kind = given_kinds[0]
     for option, (u, kinds_of) in u_of.items():
         if u > 0.0 and kind not in kinds_of:
             raise typer.BadParameter(f"does not belong to --{kind.replace('_', '-')}.", param_hint=f"'--{option}'")
@@ -171,25 +172,28 @@ def _one_pressure(
         )
 
 
-def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
-    slope = found["sensitivity"]
-    dew_point = f"{found['dew_point_c']:.2f} °C" if math.isfinite(found["dew_point_c"]) else "none"
+def _rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
+    slope = answer["sensitivity"]
+    dew_point = f"{answer['dew_point_c']:.2f} °C" if math.isfinite(answer["dew_point_c"]) else "none"
     carbon = (
         f"{slope['co2_ppm'] * 1e8:+.4f} ppm per 100 ppm of carbon dioxide"
         if slope["co2_ppm"]
-        else f"the formula's air has {found['co2_ppm']:.0f} ppm of carbon dioxide"
+        else f"the formula's air has {answer['co2_ppm']:.0f} ppm of carbon dioxide"
     )
     return [
-        ("group index", f"{found['group_index']:.9f}"),
-        ("phase index", f"{found['phase_index']:.9f}"),
-        ("uncertainty", f"{found['standard_uncertainty']:.2g} (of the group index, 1σ)"),
+        ("group index", f"{answer['group_index']:.9f}"),
+        ("phase index", f"{answer['phase_index']:.9f}"),
+        ("uncertainty", f"{answer['standard_uncertainty']:.2g} (of the group index, 1σ)"),
         ("per °C", f"{slope['temperature_c'] * 1e6:+.4f} ppm"),
         ("per hPa", f"{slope['pressure_hpa'] * 1e6:+.4f} ppm"),
         ("per %", f"{slope['humidity_percent'] * 1e6:+.4f} ppm of relative humidity"),
         ("per nm", f"{slope['wavelength_um'] * 1e3:+.4f} ppm of wavelength"),
         ("CO2", carbon),
-        ("pressure", f"{found['pressure_hpa']:.3f} hPa"),
-        ("vapour", f"{found['vapour_pressure_hpa']:.3f} hPa, {found['humidity_percent']:.2f} %, dew point {dew_point}"),
-        ("modulation", f"{found['group_wavelength']:.9f} m a wavelength at 1500 MHz"),
-        ("formula", f"{found['model']}, {found['wavelength_um']:g} µm"),
+        ("pressure", f"{answer['pressure_hpa']:.3f} hPa"),
+        (
+            "vapour",
+            f"{answer['vapour_pressure_hpa']:.3f} hPa, {answer['humidity_percent']:.2f} %, dew point {dew_point}",
+        ),
+        ("modulation", f"{answer['group_wavelength']:.9f} m a wavelength at 1500 MHz"),
+        ("formula", f"{answer['model']}, {answer['wavelength_um']:g} µm"),
     ]

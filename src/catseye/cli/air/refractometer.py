@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app, known_model
+from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import AIR_MODELS, one_of
 
 SHEET = "as in the sheet if not given"
 
@@ -20,10 +21,6 @@ def _within(low: float, high: float, unit: str) -> Callable[[float | None], floa
         return value
 
     return check
-
-
-def _model(name: str | None) -> str | None:
-    return None if name is None else known_model(name)
 
 
 @app.command(
@@ -45,7 +42,7 @@ def refractometer(
         float | None, typer.Option("--u-path-length-mm", callback=_within(0, 1000, "mm"), help="Of it, mm (1σ).")
     ] = None,
     model: Annotated[
-        str | None, typer.Option("--model", callback=_model, help=f"Formula for the index of air; {SHEET}.")
+        str | None, typer.Option("--model", callback=one_of(AIR_MODELS), help=f"Formula for the index of air; {SHEET}.")
     ] = None,
     wavelength_um: Annotated[
         float | None, typer.Option("--wavelength-um", callback=_within(0.3, 1.7, "µm"), help="Carrier in vacuum, µm.")
@@ -106,12 +103,12 @@ def refractometer(
         changes = {key: value for key, value in given.items() if value is not None}
         progress("calibration", 0, 1)
         known, hashes = read_path_sheet(sheet or readings.with_suffix(".toml"), changes, needed=sheet is not None)
-        found = calibrate_path(read_path_readings(readings, known, hashes))
+        calibration = calibrate_path(read_path_readings(readings, known, hashes))
         if out is not None:
             from catseye.gateways.air.refractometer_report import write_refractometer
 
             with whole_directory(out, readings) as directory:
-                write_refractometer(found, directory, progress)
+                write_refractometer(calibration, directory, progress)
     finally:
         progress.clear()
     from catseye.gateways.air.refractometer_report import passages, refractometer_object
@@ -119,11 +116,11 @@ def refractometer(
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(refractometer_object(found)))
+        say(json_line(refractometer_object(calibration)))
         return
     if quiet:
         return
-    for passage in passages(found):
+    for passage in passages(calibration):
         say(wrapped(passage.title, passage.text))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, group_index.csv, refractometer.json, night.svg"))

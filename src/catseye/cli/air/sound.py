@@ -6,18 +6,9 @@ import typer
 
 from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import SOUND_MODELS, one_of
 
-# as in catseye.atmosphere.sound.speed, whose import --help spares itself
-SOUND_MODELS = "parker2004|cramer1993|real_gas"
 U = {"callback": uncertainty}
-
-
-def _known(name: str) -> str:
-    from catseye.atmosphere.sound.speed import MODELS as known
-
-    if name not in known:
-        raise typer.BadParameter(f"{name!r} is not one of {', '.join(known)}.")
-    return name
 
 
 @app.command(
@@ -35,7 +26,7 @@ def sound(
         typer.Option(
             "--model",
             metavar=SOUND_MODELS,
-            callback=_known,
+            callback=one_of(SOUND_MODELS),
             help="Formula; parker2004 is the notes' as printed, real_gas measures temperature.",
         ),
     ] = "parker2004",
@@ -54,9 +45,9 @@ def sound(
     weather = (temperature_c, pressure_hpa, humidity_percent)
     state = sound_of(*weather, model=model, co2_ppm=co2_ppm)
     u = float(state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm))
-    found = sound_object(state, weather, co2_ppm, u)
+    answer = sound_object(state, weather, co2_ppm, u)
     if json:
-        say(json_line(found))
+        say(json_line(answer))
         return
-    for title, text in sound_rows(found):
+    for title, text in sound_rows(answer):
         say(wrapped(title, text))

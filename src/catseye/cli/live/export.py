@@ -6,12 +6,11 @@ from typing import Annotated, Literal
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.live.options import one_of, time_of
+from catseye.cli.live.options import time_of
 from catseye.cli.live.replay import JournalArgument, RunName, run_of
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import EXPORT_FORMATS, one_of
 from catseye.errors import InputError
-
-FORMS = "csv|fits|campaign"
 
 
 @app.command(
@@ -20,7 +19,10 @@ FORMS = "csv|fits|campaign"
 )
 def export(
     journal: JournalArgument,
-    to: Annotated[str, typer.Option("--to", metavar=FORMS, callback=one_of(FORMS), help="Tables, or a campaign.")],
+    to: Annotated[
+        str,
+        typer.Option("--to", metavar=EXPORT_FORMATS, callback=one_of(EXPORT_FORMATS), help="Tables, or a campaign."),
+    ],
     out: Annotated[
         Path,
         typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
@@ -59,8 +61,8 @@ def export(
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        told = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
-        say(json_line(told))
+        summary = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
+        say(json_line(summary))
     elif not quiet:
         rows = ", ".join(f"{count} {name}" for name, count in counts.items())
         say(wrapped("Written to", f"{out}/: run {number}, {rows}."))

@@ -9,29 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catseye.cli.terminal import say
+from catseye.cli.vocabularies import CONDITIONS, FILTERS, MODES, one_of
 from catseye.errors import CatseyeError
 
 if TYPE_CHECKING:
     from catseye.records.site.folder import SiteFolder
+    from catseye.service.coordinator import Orders
     from catseye.service.running import LiveRun
 
-CONDITIONS = "night|windy-day|dewy-night"  # as in catseye.service.world, whose import --help spares itself
-MODES = "active|passive|hold"
-FILTERS = "random_walk|constant_velocity"
 MOTION = "track 145.3 45"
 PORT_BASE = 24_100  # as in catseye.ranger.addresses
-PORT = 5260
-
-
-def one_of(names: str) -> Callable[[str | None], str | None]:
-    """A check of an option's value."""
-
-    def check(value: str | None) -> str | None:
-        if value is not None and value not in names.split("|"):
-            raise typer.BadParameter(f"{value!r} is not one of {', '.join(names.split('|'))}.")
-        return value
-
-    return check
 
 
 def within(low: float, high: float, unit: str) -> Callable[[float | None], float | None]:
@@ -167,7 +154,7 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
     return SystemClock().now_ns() / PER_DAY
 
 
-def orders_of(*, drop: list[str] | None, **given: Any) -> Any:
+def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
     """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
     from catseye.service.coordinator import Orders
 

@@ -39,15 +39,15 @@ def replay(
 
     progress = ProgressLine(quiet)
     try:
-        found = replayed(journal, run_of(run), calibrations, progress)
+        outcome = replayed(journal, run_of(run), calibrations, progress)
     finally:
         progress.clear()
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(replay_object(found)))
+        say(json_line(replay_object(outcome)))
     elif not quiet:
-        for title, text in replay_passages(found):
+        for title, text in replay_passages(outcome):
             say(wrapped(title, text))
-    if calibrations is None and not found.same:
+    if calibrations is None and not outcome.same:
         raise SystemExit(1)

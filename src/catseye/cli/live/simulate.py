@@ -71,9 +71,9 @@ def simulate(
     from catseye.service.simulation import Simulation
     from catseye.service.world import TwinWords
 
-    told: dict[str, Any] = {"seed": seed, "motion": motion, "conditions": conditions, "faults": tuple(fault or ())}
+    options: dict[str, Any] = {"seed": seed, "motion": motion, "conditions": conditions, "faults": tuple(fault or ())}
     begins = mjd_start(start, NIGHT)
-    world = TwinWords(begins, **told) if fast else TwinWords.starting_now(begins, **told).late(UNTIL_READY)
+    world = TwinWords(begins, **options) if fast else TwinWords.starting_now(begins, **options).late(UNTIL_READY)
     free = fast or port_base == 0
     orders = orders_of(
         drop=drop,
@@ -106,11 +106,11 @@ def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
     from catseye.service.objects import simulation_object, summary
 
     book, world, journal = simulation.book, simulation.world, simulation.orders.journal
-    told: dict[str, Any] = {"seconds": simulation.seconds, "rangers": len(simulation.site.rangers)}
+    totals: dict[str, Any] = {"seconds": simulation.seconds, "rangers": len(simulation.site.rangers)}
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(simulation_object(book, world, journal, **told)))
+        say(json_line(simulation_object(book, world, journal, **totals)))
     elif not quiet:
-        for title, text in summary(book, world, journal, **told):
+        for title, text in summary(book, world, journal, **totals):
             say(wrapped(title, text))

@@ -1,60 +1,23 @@
 """The command of the coordinator."""
 
 import sys
-from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from catseye.cli.commands import Quiet, app
-from catseye.cli.live.options import (
-    PORT_BASE,
-    Drop,
-    FilterName,
-    InterlocksFile,
-    JournalPlace,
-    KeepBuffers,
-    KeepOutFile,
-    Mode,
-    Port,
-    PortBase,
-    RoundS,
-    Site,
-    SolidsFile,
-    leave,
-    orders_of,
-    site_of,
-    tell_people,
-    within,
-)
+from catseye.cli.live.groups import CoordinatorOptions
+from catseye.cli.live.options import Site, leave, site_of, tell_people, within
+from catseye.cli.option_groups import grouped
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
 
-def _feed(text: str | None) -> str | None:
-    if text is not None:
-        _host_port(text)
-    return text
-
-
-def _host_port(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdecimal() or not 1 <= int(port) <= 65_535:
-        raise typer.BadParameter(f"{text!r} is not HOST:PORT.")
-    return host.strip("[]"), int(port)
-
+    from catseye.records.site.folder import SiteFolder
+    from catseye.service.coordinator import Orders, Peers
+    from catseye.service.logs import LiveLog
 
 LogJson = Annotated[bool, typer.Option("--log-json", help="The log as one JSON object a line.")]
-Loopback = Annotated[bool, typer.Option("--loopback", help="Rangers at 127.0.8.k, the feed at 127.0.0.1 port 5250.")]
-AddressFile = Annotated[
-    Path | None, typer.Option("--addresses", metavar="FILE.toml", help="Where each ranger and the feed is.")
-]
-FeedPlace = Annotated[
-    str | None, typer.Option("--feed", metavar="HOST:PORT", callback=_feed, help="Weather and telescope.")
-]
-MotionScriptText = Annotated[
-    str | None,
-    typer.Option("--motion-script", metavar='FILE|"fixed AZ EL"', help="A motion known beforehand; no feed."),
-]
-Host = Annotated[str | None, typer.Option("--host", help="Address of its own port.  [default: 127.0.0.1]")]
 
 
 @app.command(
@@ -62,24 +25,11 @@ Host = Annotated[str | None, typer.Option("--host", help="Address of its own por
     "Its rangers: catseye zy gbt --twin\n"
     "Then ask it: nc 127.0.0.1 5260"
 )
+@grouped
 def ziy(
+    *,
     site: Site,
-    port_base: PortBase = PORT_BASE,
-    loopback: Loopback = False,
-    addresses: AddressFile = None,
-    feed: FeedPlace = None,
-    motion_script: MotionScriptText = None,
-    journal: JournalPlace = None,
-    keep_buffers: KeepBuffers = True,
-    mode: Mode = "active",
-    drop: Drop = None,
-    round_s: RoundS = 10.0,
-    filter_: FilterName = "random_walk",
-    keep_out: KeepOutFile = None,
-    interlocks: InterlocksFile = None,
-    solids: SolidsFile = None,
-    host: Host = None,
-    port: Port = None,
+    asked: CoordinatorOptions,
     clock_offset_s: Annotated[
         float, typer.Option("--clock-offset-s", callback=within(-1e11, 1e11, " s"), help="As the twin's.")
     ] = 0.0,
@@ -88,69 +38,26 @@ def ziy(
 ) -> None:
     """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, tell whoever asks."""
     records = site_of(site)
-    rangers, source = where_of(
-        records, port_base=port_base, loopback=loopback, addresses=addresses, feed=feed, motion_script=motion_script
-    )
-    orders = orders_of(
-        mode=mode,
-        drop=drop,
-        round_s=round_s,
-        filter=filter_,
-        journal=journal,
-        keep_buffers=keep_buffers,
-        keep_out=keep_out,
-        interlocks=interlocks,
-        solids=solids,
-        port=port,
-        host=host,
-    )
-    run_coordinator(records, orders, rangers, source, offset=clock_offset_s, log_json=log_json, quiet=quiet)
-
-
-def where_of(
-    site: Any,
-    *,
-    port_base: int,
-    loopback: bool,
-    addresses: Path | None,
-    feed: str | None,
-    motion_script: str | None,
-) -> tuple[Any, Any]:
-    """Addresses of the rangers, and where weather and telescope are known from, by the options."""
-    if addresses is not None and loopback:
-        raise typer.BadParameter("says where; --loopback says otherwise.", param_hint="'--addresses'")
-    if feed is not None and motion_script is not None:
-        raise typer.BadParameter("is a known motion; --feed says otherwise.", param_hint="'--motion-script'")
-    from catseye.coordinator.feed import MotionScript
-    from catseye.coordinator.link.settings import Address
-    from catseye.ranger.addresses import Addresses, feed_address, ranger_addresses
-    from catseye.service.addresses import read_addresses
-
-    where: Addresses = "loopback" if loopback else port_base
-    if addresses is not None:
-        rangers, at = read_addresses(addresses, site)
-    else:
-        rangers = {n: Address(h, (a, b)) for n, (h, a, b) in ranger_addresses(site, where).items()}
-        at = feed_address(where)
-    if motion_script is not None:
-        return rangers, MotionScript.parse(motion_script)
-    return rangers, _host_port(feed) if feed is not None else at
+    peers = asked.peers(records)
+    run_coordinator(records, asked.orders(), peers, offset=clock_offset_s, log_json=log_json, quiet=quiet)
 
 
 def run_coordinator(
-    site: Any,
-    orders: Any,
-    rangers: Any,
-    feed: Any,
+    site: "SiteFolder",
+    orders: "Orders",
+    peers: "Peers",
     *,
     offset: float = 0.0,
     seed: int | None = None,
     log_json: bool = False,
     quiet: bool = False,
-    beside: Any = None,
+    beside: "Callable[[LiveLog], Coroutine[Any, Any, None]] | None" = None,
 ) -> None:
     """A coordinator with its log on stderr, until a signal.
 
+    peers    rangers and feed
+    offset   s, of its clock against this machine's
+    seed     of a simulated site, for the journal
     beside   a coroutine function that runs beside it, told the log: its children
     """
     from catseye.service.coordinator import LiveCoordinator
@@ -168,8 +75,7 @@ def run_coordinator(
         running = LiveCoordinator(
             site,
             orders,
-            addresses=rangers,
-            feed=feed,
+            peers,
             clock=clock,
             seed=seed,
             tell=lambda text, alarm: log.tell("journal", "journal", text, "alarm" if alarm else "note"),

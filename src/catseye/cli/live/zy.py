@@ -2,33 +2,27 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.live.groups import TwinOptions
 from catseye.cli.live.options import (
-    MOTION,
     PORT_BASE,
-    Conditions,
-    Faults,
-    MotionText,
     PortBase,
-    Seed,
     Site,
-    Start,
     leave,
-    mjd_start,
     say_now,
     site_of,
     within,
 )
+from catseye.cli.option_groups import grouped
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from catseye.ranger.addresses import Addresses
     from catseye.records.site.folder import SiteFolder
     from catseye.service.rangers import Listening, RangersServed
 
@@ -54,7 +48,9 @@ def _pair(text: str) -> tuple[int, int]:
     "A person at it: nc 127.0.0.1 24110\n"
     "A real one: catseye zy sites/ours ZY101 --head our.heads:card --host 0.0.0.0 --ports 5240,5241"
 )
+@grouped
 def zy(
+    *,
     site: Site,
     rangers: Annotated[list[str] | None, typer.Argument(metavar="[RANGER ...]", help="Which; all if none.")] = None,
     twin: Annotated[bool, typer.Option("--twin", help="Rangers of the site's twin, with its feed.")] = False,
@@ -62,11 +58,7 @@ def zy(
         str | None,
         typer.Option("--head", metavar="PACKAGE.MODULE:FACTORY", help="A real head: called with the ranger's name."),
     ] = None,
-    seed: Seed = 1,
-    motion: MotionText = MOTION,
-    start: Start = None,
-    conditions: Conditions = "night",
-    fault: Faults = None,
+    simulated: TwinOptions,
     clock_offset_s: Annotated[
         float | None,
         typer.Option(
@@ -100,32 +92,22 @@ def zy(
     names = _named(records, rangers or [])
     if ports is not None and len(names) != 1:
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
-    where: Addresses = "loopback" if loopback else port_base
-    told: dict[str, Any] = {
-        "addresses": where,
-        "host": host,
-        "ports": None if ports is None else _pair(ports),
-        "files": files,
-    }
-    from catseye.service.rangers import RangersServed, heads_of
+    from catseye.service.rangers import RangersServed, ServedAt, heads_of
     from catseye.service.running import LiveRun
     from catseye.simulator.clock.world_clock import SystemClock
 
+    at = ServedAt("loopback" if loopback else port_base, host, None if ports is None else _pair(ports))
     if head is not None:
-        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), **told)
+        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=files)
     else:
         from catseye.service.warm import WarmingClock
-        from catseye.service.world import TwinWords, twin_heads
+        from catseye.service.world import twin_heads
 
-        made = TwinWords.starting_now if clock_offset_s is None else TwinWords
-        more = {} if clock_offset_s is None else {"offset": clock_offset_s}
-        world = made(
-            mjd_start(start), seed=seed, motion=motion, conditions=conditions, faults=tuple(fault or ()), **more
-        )
+        world = simulated.world(clock_offset_s)
         truth, clock = world.twin(records), world.clock()
         warming = None if cold else WarmingClock(clock)
         heads = twin_heads(truth, names, warming or clock)
-        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, **told)
+        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, at=at, files=files)
     run = LiveRun(lambda: _served(served, lambda at: _say(at, json, quiet), leave_with_stdin))
     run.result()
     leave(run, terminated=0)

@@ -40,16 +40,16 @@ def beam(
 
     if out is not None:
         refuse_output(out, file)
-    found, hashes = read_beam(file, distance_m)
+    beam_path, hashes = read_beam(file, distance_m)
     if out is not None:
         with whole_directory(out, file) as directory:
-            write_beam(found, directory, hashes)
+            write_beam(beam_path, directory, hashes)
     if json:
-        say(json_line(beam_object(found)))
+        say(json_line(beam_object(beam_path)))
         return
     if quiet:
         return
-    for line in lines(found):
+    for line in lines(beam_path):
         say(line)
     if out is not None:
         say(f"written to {out}/: beam.csv, returned.csv, beam.json, beam.svg, provenance.json")

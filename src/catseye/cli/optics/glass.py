@@ -32,9 +32,9 @@ def glass(
     from catseye.gateways.optics.glass_objects import glass_object, glass_rows, table_object, table_rows
     from catseye.gateways.writers.objects import json_line
 
-    found = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm)
+    answer = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm)
     if json:
-        say(json_line(found))
+        say(json_line(answer))
         return
-    for title, text in table_rows() if name is None else glass_rows(found):
+    for title, text in table_rows() if name is None else glass_rows(answer):
         say(wrapped(title, text))

@@ -65,39 +65,39 @@ def link(
     if measured_volt is not None:
         head = head.scaled(link_budget(head, reflector, distance).amplitude_volt, measured_volt)
     light = {"incidence": incidence_deg * DEGREE, "background": background_uw * 1e-6}
-    found = link_budget(head, reflector, distance, offset=offset_mm * 1e-3, **light)
+    budget = link_budget(head, reflector, distance, offset=offset_mm * 1e-3, **light)
     if json:
-        say(json_line(_object(found, head, distance)))
+        say(json_line(_object(budget, head, distance)))
         return
-    _tell(found, head)
+    _tell(budget, head)
 
 
-def _object(found: "LinkBudget", head: Link, distance: float) -> dict[str, object]:
+def _object(budget: "LinkBudget", head: Link, distance: float) -> dict[str, object]:
     return {
         "distance": distance,
-        "factors": found.factors,
-        "received_power": found.received,
-        "amplitude_volt": found.amplitude_volt,
-        "u_volt": found.u_volt,
-        "u_phase": found.u_phase,
-        "u_range": found.u_range,
-        "crosstalk_range": found.crosstalk_range,
-        "noise_shares": found.noise_shares,
+        "factors": budget.factors,
+        "received_power": budget.received,
+        "amplitude_volt": budget.amplitude_volt,
+        "u_volt": budget.u_volt,
+        "u_phase": budget.u_phase,
+        "u_range": budget.u_range,
+        "crosstalk_range": budget.crosstalk_range,
+        "noise_shares": budget.noise_shares,
         "volts_per_ampere": head.volts_per_ampere,
-        "clipped": found.clipped,
+        "clipped": budget.clipped,
     }
 
 
-def _tell(found: "LinkBudget", head: Link) -> None:
+def _tell(budget: "LinkBudget", head: Link) -> None:
     import math
 
     say(f"{'laser':<32}{head.power * 1e3:10.4g} mW")
-    for name, share in found.factors.items():
+    for name, share in budget.factors.items():
         say(f"{name:<32}{10 * math.log10(share):10.2f} dB")
-    say(f"{'on the detector':<32}{found.received * 1e3:10.4g} mW")
-    clipped = "  more than the converter takes: it clips" if found.clipped else ""
-    say(f"{'amplitude of the return':<32}{found.amplitude_volt:10.4g} V{clipped}")
-    say(f"{'noise of the range':<32}{found.u_range * 1e6:10.4g} µm  (u of phase {found.u_phase * 1e3:.3g} mrad)")
-    for name, share in sorted(found.noise_shares.items(), key=lambda item: -item[1]):
+    say(f"{'on the detector':<32}{budget.received * 1e3:10.4g} mW")
+    clipped = "  more than the converter takes: it clips" if budget.clipped else ""
+    say(f"{'amplitude of the return':<32}{budget.amplitude_volt:10.4g} V{clipped}")
+    say(f"{'noise of the range':<32}{budget.u_range * 1e6:10.4g} µm  (u of phase {budget.u_phase * 1e3:.3g} mrad)")
+    for name, share in sorted(budget.noise_shares.items(), key=lambda item: -item[1]):
         say(f"{'':<4}{name:<28}{100 * share:10.3g} %")
-    say(f"{'crosstalk left, at worst':<32}{found.crosstalk_range * 1e6:10.4g} µm")
+    say(f"{'crosstalk left, at worst':<32}{budget.crosstalk_range * 1e6:10.4g} µm")

@@ -6,14 +6,7 @@ import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.terminal import say, wrapped
-
-EDITIONS = "iec2014|ansi2014"  # as in catseye.optics.safety.limits, whose import --help spares itself
-
-
-def _known_edition(name: str) -> str:
-    if name not in EDITIONS.split("|"):
-        raise typer.BadParameter(f"{name!r} is not one of {EDITIONS.replace('|', ', ')}.")
-    return name
+from catseye.cli.vocabularies import EDITIONS, one_of
 
 
 @app.command(
@@ -50,7 +43,7 @@ def safety(
         float, typer.Option("--subtense-mrad", help="Angle of the apparent source where the eye is; up to 1.5 a point.")
     ] = 1.5,
     edition: Annotated[
-        str, typer.Option("--edition", metavar=EDITIONS, callback=_known_edition, help="Of the limits.")
+        str, typer.Option("--edition", metavar=EDITIONS, callback=one_of(EDITIONS), help="Of the limits.")
     ] = "iec2014",
     json: Json = False,
 ) -> None:
@@ -61,7 +54,7 @@ def safety(
 
     if scan_period_s is not None and scan_rad_per_s is None:
         raise typer.BadParameter("needs --scan-rad-per-s.", param_hint="'--scan-period-s'")
-    told = safety_object(
+    answer = safety_object(
         Question(
             LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * 1e-3, divergence_mrad * 1e-3, waist_distance),
             edition=edition,
@@ -75,9 +68,9 @@ def safety(
         )
     )
     if json:
-        say(json_line(told))
+        say(json_line(answer))
         return
-    for title, text in safety_passages(told):
+    for title, text in safety_passages(answer):
         say(wrapped(title, text))
-    say("\n" + safety_table(told) + "\n")
-    say(wrapped("Note", told["notice"]))
+    say("\n" + safety_table(answer) + "\n")
+    say(wrapped("Note", answer["notice"]))

@@ -8,6 +8,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import say, wrapped
+from catseye.cli.vocabularies import POINTING_TERMS
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from catseye.gateways.pose.pointing_series_objects import Observed
     from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 
-# as in catseye.geometry.antenna.pointing_series, whose import --help spares itself
-TERMS = "IA,IE,CA,NPAE,AW,AN,HZCZ,HZSZ"
+TERMS = POINTING_TERMS.replace("|", ",")
 ZENITH = 89.999  # degrees: nearer, azimuth is not defined
 
 pointing = typer.Typer(
@@ -103,28 +103,28 @@ def fit(
         if path is not None and any(path.resolve() == f.resolve() for f in files):
             raise InputError(f"{option} {path}: is an input (expected another file)")
     chosen = terms.split(",")
-    found, observed, compared = _fitted(files, against, chosen, u_arcsec, reject)
+    pointing_fit, observed, compared = _fitted(files, against, chosen, u_arcsec, reject)
     if write_stars is not None and observed.stars is None:
         raise InputError(f"--write-stars {write_stars}: there are no stars in poses (expected a TPOINT file)")
     if out is not None:
         asked = {"terms": chosen, "u_arcsec": u_arcsec, "reject": reject, "against": against}
         with whole_directory(out, files[0]) as directory:
-            write_fit(found, observed, compared, directory, asked)
+            write_fit(pointing_fit, observed, compared, directory, asked)
     if write is not None:
-        write_model(found, write)
+        write_model(pointing_fit, write)
     if write_stars is not None and observed.stars is not None:
-        _write_stars(found, observed, write_stars)
+        _write_stars(pointing_fit, observed, write_stars)
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(fit_object(found, observed, compared)))
+        say(json_line(fit_object(pointing_fit, observed, compared)))
         return
     if quiet:
         return
-    for title, text in fit_words(found, observed, compared):
+    for title, text in fit_words(pointing_fit, observed, compared):
         say(wrapped(title, text))
     heads = ("term", "arcsec", "u", *(("difference", "u") if compared is not None else ()))
-    for row in (heads, *fit_rows(found, compared)):
+    for row in (heads, *fit_rows(pointing_fit, compared)):
         say(f"{'':<14}{row[0]:<6}" + "".join(f"{cell:>12}" for cell in row[1:]))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, observations.csv, pointing.json, pointing.toml"))
@@ -149,25 +149,25 @@ def _fitted(
         )
 
     observed = read_observed(files)
-    found = fitted(observed)
+    pointing_fit = fitted(observed)
     if against is None:
-        return found, observed, None
+        return pointing_fit, observed, None
     if against == "published" or against.endswith(".toml"):
         other, hashes = read_series(against)
     else:
         second = read_observed([Path(against)])
         other, hashes = fitted(second).series, second.hashes
     observed.hashes.update(hashes)
-    return found, observed, compare_series(other, found.series)
+    return pointing_fit, observed, compare_series(other, pointing_fit.series)
 
 
-def _write_stars(found: "PointingFit", observed: "Observed", path: Path) -> None:
+def _write_stars(pointing_fit: "PointingFit", observed: "Observed", path: Path) -> None:
     from dataclasses import replace
 
     from catseye.gateways.writers.output import whole_file
     from catseye.records.laboratory.star_offsets import MARK, star_offsets_text
 
-    stars, keep = observed.stars, found.used
+    stars, keep = observed.stars, pointing_fit.used
     assert stars is not None
     columns = ("azimuth", "elevation", "azimuth_encoder", "elevation_encoder", "auxiliary")
     kept = replace(stars, **{name: getattr(stars, name)[keep] for name in columns})
@@ -199,18 +199,18 @@ def predict(
     known = bool(np.any(series.covariance != 0.0))
     u = np.sqrt(np.diag(spread))
     if json:
-        told = {
+        answer = {
             "model": model,
             "order": ["azimuth times cos E", "elevation"],
             "correction": correction,
             "covariance": spread if known else None,
             "encoders": {"azimuth_deg": encoder[0] / DEGREE, "elevation_deg": encoder[1] / DEGREE},
         }
-        say(json_line(told))
+        say(json_line(answer))
         return
     for name, value, w in zip(("azimuth times cos E", "elevation"), correction, u, strict=True):
-        said = f"   u {w / ARCSECOND:.3f}" if known else "   u unknown"
-        say(f"{name:<22}{value / ARCSECOND:+12.3f} arcsec{said}")
+        u_text = f"   u {w / ARCSECOND:.3f}" if known else "   u unknown"
+        say(f"{name:<22}{value / ARCSECOND:+12.3f} arcsec{u_text}")
     say(f"{'encoders':<22}{encoder[0] / DEGREE:12.6f} {encoder[1] / DEGREE:12.6f} deg")
 
 
@@ -248,35 +248,35 @@ def track(
         for source in sources:
             refuse_output(out, source)
     hashes: dict[str, str] = {}
-    seen = []
+    tilts_of_poses = []
     for path in poses or []:
         folder = Folder(path.parent)
-        seen.append(tilt_of_pose(folder, path.name))
+        tilts_of_poses.append(tilt_of_pose(folder, path.name))
         hashes |= {str(path): digest for digest in folder.hashes.values()}
     readings = None if tilts is None else read_tilts(tilts)
     if readings is not None:
         hashes[str(tilts)] = readings.digest
-    found = track_profile(
-        np.array([p.azimuth for p in seen]),
-        np.array([p.turn for p in seen]).reshape(-1, 2),
-        np.array([p.covariance for p in seen]).reshape(-1, 2, 2),
+    profile = track_profile(
+        np.array([p.azimuth for p in tilts_of_poses]),
+        np.array([p.turn for p in tilts_of_poses]).reshape(-1, 2),
+        np.array([p.covariance for p in tilts_of_poses]).reshape(-1, 2, 2),
         readings,
         harmonics=harmonics,
         names=[str(p) for p in poses or []],
     )
     if out is not None:
         with whole_directory(out, sources[0]) as directory:
-            write_track(found, directory, hashes)
+            write_track(profile, directory, hashes)
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(track_object(found)))
+        say(json_line(track_object(profile)))
         return
     if quiet:
         return
-    for title, text in track_words(found):
+    for title, text in track_words(profile):
         say(wrapped(title, text))
-    for name, value, u in track_rows(found):
+    for name, value, u in track_rows(profile):
         say(f"{'':<14}{name:<16}{value:>10} arcsec   u {u}")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, tilt.csv, track.json"))

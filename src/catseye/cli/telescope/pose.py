@@ -2,12 +2,13 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import OPTICS, POSE_FRAMES, POSE_GROUPS, POSE_WEIGHTS, one_of
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 
@@ -16,29 +17,17 @@ if TYPE_CHECKING:
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
 
-# as in catseye.reduction.pose.pose and catseye.estimation.shapes.pose, whose import --help spares itself
-GROUPS, FRAMES = "dish|feed-arm|alidade|subreflector", "ground|alidade|reflector"
-METHODS, OPTICS = "l1|huber|igg3|biweight", "prime|gregorian"
 CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
-
-
-def _one_of(words: str):
-    def check(value: str | None) -> str | None:
-        if value is not None and value not in words.split("|"):
-            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
-        return value
-
-    return check
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
     try:
-        found = [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if len(found) != count or not all(math.isfinite(v) for v in found):
+        numbers = []
+    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
         raise typer.BadParameter(f"{text!r} is not {what}.")
-    return found
+    return numbers
 
 
 def _pivot(text: str | None) -> str | None:
@@ -77,7 +66,9 @@ def pose(
     ] = None,
     group: Annotated[
         str | None,
-        typer.Option("--group", metavar=GROUPS, callback=_one_of(GROUPS), help="What moves as one.  [default: dish]"),
+        typer.Option(
+            "--group", metavar=POSE_GROUPS, callback=one_of(POSE_GROUPS), help="What moves as one.  [default: dish]"
+        ),
     ] = None,
     points: Annotated[
         str | None, typer.Option("--points", metavar="A,B,C,...", help="Points that move as one, instead of a group.")
@@ -85,7 +76,7 @@ def pose(
     frame: Annotated[
         str | None,
         typer.Option(
-            "--frame", metavar=FRAMES, callback=_one_of(FRAMES), help="Axes of the answer.  [default: ground]"
+            "--frame", metavar=POSE_FRAMES, callback=one_of(POSE_FRAMES), help="Axes of the answer.  [default: ground]"
         ),
     ] = None,
     pivot: Annotated[
@@ -99,14 +90,16 @@ def pose(
     ] = None,
     robust: Annotated[
         str | None,
-        typer.Option("--robust", metavar=METHODS, callback=_one_of(METHODS), help="Leave out points that moved alone."),
+        typer.Option(
+            "--robust", metavar=POSE_WEIGHTS, callback=one_of(POSE_WEIGHTS), help="Leave out points that moved alone."
+        ),
     ] = None,
     pointing: Annotated[
         str | None,
         typer.Option(
             "--pointing",
             metavar=OPTICS,
-            callback=_one_of(OPTICS),
+            callback=one_of(OPTICS),
             help="Beam and focus too, from the dish and feed arm (prime) or subreflector (gregorian).",
         ),
     ] = None,
@@ -140,7 +133,6 @@ def pose(
         raise typer.BadParameter("belongs to --group alidade in the frame alidade.", param_hint="'--tilt'")
     if pointing is not None and (points is not None or frame not in (None, "reflector") or group not in (None, "dish")):
         raise typer.BadParameter("is of the dish in the frame reflector.", param_hint="'--pointing'")
-    from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.network.solved_points import read_solved_points
     from catseye.records.site.folder import read_site
@@ -157,71 +149,84 @@ def pose(
         records = read_site(site)
         inputs = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
         progress("fitting", 1, 2)
-        chosen = None if points is not None else group or "dish"
-        axes = frame or ("reflector" if pointing else "alidade" if tilt else "ground")
-        found = _found(
-            later,
-            before,
-            records,
-            group=chosen,
+        wanted = _Wanted(
+            group=None if points is not None else group or "dish",
             points=None if points is None else [p.strip() for p in points.split(",")],
-            frame=axes,
+            frame=frame or ("reflector" if pointing else "alidade" if tilt else "ground"),
             pivot=None if pivot is None else _numbers(pivot, 3, "x,y,z in metres"),
             robust=robust,
             pointing=pointing,
             tilt=None if tilt is None else _numbers(tilt, 3, "X,Y,U in arc seconds"),
         )
+        result = _result(later, before, records, wanted)
         if out is not None:
             from catseye.gateways.pose.files import write_pose
 
-            asked = {"group": chosen, "points": points, "frame": axes, "pivot": pivot, "robust": robust}
+            asked = {"group": wanted.group, "points": points, "frame": wanted.frame, "pivot": pivot, "robust": robust}
             with whole_directory(out, epoch) as directory:
-                write_pose(found, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
+                write_pose(result, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
     finally:
         progress.clear()
+    _tell(result, json, quiet, out)
+
+
+def _tell(result: "PoseResult", json: bool, quiet: bool, out: Path | None) -> None:
+    from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
+
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(pose_result_object(found)))
+        say(json_line(pose_result_object(result)))
         return
     if quiet:
         return
-    for title, text in pose_words(found):
+    for title, text in pose_words(result):
         say(wrapped(title, text))
-    for name, value, u, unit in pose_rows(found):
+    for name, value, u, unit in pose_rows(result):
         say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-    if found.beam is not None:
+    if result.beam is not None:
         say("\nThe beam (its correction is the opposite)")
-        for name, value, u, unit in beam_rows(found.beam):
+        for name, value, u, unit in beam_rows(result.beam):
             say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-        for name, part in found.beam.terms.items():
+        for name, part in result.beam.terms.items():
             a, b, c = part[0] / ARCSECOND, part[1] / ARCSECOND, part[2] * 1e3
             say(f"{'':<14}{name:<36}{a:+9.3f} {b:+9.3f} arcsec {c:+9.3f} mm")
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, points.csv, pose.json"))
 
 
-def _with_posture(points: "SolvedPoints", told: str | None) -> "SolvedPoints":
+def _with_posture(points: "SolvedPoints", posture: str | None) -> "SolvedPoints":
     from dataclasses import replace
 
-    if told is None:
+    if posture is None:
         return points
-    azimuth, elevation = _numbers(told, 2, "AZ,EL in degrees")
+    azimuth, elevation = _numbers(posture, 2, "AZ,EL in degrees")
     return replace(points, posture=(azimuth * DEGREE, elevation * DEGREE))
 
 
-def _found(
-    later: "SolvedPoints",
-    before: "SolvedPoints | None",
-    records: "SiteFolder",
-    *,
-    group: str | None,
-    points: list[str] | None,
-    frame: str,
-    pivot: list[float] | None,
-    robust: str | None,
-    pointing: str | None,
-    tilt: list[float] | None,
+class _Wanted(NamedTuple):
+    """Which pose is asked for.
+
+    group      what moves as one, or
+    points     the points that do, by name
+    frame      axes of the answer
+    pivot      of the rotation, m, in the frame; None: the usual one
+    robust     how points that moved alone are left out; None: none is
+    pointing   optics whose beam is derived, too
+    tilt       of an inclinometer, joined: x, y and their u, arc seconds
+    """
+
+    group: str | None
+    points: list[str] | None
+    frame: str
+    pivot: list[float] | None
+    robust: str | None
+    pointing: str | None
+    tilt: list[float] | None
+
+
+def _result(
+    later: "SolvedPoints", before: "SolvedPoints | None", records: "SiteFolder", wanted: _Wanted
 ) -> "PoseResult":
     """The pose, with an inclinometer joined or the beam derived where asked for."""
     import numpy as np
@@ -234,13 +239,22 @@ def _found(
     if later.posture is None:
         raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
     site = at_posture(records, *later.posture)
-    about = None if pivot is None else np.array(pivot)
-    found = pose_of_group(later, before, site, group=group, points=points, frame=frame, pivot=about, robust=robust)
-    if tilt is not None:
-        x, y, u = (v * ARCSECOND for v in tilt)
-        return PoseResult(pose_with_tilt(found, np.array([x, y]), u), None)
-    if pointing is None:
-        return PoseResult(found, None)
-    carried = pose_of_group(later, before, site, group=CARRIED[pointing], frame="reflector", robust=robust)
-    cross = cross_covariance(carried, found, site, before)
-    return PoseResult(found, pointing_offset(found.pose, carried.pose, site, cross=cross, optics=pointing))
+    group_pose = pose_of_group(
+        later,
+        before,
+        site,
+        group=wanted.group,
+        points=wanted.points,
+        frame=wanted.frame,
+        pivot=None if wanted.pivot is None else np.array(wanted.pivot),
+        robust=wanted.robust,
+    )
+    if wanted.tilt is not None:
+        x, y, u = (v * ARCSECOND for v in wanted.tilt)
+        return PoseResult(pose_with_tilt(group_pose, np.array([x, y]), u), None)
+    optics = wanted.pointing
+    if optics is None:
+        return PoseResult(group_pose, None)
+    carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=wanted.robust)
+    cross = cross_covariance(carried, group_pose, site, before)
+    return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))

@@ -1,22 +1,21 @@
 """The command of the structure: flexible models of groups of points, and vibration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.live.options import one_of
 from catseye.cli.live.replay import RunName, run_of
 from catseye.cli.networks import Out
 from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.vocabularies import OWN_FUNCTIONS, SERIES_FRAMES, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
     from catseye.gateways.structure.epochs import ReadEpochs
-    from catseye.reduction.structure.series import Prediction, StructureFit
-
-FRAMES, OWN = "reflector|alidade|ground", "place|each"
+    from catseye.reduction.structure.series import GroupSeries, Prediction, SeriesModel, StructureFit
+    from catseye.reduction.structure.vibration import Vibration
 
 
 def _pivot(text: str | None) -> str | None:
@@ -61,7 +60,8 @@ def structure(
     ] = None,
     group: Annotated[str, typer.Option("--group", help="Name of the group, for the report.")] = "group",
     frame: Annotated[
-        str, typer.Option("--frame", metavar=FRAMES, callback=one_of(FRAMES), help="That carries the points.")
+        str,
+        typer.Option("--frame", metavar=SERIES_FRAMES, callback=one_of(SERIES_FRAMES), help="That carries the points."),
     ] = "reflector",
     pivot: Annotated[
         str | None,
@@ -72,7 +72,12 @@ def structure(
     hysteresis: Annotated[bool, typer.Option("--hysteresis", help="Does it matter which way it moved last?")] = False,
     own: Annotated[
         str,
-        typer.Option("--own", metavar=OWN, callback=one_of(OWN), help="Each point: its place, or all functions."),
+        typer.Option(
+            "--own",
+            metavar=OWN_FUNCTIONS,
+            callback=one_of(OWN_FUNCTIONS),
+            help="Each point: its place, or all functions.",
+        ),
     ] = "place",
     scatter: Annotated[
         bool, typer.Option("--scatter/--no-scatter", help="Estimate what is new in each epoch (wind).")
@@ -102,26 +107,36 @@ def structure(
     """Gravity and temperature: how a group of points moves, foretold; and its vibration."""
     if not points:
         raise typer.BadParameter("is needed: a name or a pattern such as 'ZEG*'.", param_hint="'--points'")
-    progress = ProgressLine(quiet)
+    to = _Answer(out, json, quiet, ProgressLine(quiet))
     _refuse(out, [*(sources or []), *([epochs] if epochs else []), *(Path(j) for j in (journal, vibration) if j)])
     try:
         if vibration is not None:
-            _vibration(vibration, points, run, stretch_s, less, out=out, json=json, quiet=quiet, progress=progress)
+            _vibration(vibration, points, run, stretch_s, less, to)
             return
         given = _read(sources, epochs, journal, run, every_s)
+        import numpy as np
+
+        from catseye.reduction.structure.group import group_series
         from catseye.reduction.structure.series import SeriesModel
 
         kind = cast(Literal["place", "each"], own)
         model = SeriesModel(harmonics, temperature, hysteresis, kind, scatter)
-        where = None if pivot is None else [float(v) for v in pivot.split(",")]
+        where = None if pivot is None else np.array([float(v) for v in pivot.split(",")])
         asked = {"elevation_deg": predict or [], "temperature_c": temperature_c, "way": way}
-        _structure(
-            given, points, group, frame, where, correlated=not independent, model=model, folds=folds, asked=asked,
-            out=out, json=json, quiet=quiet, progress=progress,
-            source=Path(journal) if journal else (sources or [epochs or Path()])[0],
-        )  # fmt: skip
+        series = group_series(given.epochs, points, group=group, frame=frame, pivot=where, correlated=not independent)
+        source = Path(journal) if journal else (sources or [epochs or Path()])[0]
+        _structure(given, series, model, folds, asked, source, to)
     finally:
-        progress.clear()
+        to.progress.clear()
+
+
+class _Answer(NamedTuple):
+    """Where an answer goes: a directory, one JSON object or text; and the line of progress until then."""
+
+    out: Path | None
+    json: bool
+    quiet: bool
+    progress: ProgressLine
 
 
 def _refuse(out: Path | None, inputs: list[Path]) -> None:
@@ -145,10 +160,15 @@ def _read(
 
 
 def _structure(
-    given: "ReadEpochs", points: list[str], group: str, frame: str, pivot: Any,
-    *, correlated: bool, model: Any, folds: int,
-    asked: dict[str, Any], out: Path | None, json: bool, quiet: bool, progress: ProgressLine, source: Path,
-) -> None:  # fmt: skip
+    given: "ReadEpochs",
+    series: "GroupSeries",
+    model: "SeriesModel",
+    folds: int,
+    asked: dict[str, Any],
+    source: Path,
+    to: _Answer,
+) -> None:
+    """The model fitted, checked by epochs left out, foretold where asked; written and told."""
     from dataclasses import replace
 
     import numpy as np
@@ -156,45 +176,49 @@ def _structure(
     from catseye.constants import DEGREE
     from catseye.gateways.structure.objects import structure_object
     from catseye.reduction.structure.check import left_out
-    from catseye.reduction.structure.group import group_series
     from catseye.reduction.structure.series import fit_structure
 
-    series = group_series(given.epochs, points, group=group, frame=frame, pivot=pivot, correlated=correlated)
     notes = given.notes
-    if not correlated:
+    if series.spread.full is None:  # the command was asked to take points as independent
         notes += ("Points of an epoch were taken as independent: what they share makes the claims too small.",)
     if model.temperature and not np.isfinite(np.asarray(series.posture.temperature_c)).any():
         notes += ("No epoch says a temperature: the model has no coefficient of it.",)
         model = replace(model, temperature=False)
     fit = fit_structure(series, model)
-    check = left_out(series, model, folds=folds, progress=progress) if folds else None
+    check = left_out(series, model, folds=folds, progress=to.progress) if folds else None
     predicted = None
     if asked["elevation_deg"]:
         e = np.array(asked["elevation_deg"]) * DEGREE
         predicted = fit.predict(e, temperature_c=asked["temperature_c"], way=asked["way"])
         notes += predicted.outside
-    told = structure_object(fit, check, predicted, asked, notes)
-    if out is not None:
+    answer = structure_object(fit, check, predicted, asked, notes)
+    if to.out is not None:
         from catseye.gateways.structure.files import write_structure
         from catseye.gateways.writers.output import whole_directory
 
-        with whole_directory(out, source) as directory:
+        with whole_directory(to.out, source) as directory:
             write_structure(
-                fit, directory, told=told, check=check, predicted=predicted, inputs=given.inputs, progress=progress
+                fit,
+                directory,
+                answer=answer,
+                check=check,
+                predicted=predicted,
+                inputs=given.inputs,
+                progress=to.progress,
             )
-    if json:
+    if to.json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(told))
-    elif not quiet:
-        _tell(fit, told, predicted, out)
+        say(json_line(answer))
+    elif not to.quiet:
+        _tell(fit, answer, predicted, to.out)
 
 
-def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:
+def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:
     import numpy as np
 
     s = fit.series
-    low, high = told["elevation_deg"]
+    low, high = answer["elevation_deg"]
     say(
         wrapped(
             "Structure",
@@ -218,8 +242,8 @@ def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | No
             f"{fit.scatter.u_point * 1e3:.3f} mm of each coordinate are in no function (u).",
         )
     )
-    if told["left_out"] is not None:
-        check = told["left_out"]
+    if answer["left_out"] is not None:
+        check = answer["left_out"]
         say(
             wrapped(
                 "Left out",
@@ -228,13 +252,13 @@ def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | No
             )
         )
     if predicted is not None:
-        for k, e in enumerate(told["prediction"]["elevation_deg"]):
+        for k, e in enumerate(answer["prediction"]["elevation_deg"]):
             for i, name in enumerate(predicted.names):
                 x, y, z = predicted.place[k, i]
                 u_x, u_y, u_z = np.sqrt(np.diag(predicted.covariance[k, i])) * 1e3
                 head = f"At {e:g}°" if i == 0 else ""
                 say(f"{head:<14}{name}  x {x:9.4f}  y {y:9.4f}  z {z:9.4f} m   u {u_x:.3f}, {u_y:.3f}, {u_z:.3f} mm")
-    for note in told["notes"]:
+    for note in answer["notes"]:
         say(wrapped("Note", note))
     if out is not None:
         names = "report.html, structure.json, coefficients.csv, residuals.csv, samplers.fits, provenance.json"
@@ -242,16 +266,15 @@ def _tell(fit: "StructureFit", told: dict[str, Any], predicted: "Prediction | No
 
 
 def _vibration(
-    journal: str, points: list[str], run: str | None, stretch_s: float | None, less: str | None,
-    *, out: Path | None, json: bool, quiet: bool, progress: ProgressLine,
-) -> None:  # fmt: skip
+    journal: str, points: list[str], run: str | None, stretch_s: float | None, less: str | None, to: _Answer
+) -> None:
     from catseye.gateways.structure.epochs import read_range_series
     from catseye.gateways.structure.objects import vibration_object
     from catseye.reduction.structure.vibration import difference
     from catseye.reduction.structure.vibration import vibration as found_in
 
     wanted = points if less is None else [*points, less.partition(":")[2]]
-    progress("reading ranges", 0, 0)
+    to.progress("reading ranges", 0, 0)
     series, inputs, zero_mjd = read_range_series(journal, wanted, run=run_of(run))
     if less is not None:
         base = [s for s in series if s.name == less]
@@ -260,28 +283,31 @@ def _vibration(
             raise InputError(f"--less {less}: no such series (the journal has {held})")
         others = [s for s in series if s.ranger == base[0].ranger and s.name != less]
         series = tuple(difference(s, base[0]) for s in others)
-    progress("finding modes", 0, 0)
-    found = found_in(series, stretch=stretch_s)
-    if out is not None:
+    to.progress("finding modes", 0, 0)
+    vibration = found_in(series, stretch=stretch_s)
+    if to.out is not None:
         from catseye.gateways.structure.files import write_vibration
         from catseye.gateways.writers.output import whole_directory
 
-        with whole_directory(out, Path(journal)) as directory:
-            write_vibration(found, directory, zero_mjd=zero_mjd, inputs=inputs, progress=progress)
-    progress.clear()
-    if json:
+        with whole_directory(to.out, Path(journal)) as directory:
+            write_vibration(vibration, directory, zero_mjd=zero_mjd, inputs=inputs, progress=to.progress)
+    to.progress.clear()
+    if to.json:
         from catseye.gateways.writers.objects import json_line
 
-        say(json_line(vibration_object(found)))
+        say(json_line(vibration_object(vibration)))
         return
-    if quiet:
-        return
-    for s in found.series:
+    if not to.quiet:
+        _tell_vibration(vibration, to.out)
+
+
+def _tell_vibration(vibration: "Vibration", out: Path | None) -> None:
+    for s in vibration.series:
         say(wrapped("Series", f"{s.name}: {len(s.seconds)} ranges, {s.rate_hz:.3f} a second"))
-    for peak in found.peaks[:10]:
+    for peak in vibration.peaks[:10]:
         where = f"{peak.likely_hz:.4g} Hz" if peak.decided else f"{peak.peak.frequency_hz:.4g} Hz, or an alias of it"
         say(wrapped("Peak", f"{where}: {peak.peak.over:.0f} times the background"))
-    for mode in found.modes:
+    for mode in vibration.modes:
         say(
             wrapped(
                 "Mode",
@@ -289,7 +315,7 @@ def _vibration(
                 f"rms {mode.covariance[0, 0] ** 0.5 * 1e6:.1f} µm",
             )
         )
-    for note in found.notes:
+    for note in vibration.notes:
         say(wrapped("Note", note))
     if out is not None:
         say(wrapped("Written to", f"{out}/: report.html, vibration.json, spectra.csv, samplers.fits"))

@@ -60,9 +60,9 @@ def _correlation(traces: Sequence["ChannelTrace"]) -> Figure:
 
 
 def _in_time(path: "AcousticPath") -> Figure:
-    used, found, sheet = path.used, path.temperatures, path.sheet
+    used, air, sheet = path.used, path.temperatures, path.sheet
     minutes = (path.shots.mjd[used] - path.shots.mjd[0]) * 1440.0
-    t, u, noise = found.temperature_c[used], found.u_temperature_c[used], found.parts_c["time"][used]
+    t, u, noise = air.temperature_c[used], air.u_temperature_c[used], air.parts_c["time"][used]
     both = path.shots.time_ba is not None
     figure = Figure(figsize=(9.4, 5.2 if both else 3.2), layout="constrained")
     panels = figure.subplots(2 if both else 1, 1, sharex=True, squeeze=False)[:, 0]
@@ -73,7 +73,7 @@ def _in_time(path: "AcousticPath") -> Figure:
     panels[0].set_ylabel("mean temperature of the path (°C)")
     panels[0].legend(loc="best")
     if both:
-        panels[1].errorbar(minutes, found.wind[used], found.u_wind[used], fmt="o", color=SERIES[2], ms=4, elinewidth=1)
+        panels[1].errorbar(minutes, air.wind[used], air.u_wind[used], fmt="o", color=SERIES[2], ms=4, elinewidth=1)
         panels[1].axhline(0.0, color=FAINT, lw=0.7)
         panels[1].set_ylabel(f"wind, {sheet.ranger} to {sheet.target} (m/s)")
     panels[-1].set_xlabel(f"minutes from MJD {path.shots.mjd[0]:.5f} UTC")

@@ -32,18 +32,18 @@ class Mean(NamedTuple):
 
 def mean(path: "AcousticPath") -> Mean:
     """Means over the used shots, by the full covariance: what is common to all does not shrink."""
-    used, found = path.used, path.temperatures
+    used, air = path.used, path.temperatures
     count = int(used.sum())
     if count == 0:
         return Mean(0, *(np.nan,) * 5)
     both = np.ix_(used, used)
     return Mean(
         count,
-        float(found.temperature_c[used].mean()),
-        float(np.sqrt(found.covariance_c2[both].sum())) / count,
-        float(found.wind[used].mean()),
-        float(found.group_refractivity[used].mean()),
-        float(np.sqrt(found.covariance_group[both].sum())) / count,
+        float(air.temperature_c[used].mean()),
+        float(np.sqrt(air.covariance_c2[both].sum())) / count,
+        float(air.wind[used].mean()),
+        float(air.group_refractivity[used].mean()),
+        float(np.sqrt(air.covariance_group[both].sum())) / count,
     )
 
 
@@ -65,7 +65,7 @@ def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
 
 
 def _path(path: "AcousticPath") -> dict[str, Any]:
-    sheet, found, over = path.sheet, path.temperatures, mean(path)
+    sheet, air, over = path.sheet, path.temperatures, mean(path)
     return {
         "ranger": sheet.ranger,
         "target": sheet.target,
@@ -79,7 +79,7 @@ def _path(path: "AcousticPath") -> dict[str, Any]:
         "group_refractivity": over.refractivity,
         "u_group_refractivity": over.u_refractivity,
         "measurements": [_shot(path, k) for k in range(len(path.shots.mjd))],
-        "parts_c": {name: _first(part[path.used]) for name, part in found.parts_c.items()},
+        "parts_c": {name: _first(part[path.used]) for name, part in air.parts_c.items()},
     }
 
 
@@ -88,7 +88,7 @@ def _first(values: np.ndarray) -> float:
 
 
 def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
-    shots, found = path.shots, path.temperatures
+    shots, air = path.shots, path.temperatures
     return {
         "mjd_utc": shots.mjd[k],
         "file": shots.file[k],
@@ -96,12 +96,12 @@ def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
         "time_ba": None if shots.time_ba is None else shots.time_ba[k],
         "u_time_ab": shots.u_time[0, k],
         "u_time_ba": None if shots.time_ba is None else shots.u_time[1, k],
-        "temperature_c": found.temperature_c[k],
-        "u_temperature_c": found.u_temperature_c[k],
-        "wind": found.wind[k],
-        "u_wind": found.u_wind[k],
-        "group_refractivity": found.group_refractivity[k],
-        "u_group_refractivity": found.u_group_refractivity[k],
+        "temperature_c": air.temperature_c[k],
+        "u_temperature_c": air.u_temperature_c[k],
+        "wind": air.wind[k],
+        "u_wind": air.u_wind[k],
+        "group_refractivity": air.group_refractivity[k],
+        "u_group_refractivity": air.u_group_refractivity[k],
         "status": path.status(k),
     }
 
@@ -122,7 +122,7 @@ def shots_csv(paths: Sequence["AcousticPath"]) -> str:
     """Every shot, used or not."""
     rows = []
     for path in paths:
-        shots, found = path.shots, path.temperatures
+        shots, air = path.shots, path.temperatures
         back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
         with np.errstate(invalid="ignore", divide="ignore"):
             decibel = 10.0 * np.log10(shots.snr)
@@ -130,9 +130,9 @@ def shots_csv(paths: Sequence["AcousticPath"]) -> str:
             numbers = (
                 (shots.time_ab[k], ".9f"), (back[k], ".9f"), (shots.u_time[0, k] * 1e6, ".3f"),
                 (shots.u_time[1, k] * 1e6 if shots.time_ba is not None else np.nan, ".3f"), (decibel[0, k], ".1f"),
-                (decibel[1, k], ".1f"), (found.temperature_c[k], ".4f"), (found.u_temperature_c[k], ".4f"),
-                (found.wind[k], ".3f"), (found.u_wind[k], ".3f"), (found.group_refractivity[k] / PPM, ".4f"),
-                (found.u_group_refractivity[k] / PPM, ".4f"),
+                (decibel[1, k], ".1f"), (air.temperature_c[k], ".4f"), (air.u_temperature_c[k], ".4f"),
+                (air.wind[k], ".3f"), (air.u_wind[k], ".3f"), (air.group_refractivity[k] / PPM, ".4f"),
+                (air.u_group_refractivity[k] / PPM, ".4f"),
             )  # fmt: skip
             cells = ("" if not np.isfinite(value) else format(float(value), form) for value, form in numbers)
             head = (f"{shots.mjd[k]:.8f}", path.sheet.ranger, path.sheet.target, shots.file[k])

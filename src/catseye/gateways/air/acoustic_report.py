@@ -42,8 +42,8 @@ def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
         "report.html": lambda: acoustic_report(paths, when),
     }
     settings = {"model": paths[0].model, "air_model": paths[0].air_model}
-    made = {"format": FORMAT, "made_by": "catseye acoustic", "settings": settings}
-    write_files(files, directory, {**made, **origin(when, _inputs(paths))})
+    provenance = {"format": FORMAT, "made_by": "catseye acoustic", "settings": settings}
+    write_files(files, directory, {**provenance, **origin(when, _inputs(paths))})
 
 
 def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
@@ -65,13 +65,13 @@ def _section(number: int, path: "AcousticPath") -> str:
         card("Wind", f"{over.wind:+.2f} m/s", f"from {sheet.ranger} to {sheet.target}"),
         card("Group index", f"{over.refractivity / PPM:.3f} ppm", f"u = {over.u_refractivity / PPM:.3f} ppm"),
     ] if over.used else []  # fmt: skip
-    said = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in words(path))
+    passages = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in words(path))
     drawn = acoustic_figures(path)
     return section(
         f"path-{number}",
         f"{sheet.ranger} to {sheet.target}",
         f'<div class="cards">{"".join(cards)}</div>',
-        f"<dl>{said}</dl>",
+        f"<dl>{passages}</dl>",
         *(picture(drawn[name], caption) for name, caption in CAPTIONS.items() if name in drawn),
         _budget(path),
         _shots(path),
@@ -90,7 +90,7 @@ def _budget(path: "AcousticPath") -> str:
 
 
 def _shots(path: "AcousticPath") -> str:
-    shots, found = path.shots, path.temperatures
+    shots, air = path.shots, path.temperatures
     back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
 
     def cell(value: float, form: str) -> str:
@@ -98,8 +98,8 @@ def _shots(path: "AcousticPath") -> str:
 
     rows = [
         (f"{shots.mjd[k]:.6f}", shots.file[k], cell(shots.time_ab[k] * 1e3, ".5f"), cell(back[k] * 1e3, ".5f"),
-         cell(found.temperature_c[k], ".3f"), cell(found.u_temperature_c[k], ".3f"), cell(found.wind[k], "+.2f"),
-         cell(found.group_refractivity[k] / PPM, ".3f"), path.status(k))
+         cell(air.temperature_c[k], ".3f"), cell(air.u_temperature_c[k], ".3f"), cell(air.wind[k], "+.2f"),
+         cell(air.group_refractivity[k] / PPM, ".3f"), path.status(k))
         for k in range(len(shots.mjd))
     ]  # fmt: skip
     columns = ("MJD", "file", "A to B (ms)", "B to A (ms)", "°C", "u (°C)", "wind (m/s)", "n_g - 1 (ppm)", "status")
@@ -108,12 +108,12 @@ def _shots(path: "AcousticPath") -> str:
 
 def _inputs(paths: Sequence["AcousticPath"]) -> dict[str, str]:
     """File -> SHA-256; of files of one name in several directories, with their path's name before it."""
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for path in paths:
         for name, digest in path.hashes.items():
-            double = found.get(name, digest) != digest
-            found[f"{path.sheet.ranger} to {path.sheet.target}/{name}" if double else name] = digest
-    return found
+            double = digests.get(name, digest) != digest
+            digests[f"{path.sheet.ranger} to {path.sheet.target}/{name}" if double else name] = digest
+    return digests
 
 
 def _provenance(inputs: Mapping[str, str], when: datetime) -> str:

@@ -4,7 +4,7 @@ The index moves by tens of ppm where its uncertainty is a tenth. So each variabl
 below, enlarged, what the other models differ from the chosen one, over its uncertainty as bands.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,23 @@ VARIABLES = (
 )
 
 
+@dataclass(frozen=True)
+class StateUncertainty:
+    """Standard uncertainties of a state of air, from 0 on, uncorrelated.
+
+    temperature_c      °C
+    pressure_hpa       hPa
+    humidity_percent   % over liquid water
+    """
+
+    temperature_c: float = 0.0
+    pressure_hpa: float = 0.0
+    humidity_percent: float = 0.0
+
+
+CERTAIN = StateUncertainty()
+
+
 def air_plot(
     temperature_c: float,
     pressure_hpa: float,
@@ -79,9 +96,7 @@ def air_plot(
     wavelength_um: float = 0.780,
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
-    u_temperature_c: float = 0.0,
-    u_pressure_hpa: float = 0.0,
-    u_humidity_percent: float = 0.0,
+    uncertainty: StateUncertainty = CERTAIN,
 ) -> tuple[str, dict[str, Any]]:
     """The group index about one state of air as SVG text, and what it says in numbers.
 
@@ -89,14 +104,14 @@ def air_plot(
     wavelength_um   vacuum wavelength, um
     model           a name in MODELS
     co2_ppm         carbon dioxide, ppm, where a model has it
-    u_temperature_c, u_pressure_hpa, u_humidity_percent   standard uncertainties of the state, from 0; uncorrelated
+    uncertainty     of the state
 
     Source: the models'; uncertainty by the law of propagation, [JCGM100] eq. 10. Other models are drawn only where they
     hold, and named in `not_drawn` where they hold nowhere in the figure.
 
     Raises ValidityError for values outside the chosen model's limits, and for uncertainties that are none.
     """
-    u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa, "u_humidity_percent": u_humidity_percent}
+    u = {f"u_{name}": value for name, value in asdict(uncertainty).items()}
     for key, value in u.items():
         UNCERTAINTIES[key].check(value)
     state = {
@@ -126,7 +141,7 @@ def air_plot(
         figure.suptitle(_title(state, here, not_drawn), x=0.01, ha="left", fontweight="bold", fontsize=10.5)
         figure.legend(*_key(pairs), loc="outside lower left", ncols=3)
         text = svg(figure)
-    return text, _told(state, here, parts, not_drawn)
+    return text, _summary(state, here, parts, not_drawn)
 
 
 def _parts(here: AirState, u: dict[str, float]) -> dict[str, float]:
@@ -162,7 +177,7 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
         below.fill_between(x, -whole, whole, color=own, alpha=0.16, lw=0, label="u with the inputs'")
     below.fill_between(x, -formula, formula, color=own, alpha=0.28, lw=0, label="u of the formula")
     below.axhline(0.0, color=own, lw=1.4, label=_name(model))
-    found = set()
+    drawn = set()
     for name in MODELS:
         if name == model:
             continue
@@ -172,9 +187,9 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
             there = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
             other[inside] = air(**there, model=name).group_refractivity / PPM
             below.plot(x, other - index, color=COLOURS[name], lw=1.2, label=_name(name))
-            found.add(name)
+            drawn.add(name)
     below.set_xlabel(variable.label)
-    return found
+    return drawn
 
 
 def _name(model: str) -> str:
@@ -224,11 +239,11 @@ def _draw_parts(figure: Figure, pair, parts: dict[str, float]) -> None:
 
 def _key(pairs) -> tuple[list, list]:
     """Handles and labels of all that is drawn below, once each."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for _, below in pairs[:-1]:
         for handle, label in zip(*below.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return list(found.values()), list(found)
+            handles.setdefault(label, handle)
+    return list(handles.values()), list(handles)
 
 
 def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str:
@@ -241,7 +256,7 @@ def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str
     return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
 
 
-def _told(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
+def _summary(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
     differences = {}
     for name, model in MODELS.items():
         if name != here.model and bool(_inside(model, state, ()).all()):

@@ -28,11 +28,10 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
           "u_temperature_c", "weather_refractivity_ppm", "residual_ppm", "standardised", "status")  # fmt: skip
 
 
-def refractometer_object(found: "PathCalibration") -> dict[str, Any]:
+def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """A calibrated path as `catseye refractometer --json` gives it."""
-    sheet, readings, parameters = found.readings.sheet, found.readings, _parameters(found)
-    absolute = found.absolute
-    counts = Counter(found.status)
+    sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
+    counts = Counter(calibration.status)
     return {
         "path": sheet.path,
         "path_length": sheet.path_length_m,
@@ -41,96 +40,112 @@ def refractometer_object(found: "PathCalibration") -> dict[str, Any]:
         "model": sheet.air_model,
         "co2_ppm": sheet.co2_ppm,
         "readings": {"total": len(readings), **{word.replace(" ", "_"): counts[word] for word in STATUS}},
-        "group_index": 1.0 + found.index_0,
-        "u_group_index": found.u_index_0,
-        "phase": found.phase_0 % TWO_PI,
-        "mjd_utc": found.mjd_0,
-        "temperature_c": found.temperature_0_c,
-        "pressure_hpa": found.pressure_0_hpa,
-        "humidity_percent": found.humidity_0_percent,
+        "group_index": 1.0 + calibration.index_0,
+        "u_group_index": calibration.u_index_0,
+        "phase": calibration.phase_0 % TWO_PI,
+        "mjd_utc": calibration.mjd_0,
+        "temperature_c": calibration.temperature_0_c,
+        "pressure_hpa": calibration.pressure_0_hpa,
+        "humidity_percent": calibration.humidity_0_percent,
         "phase_per_index": float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)),
-        "budget": found.budget,
-        "slope": {"ratio": found.slope.ratio, "u_ratio": found.slope.u, "agrees": found.slope.agrees},
+        "budget": calibration.budget,
+        "slope": {"ratio": calibration.slope.ratio, "u_ratio": calibration.slope.u, "agrees": calibration.slope.agrees},
         "thermometers": {n: {"offset_c": v, "u_offset_c": u} for n, (v, u) in parameters["thermometers"].items()},
         "drift": [{"hours": h, "phase": v, "u_phase": u} for h, v, u in parameters["drift"]],
         "noise": {
-            "thermometers_over_claimed": found.thermometer_scatter,
-            "places_over_claimed": found.places,
-            "air": found.air_noise,
-            "readings_that_hang_together": found.correlation,
+            "thermometers_over_claimed": calibration.thermometer_scatter,
+            "places_over_claimed": calibration.places,
+            "air": calibration.air_noise,
+            "readings_that_hang_together": calibration.correlation,
         },
-        "variance_factor": found.variance_factor,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "absolute": {
-            "group_index": float(absolute.group_index),
-            "u_group_index": float(absolute.u),
-            "cycles": int(absolute.cycles),
-            "margin": float(absolute.margin),
-            "status": CycleStatus(int(absolute.status)).name.lower(),
-            "path_length_of_weather": found.path_length,
-            "u_path_length_of_weather": found.u_path_length,
-        },
-        "sections": [
-            {
-                "first_mjd_utc": readings.mjd_utc[s.first],
-                "last_mjd_utc": readings.mjd_utc[s.last],
-                "begins_with": s.reason,
-                "text": s.text,
-                "calibrated": f"index {k + 1}" in found.names,
-            }
-            for k, s in enumerate(found.followed.sections)
-        ],
-        "notes": found.notes,
+        "variance_factor": calibration.variance_factor,
+        "degrees_of_freedom": calibration.degrees_of_freedom,
+        "absolute": _absolute(calibration),
+        "sections": _sections(calibration),
+        "notes": calibration.notes,
         "series": {
             "mjd_utc": readings.mjd_utc,
-            "group_index": 1.0 + found.refractivity,
-            "u_group_index": found.u_refractivity,
-            "temperature_c": found.temperature_c,
-            "u_temperature_c": found.u_temperature_c,
-            "status": found.status,
+            "group_index": 1.0 + calibration.refractivity,
+            "u_group_index": calibration.u_refractivity,
+            "temperature_c": calibration.temperature_c,
+            "u_temperature_c": calibration.u_temperature_c,
+            "status": calibration.status,
         },
     }
 
 
-def _parameters(found: "PathCalibration") -> dict[str, Any]:
-    drift = [name for name in found.names if name.startswith("drift at ")]
+def _absolute(calibration: "PathCalibration") -> dict[str, Any]:
+    absolute = calibration.absolute
     return {
-        "thermometers": {name: found.of(name) for name in found.readings.thermometers},
-        "drift": [(float(name.split()[2]), *found.of(name)) for name in drift],
+        "group_index": float(absolute.group_index),
+        "u_group_index": float(absolute.u),
+        "cycles": int(absolute.cycles),
+        "margin": float(absolute.margin),
+        "status": CycleStatus(int(absolute.status)).name.lower(),
+        "path_length_of_weather": calibration.path_length,
+        "u_path_length_of_weather": calibration.u_path_length,
     }
 
 
-def passages(found: "PathCalibration") -> list[Passage]:
+def _sections(calibration: "PathCalibration") -> list[dict[str, Any]]:
+    readings = calibration.readings
+    return [
+        {
+            "first_mjd_utc": readings.mjd_utc[s.first],
+            "last_mjd_utc": readings.mjd_utc[s.last],
+            "begins_with": s.reason,
+            "text": s.text,
+            "calibrated": f"index {k + 1}" in calibration.names,
+        }
+        for k, s in enumerate(calibration.followed.sections)
+    ]
+
+
+def _parameters(calibration: "PathCalibration") -> dict[str, Any]:
+    drift = [name for name in calibration.names if name.startswith("drift at ")]
+    return {
+        "thermometers": {name: calibration.of(name) for name in calibration.readings.thermometers},
+        "drift": [(float(name.split()[2]), *calibration.of(name)) for name in drift],
+    }
+
+
+def passages(calibration: "PathCalibration") -> list[Passage]:
     """What a person should know, in order."""
-    sheet, counts = found.readings.sheet, Counter(found.status)
-    good = np.isfinite(found.refractivity)
-    n, u, t = found.refractivity[good] / PPM, found.u_refractivity[good] / PPM, found.temperature_c[good]
+    sheet, counts = calibration.readings.sheet, Counter(calibration.status)
+    good = np.isfinite(calibration.refractivity)
+    n, u, t = (
+        calibration.refractivity[good] / PPM,
+        calibration.u_refractivity[good] / PPM,
+        calibration.temperature_c[good],
+    )
     others = ", ".join(f"{counts[word]} {word}" for word in STATUS[1:] if counts[word])
-    made = [
-        Passage("The readings", f"{counts['good']} of {len(found.readings)} used" + (f"; {others}" if others else "")),
+    passages = [
+        Passage(
+            "The readings", f"{counts['good']} of {len(calibration.readings)} used" + (f"; {others}" if others else "")
+        ),
         Passage(
             "Calibration",
-            f"n_g - 1 = {found.index_0 / PPM:.3f} ± {found.u_index_0 / PPM:.3f} ppm at the phase "
-            f"{found.phase_0 % TWO_PI:.4f} rad ({found.temperature_0_c:.2f} °C, {found.pressure_0_hpa:.2f} hPa, "
-            f"{found.humidity_0_percent:.1f} %, {sheet.air_model})",
+            f"n_g - 1 = {calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm at the phase "
+            f"{calibration.phase_0 % TWO_PI:.4f} rad ({calibration.temperature_0_c:.2f} °C, "
+            f"{calibration.pressure_0_hpa:.2f} hPa, {calibration.humidity_0_percent:.1f} %, {sheet.air_model})",
         ),
         Passage(
             "Of it",
-            ", ".join(f"{cause} {part / PPM:.3f}" for cause, part in found.budget.items()) + " ppm",
+            ", ".join(f"{cause} {part / PPM:.3f}" for cause, part in calibration.budget.items()) + " ppm",
         ),
-        Passage("The slope", _slope(found)),
+        Passage("The slope", _slope(calibration)),
         Passage(
             "The air",
             f"n_g - 1 from {n.min():.2f} to {n.max():.2f} ppm, each ± {np.median(u):.2f}"
             + (f"; as warm as {np.nanmin(t):.2f} to {np.nanmax(t):.2f} °C" if np.isfinite(t).any() else ""),
         ),
-        Passage("The length", _length(found)),
+        Passage("The length", _length(calibration)),
     ]
-    return made + [Passage("Note", note) for note in found.notes]
+    return passages + [Passage("Note", note) for note in calibration.notes]
 
 
-def _slope(found: "PathCalibration") -> str:
-    sheet, slope = found.readings.sheet, found.slope
+def _slope(calibration: "PathCalibration") -> str:
+    sheet, slope = calibration.readings.sheet, calibration.slope
     theory = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)) * PPM * 1e3
     if slope.agrees is None:
         return f"{theory:.3f} mrad a ppm by theory; the index changed too little to test it"
@@ -139,8 +154,8 @@ def _slope(found: "PathCalibration") -> str:
     return f"{theory:.3f} mrad a ppm by theory; the weather's index goes {times} as far as that: {verdict}"
 
 
-def _length(found: "PathCalibration") -> str:
-    sheet, absolute = found.readings.sheet, found.absolute
+def _length(calibration: "PathCalibration") -> str:
+    sheet, absolute = calibration.readings.sheet, calibration.absolute
     if absolute.status != CycleStatus.SURE:
         return (
             f"{sheet.path_length_m:.4f} m ± {sheet.u_path_length_mm:g} mm does not tell the whole cycles: no absolute "
@@ -149,31 +164,31 @@ def _length(found: "PathCalibration") -> str:
     return (
         f"{sheet.path_length_m:.5f} m ± {sheet.u_path_length_mm:g} mm alone gives n_g - 1 = "
         f"{(float(absolute.group_index) - 1.0) / PPM:.2f} ± {float(absolute.u) / PPM:.2f} ppm "
-        f"(N {int(absolute.cycles)}); the weather's index asks for {found.path_length:.6f} m "
-        f"± {found.u_path_length * 1e3:.3f} mm"
+        f"(N {int(absolute.cycles)}); the weather's index asks for {calibration.path_length:.6f} m "
+        f"± {calibration.u_path_length * 1e3:.3f} mm"
     )
 
 
-def series_csv(found: "PathCalibration") -> str:
+def series_csv(calibration: "PathCalibration") -> str:
     """A row a reading; a cell is empty where there is no number."""
-    readings = found.readings
+    readings = calibration.readings
     columns = (
         [f"{v:.8f}" for v in readings.mjd_utc],
-        [str(k + 1) for k in found.followed.section],
-        [f"{v:.6f}" for v in found.followed.phase],
+        [str(k + 1) for k in calibration.followed.section],
+        [f"{v:.6f}" for v in calibration.followed.phase],
         *(
             [f"{v:.4f}" if np.isfinite(v) else "" for v in values]
             for values in (
-                found.refractivity / PPM,
-                found.u_refractivity / PPM,
-                found.temperature_c,
-                found.u_temperature_c,
-                found.weather.mean / PPM,
-                found.residual / PPM,
-                found.standardised,
+                calibration.refractivity / PPM,
+                calibration.u_refractivity / PPM,
+                calibration.temperature_c,
+                calibration.u_temperature_c,
+                calibration.weather.mean / PPM,
+                calibration.residual / PPM,
+                calibration.standardised,
             )
         ),
-        found.status,
+        calibration.status,
     )
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, lineterminator="\n")
@@ -182,66 +197,66 @@ def series_csv(found: "PathCalibration") -> str:
     return stream.getvalue()
 
 
-def refractometer_figures(found: "PathCalibration") -> dict[str, str]:
+def refractometer_figures(calibration: "PathCalibration") -> dict[str, str]:
     """The night and its residuals, and phase against weather, as SVG text."""
     from catseye.gateways.writers.drawing import STYLE, mpl, svg  # matplotlib is heavy
 
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        return {"night": svg(_night(found)), "slope": svg(_line(found))}
+        return {"night": svg(_night(calibration)), "slope": svg(_line(calibration))}
 
 
-def _night(found: "PathCalibration"):
+def _night(calibration: "PathCalibration"):
     from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure
 
-    hours, good = found.readings.hours, np.isfinite(found.refractivity)
-    used = np.array([s == "good" for s in found.status])
-    off = np.array([s == "weather off" for s in found.status])
+    hours, good = calibration.readings.hours, np.isfinite(calibration.refractivity)
+    used = np.array([s == "good" for s in calibration.status])
+    off = np.array([s == "weather off" for s in calibration.status])
     figure = Figure(figsize=(9.4, 6.4), layout="constrained")
     index, rest, warm = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": (3, 2, 2)})
-    index.scatter(hours, found.weather.mean / PPM, s=5, c=SERIES[1], lw=0, alpha=0.6, label="by the weather")
-    path = np.where(good, found.refractivity, np.nan) / PPM
+    index.scatter(hours, calibration.weather.mean / PPM, s=5, c=SERIES[1], lw=0, alpha=0.6, label="by the weather")
+    path = np.where(good, calibration.refractivity, np.nan) / PPM
     gaps = np.flatnonzero(np.diff(hours) > 10.0 * np.median(np.diff(hours))) + 1
-    lines = [np.insert(v, gaps, np.nan) for v in (hours, path, found.temperature_c, found.u_temperature_c)]
+    lines = [np.insert(v, gaps, np.nan) for v in (hours, path, calibration.temperature_c, calibration.u_temperature_c)]
     index.plot(lines[0], lines[1], color=SERIES[0], lw=1.2, label="by the phase")
-    for row in np.flatnonzero([s == "stray" for s in found.status]):
+    for row in np.flatnonzero([s == "stray" for s in calibration.status]):
         index.axvline(hours[row], color=BAD, lw=0.6, ls=":", alpha=0.6)
     low, high = np.nanpercentile(path, [0, 100])
     index.set_ylim(low - 0.25 * (high - low) - 0.2, high + 0.25 * (high - low) + 0.2)
     index.set_ylabel("n_g − 1 (ppm)")
-    index.set_title(f"{found.readings.sheet.path}: group index of the path (dotted: stray phases)")
+    index.set_title(f"{calibration.readings.sheet.path}: group index of the path (dotted: stray phases)")
     rest.axhline(0.0, color=FAINT, lw=0.8)
-    rest.scatter(hours[used], found.residual[used] / PPM, s=5, c=INK, lw=0, alpha=0.7, label="used")
-    rest.scatter(hours[off], found.residual[off] / PPM, s=14, c=BAD, marker="x", lw=0.8, label="left out")
-    spread = 6.0 * float(np.nanstd(found.residual[used])) / PPM
+    rest.scatter(hours[used], calibration.residual[used] / PPM, s=5, c=INK, lw=0, alpha=0.7, label="used")
+    rest.scatter(hours[off], calibration.residual[off] / PPM, s=14, c=BAD, marker="x", lw=0.8, label="left out")
+    spread = 6.0 * float(np.nanstd(calibration.residual[used])) / PPM
     rest.set_ylim(-spread, spread)
     rest.set_ylabel("weather − path (ppm)")
     when, _, t, u = lines
     warm.fill_between(when, t - u, t + u, color=SERIES[0], alpha=0.25, lw=0, label="± u")
     warm.plot(when, t, color=SERIES[0], lw=1.0, label="mean of the path")
     warm.set_ylabel("°C")
-    warm.set_xlabel(f"hours since MJD {found.readings.mjd_utc[0]:.4f} UTC")
+    warm.set_xlabel(f"hours since MJD {calibration.readings.mjd_utc[0]:.4f} UTC")
     for ax in (index, rest, warm):
-        for s in found.followed.sections[1:]:
+        for s in calibration.followed.sections[1:]:
             ax.axvline(hours[s.first], color=BAD, lw=1.0)
         ax.legend(loc="best", ncols=2)
     return figure
 
 
-def _line(found: "PathCalibration"):
+def _line(calibration: "PathCalibration"):
     from catseye.gateways.writers.drawing import INK, SERIES, Figure
 
-    sheet = found.readings.sheet
+    sheet = calibration.readings.sheet
     slope = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))
     figure = Figure(figsize=(9.4, 4.2), layout="constrained")
     ax = figure.add_subplot()
-    used = np.array([s == "good" for s in found.status])
-    drift = (found.refractivity - found.index_0) * slope  # what the phase would be without drift and jumps
-    weather = found.refractivity + found.residual  # of the thermometers that were not left out
+    used = np.array([s == "good" for s in calibration.status])
+    drift = (calibration.refractivity - calibration.index_0) * slope  # what the phase would be without drift and jumps
+    weather = calibration.refractivity + calibration.residual  # of the thermometers that were not left out
     ax.scatter(weather[used] / PPM, drift[used], s=8, c=SERIES[0], lw=0, alpha=0.6, label="readings")
     ends = np.array([np.nanmin(weather[used]), np.nanmax(weather[used])])
-    ax.plot(ends / PPM, (ends - found.index_0) * slope, color=INK, lw=1.1, label="theory: −(4πf/c) L")
+    ax.plot(ends / PPM, (ends - calibration.index_0) * slope, color=INK, lw=1.1, label="theory: −(4πf/c) L")
     ax.set_xlabel("n_g − 1 by the weather (ppm)")
     ax.set_ylabel("phase from the reference phase (rad)")
     ax.set_title("Phase against weather: the phase falls as the index rises")
@@ -249,15 +264,21 @@ def _line(found: "PathCalibration"):
     return figure
 
 
-def refractometer_report(found: "PathCalibration", when: datetime) -> str:
+def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     """The whole page; `when` in UTC."""
-    drawn, sheet = refractometer_figures(found), found.readings.sheet
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(found))
-    parameters = _parameters(found)["thermometers"]
+    drawn, sheet = refractometer_figures(calibration), calibration.readings.sheet
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
+    parameters = _parameters(calibration)["thermometers"]
     cards = [
-        card("n_g − 1", f"{found.index_0 / PPM:.3f} ± {found.u_index_0 / PPM:.3f} ppm", "at the reference phase"),
-        card("Weather over phase", _card_slope(found), "1: the path's air changes as the sensors'"),
-        card("Readings", f"{found.status.count('good')} of {len(found.readings)}", "used in the calibration"),
+        card(
+            "n_g − 1",
+            f"{calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm",
+            "at the reference phase",
+        ),
+        card("Weather over phase", _card_slope(calibration), "1: the path's air changes as the sensors'"),
+        card(
+            "Readings", f"{calibration.status.count('good')} of {len(calibration.readings)}", "used in the calibration"
+        ),
     ]
     thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in parameters.items()]
     facts = [*versions().items(), *((k, str(v)) for k, v in sheet.model_dump(exclude_none=True).items())]
@@ -278,40 +299,40 @@ def refractometer_report(found: "PathCalibration", when: datetime) -> str:
             "budget",
             "Budget",
             paragraph("Standard uncertainty of the calibrated index by cause; causes add in squares."),
-            table(("cause", "ppm"), [(c, f"{p / PPM:.4f}") for c, p in found.budget.items()], "tn"),
+            table(("cause", "ppm"), [(c, f"{p / PPM:.4f}") for c, p in calibration.budget.items()], "tn"),
             table(("thermometer", "reads too high (°C)", "u (°C)"), thermometers, "tnn"),
         ),
         section(
             "provenance",
             "Provenance",
-            table(("file read", "SHA-256"), list(found.readings.hashes.items()), "th"),
+            table(("file read", "SHA-256"), list(calibration.readings.hashes.items()), "th"),
             table(("what", "value"), facts, "tt"),
         ),
     ]  # fmt: skip
     return page("catseye: refractometer", "\n".join(body))
 
 
-def _card_slope(found: "PathCalibration") -> str:
-    slope = found.slope
+def _card_slope(calibration: "PathCalibration") -> str:
+    slope = calibration.slope
     return "not tested" if slope.agrees is None else f"{slope.ratio:.3f} ± {slope.u:.3f}"
 
 
 def write_refractometer(
-    found: "PathCalibration", directory: Path, progress: Callable[[str, int, int], None] | None = None
+    calibration: "PathCalibration", directory: Path, progress: Callable[[str, int, int], None] | None = None
 ) -> None:
     """Table, object, report, and last the provenance with the hashes of the others.
 
-    found       a calibrated path
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    progress    told of each file
+    calibration   a calibrated path
+    directory     exists, and is ours to fill: see `writers.output.whole_directory`
+    progress      told of each file
     """
     when = datetime.now(UTC)
     files: Files = {
-        "group_index.csv": lambda: series_csv(found),
-        "refractometer.json": lambda: json_page(refractometer_object(found)),
-        "night.svg": lambda: refractometer_figures(found)["night"],
-        "report.html": lambda: refractometer_report(found, when),
+        "group_index.csv": lambda: series_csv(calibration),
+        "refractometer.json": lambda: json_page(refractometer_object(calibration)),
+        "night.svg": lambda: refractometer_figures(calibration)["night"],
+        "report.html": lambda: refractometer_report(calibration, when),
     }
-    sheet = found.readings.sheet.model_dump(mode="json", exclude_none=True)
-    made = {"format": FORMAT, "made_by": "catseye refractometer", "sheet": sheet}
-    write_files(files, directory, {**made, **origin(when, found.readings.hashes)}, progress)
+    sheet = calibration.readings.sheet.model_dump(mode="json", exclude_none=True)
+    provenance = {"format": FORMAT, "made_by": "catseye refractometer", "sheet": sheet}
+    write_files(files, directory, {**provenance, **origin(when, calibration.readings.hashes)}, progress)

@@ -54,9 +54,9 @@ def gamma_water_cost(state: Sound, weather: tuple[float, float, float]) -> dict[
     }
 
 
-def sound_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+def sound_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
     """The object's lines for a terminal, each (title, text)."""
-    slope, cost, low = found["sensitivity"], found["notes_gamma_w"], found["dispersion"][0]
+    slope, cost, low = answer["sensitivity"], answer["notes_gamma_w"], answer["dispersion"][0]
     carbon = (
         f"{slope['co2_ppm'] * 100.0:+.5f} m/s per 100 ppm of carbon dioxide"
         if "co2_ppm" in slope
@@ -66,19 +66,22 @@ def sound_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
         f"{name} {item['speed']:.3f} ± {item['standard_uncertainty']:.2g} m/s"
         if item["speed"] is not None
         else f"{name}: {item['reason']}"
-        for name, item in found["models"].items()
+        for name, item in answer["models"].items()
     )
     return [
-        ("speed", f"{found['speed']:.3f} m/s at zero frequency, dry air {found['dry_speed']:.3f} m/s"),
-        ("uncertainty", f"{found['standard_uncertainty']:.2g} m/s (1σ)"),
+        ("speed", f"{answer['speed']:.3f} m/s at zero frequency, dry air {answer['dry_speed']:.3f} m/s"),
+        ("uncertainty", f"{answer['standard_uncertainty']:.2g} m/s (1σ)"),
         ("per °C", f"{slope['temperature_c']:+.6f} m/s"),
         ("per hPa", f"{slope['pressure_hpa']:+.6f} m/s"),
         ("per %", f"{slope['humidity_percent']:+.6f} m/s of relative humidity"),
         ("per hPa (e)", f"{slope['vapour_pressure_hpa']:+.6f} m/s"),
         ("CO2", carbon),
-        ("time", f"{found['travel_time_per_m'] * 1e3:.6f} ms/m, {found['travel_time_per_m_per_c'] * 1e6:+.4f} µs/m/°C"),
-        ("vapour", f"{found['vapour_pressure_hpa']:.3f} hPa"),
-        ("formula", found["model"]),
+        (
+            "time",
+            f"{answer['travel_time_per_m'] * 1e3:.6f} ms/m, {answer['travel_time_per_m_per_c'] * 1e6:+.4f} µs/m/°C",
+        ),
+        ("vapour", f"{answer['vapour_pressure_hpa']:.3f} hPa"),
+        ("formula", answer["model"]),
         ("formulas", others),
         (
             "notes",

@@ -14,32 +14,32 @@ if TYPE_CHECKING:
 MARKERS = "osD^vP"
 
 
-def baseline_figures(found: "BaselineCalibration") -> dict[str, str]:
+def baseline_figures(calibration: "BaselineCalibration") -> dict[str, str]:
     """Every figure of the report by its name, as SVG text."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         drawn = {
-            "line": _line(found),
-            "residuals": _residuals(found),
-            "weather": _weather(found),
-            "corrections": _corrections(found),
+            "line": _line(calibration),
+            "residuals": _residuals(calibration),
+            "weather": _weather(calibration),
+            "corrections": _corrections(calibration),
         }
-        if found.cyclic:
-            drawn["cyclic"] = _cyclic(found)
+        if calibration.cyclic:
+            drawn["cyclic"] = _cyclic(calibration)
         return {name: svg(figure) for name, figure in drawn.items()}
 
 
-def _setups(found: "BaselineCalibration"):
+def _setups(calibration: "BaselineCalibration"):
     """Number, legend, colour and marker of each set-up."""
-    seen = found.observations
-    for k in range(int(seen.setup.max()) + 1):
-        first = int(np.argmax(seen.setup == k))
-        yield k, f"from {found.names[seen.start[first]]}", SERIES[k % len(SERIES)], MARKERS[k // len(SERIES) % 6]
+    shots = calibration.observations
+    for k in range(int(shots.setup.max()) + 1):
+        first = int(np.argmax(shots.setup == k))
+        yield k, f"from {calibration.names[shots.start[first]]}", SERIES[k % len(SERIES)], MARKERS[k // len(SERIES) % 6]
 
 
-def _line(found: "BaselineCalibration") -> Figure:
-    s = found.solution
+def _line(calibration: "BaselineCalibration") -> Figure:
+    s = calibration.solution
     figure = Figure(figsize=(9.4, 2.9), layout="constrained")
     ax = figure.add_subplot()
     rows, covariance = s.places
@@ -47,7 +47,7 @@ def _line(found: "BaselineCalibration") -> Figure:
     u[rows] = np.sqrt(np.diag(covariance))
     ax.axhline(0.0, color=FAINT, lw=0.8)
     ax.errorbar(s.x, s.y / MILLIMETRE, u[len(s.x) :] / MILLIMETRE, fmt="o", color=SERIES[0], ms=5, elinewidth=1.0)
-    for name, x, y, ux in zip(found.names, s.x, s.y, u, strict=False):
+    for name, x, y, ux in zip(calibration.names, s.x, s.y, u, strict=False):
         label = f"{name}   {x:.4f} m" + (f" ± {ux / MILLIMETRE:.2f} mm" if ux > 0.0 else "")
         ax.annotate(label, (x, y / MILLIMETRE), xytext=(5, 7), textcoords="offset points", fontsize=7.5, rotation=22)
     ax.margins(x=0.05, y=0.35)
@@ -58,20 +58,20 @@ def _line(found: "BaselineCalibration") -> Figure:
     return figure
 
 
-def _residuals(found: "BaselineCalibration") -> Figure:
-    seen, distance = found.observations, found.lengths.distance
-    residual = shot_residuals(found) / MILLIMETRE
+def _residuals(calibration: "BaselineCalibration") -> Figure:
+    shots, distance = calibration.observations, calibration.lengths.distance
+    residual = shot_residuals(calibration) / MILLIMETRE
     figure = Figure(figsize=(9.4, 4.3), layout="constrained")
     ax = figure.add_subplot()
     far = np.linspace(0.0, 1.03 * float(distance.max()), 101)
-    settings = found.settings
+    settings = calibration.settings
     claim = settings.specified_mm + settings.specified_ppm * PPM * far / MILLIMETRE
     ax.fill_between(far, -2 * claim, 2 * claim, color="#eef2f5", lw=0, label="twice the maker's claim")
     ax.axhline(0.0, color=FAINT, lw=0.8)
-    for k, label, colour, marker in _setups(found):
-        mine = seen.setup == k
+    for k, label, colour, marker in _setups(calibration):
+        mine = shots.setup == k
         ax.scatter(distance[mine], residual[mine], s=22, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
-    out = ~found.keep
+    out = ~calibration.keep
     for d in distance[out]:
         ax.axvline(d, color=BAD, lw=0.8, ls=":")
     ax.set_xlabel("horizontal distance (m)")
@@ -80,19 +80,19 @@ def _residuals(found: "BaselineCalibration") -> Figure:
     return figure
 
 
-def _weather(found: "BaselineCalibration") -> Figure:
+def _weather(calibration: "BaselineCalibration") -> Figure:
     """Residuals in ppm over the change of the index: a slope is a light that does not follow the sensors."""
-    seen, way = found.observations, found.lengths
-    residual = shot_residuals(found) / way.distance / PPM
-    change = -(way.index - way.index[found.keep].mean()) / PPM
+    shots, way = calibration.observations, calibration.lengths
+    residual = shot_residuals(calibration) / way.distance / PPM
+    change = -(way.index - way.index[calibration.keep].mean()) / PPM
     long = way.distance > 0.25 * way.distance.max()
     figure = Figure(figsize=(9.4, 4.0), layout="constrained")
     ax = figure.add_subplot()
     ax.axhline(0.0, color=FAINT, lw=0.8)
-    for k, label, colour, marker in _setups(found):
-        mine = long & (seen.setup == k)
+    for k, label, colour, marker in _setups(calibration):
+        mine = long & (shots.setup == k)
         ax.scatter(change[mine], residual[mine], s=22, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
-    share, u = found.weather
+    share, u = calibration.weather
     if np.isfinite(share):
         ends = np.array([change[long].min(), change[long].max()])
         ax.plot(ends, (1.0 - share) * ends, color=INK, lw=1.1, label=f"light followed {share:.2f} ± {u:.2f} of it")
@@ -102,8 +102,8 @@ def _weather(found: "BaselineCalibration") -> Figure:
     return figure
 
 
-def _corrections(found: "BaselineCalibration") -> Figure:
-    way = found.lengths
+def _corrections(calibration: "BaselineCalibration") -> Figure:
+    way = calibration.lengths
     figure = Figure(figsize=(9.4, 3.4), layout="constrained")
     panels = figure.subplots(1, 3)
     for ax, values, label, scale in (
@@ -118,26 +118,26 @@ def _corrections(found: "BaselineCalibration") -> Figure:
     return figure
 
 
-def _cyclic(found: "BaselineCalibration") -> Figure:
-    unit = found.settings.unit_length
+def _cyclic(calibration: "BaselineCalibration") -> Figure:
+    unit = calibration.settings.unit_length
     assert unit is not None
-    seen = found.observations
+    shots = calibration.observations
     angle = np.linspace(0.0, 1.0, 201)
 
     def curve(share):
         total = np.zeros_like(share)
-        for order in range(1, len(found.cyclic) // 2 + 1):
+        for order in range(1, len(calibration.cyclic) // 2 + 1):
             for name, wave in (("cosine", np.cos), ("sine", np.sin)):
-                total = total + found.solution.of(f"cyclic {name} {order}")[0] * wave(TWO_PI * order * share)
+                total = total + calibration.solution.of(f"cyclic {name} {order}")[0] * wave(TWO_PI * order * share)
         return total
 
-    share = seen.slope / unit % 1.0
+    share = shots.slope / unit % 1.0
     figure = Figure(figsize=(9.4, 3.6), layout="constrained")
     ax = figure.add_subplot()
     ax.plot(angle * unit, curve(angle) / MILLIMETRE, color=INK, lw=1.2, label="adjusted")
-    values = (shot_residuals(found) + curve(share)) / MILLIMETRE
-    for k, label, colour, marker in _setups(found):
-        mine = seen.setup == k
+    values = (shot_residuals(calibration) + curve(share)) / MILLIMETRE
+    for k, label, colour, marker in _setups(calibration):
+        mine = shots.setup == k
         ax.scatter(share[mine] * unit, values[mine], s=18, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
     ax.set_xlabel(f"place in the unit length of {unit:g} m (m)")
     ax.set_ylabel("cyclic term and residual (mm)")

@@ -22,31 +22,31 @@ MARK = f'format = "{FORMAT}"'
 
 
 def write_calibration(
-    found: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    calibration: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
-    found       a calibration
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs      SHA-256 of each file read, by its name
-    progress    told of each file
+    calibration   a calibration
+    directory     exists, and is ours to fill: see `writers.output.whole_directory`
+    inputs        SHA-256 of each file read, by its name
+    progress      told of each file
     """
     from catseye.gateways.baseline.report import baseline_report  # matplotlib is heavy
 
     when = datetime.now(UTC)
     files: Files = {
-        "pillars.csv": lambda: pillars_csv(found),
-        "distances.csv": lambda: distances_csv(found),
-        "observations.csv": lambda: observations_csv(found),
-        "baseline.json": lambda: json_page(baseline_object(found)),
-        "report.html": lambda: baseline_report(found, when, inputs),
+        "pillars.csv": lambda: pillars_csv(calibration),
+        "distances.csv": lambda: distances_csv(calibration),
+        "observations.csv": lambda: observations_csv(calibration),
+        "baseline.json": lambda: json_page(baseline_object(calibration)),
+        "report.html": lambda: baseline_report(calibration, when, inputs),
     }
-    made = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(found.settings)}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    provenance = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(calibration.settings)}
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
 
 
 def write_record(
-    found: "BaselineCalibration",
+    calibration: "BaselineCalibration",
     path: Path,
     inputs: Mapping[str, str],
     *,
@@ -57,7 +57,7 @@ def write_record(
 ) -> None:
     """BASELINE.toml, whole or not at all.
 
-    found         a calibration
+    calibration   a calibration
     path          new, or an earlier one of catseye
     inputs        SHA-256 of each file read, by its name
     serial        of the instrument
@@ -73,7 +73,7 @@ def write_record(
         by=by,
         report=report,
         inputs_sha256=dict(inputs),
-        **record_values(found),
+        **record_values(calibration),
     )
     with whole_file(path, "--write", MARK) as pieces:
         pieces.append(baseline_text(record))

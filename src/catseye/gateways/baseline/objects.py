@@ -23,85 +23,85 @@ class Span(NamedTuple):
     u: float
 
 
-def spans(found: "BaselineCalibration") -> list[Span]:
+def spans(calibration: "BaselineCalibration") -> list[Span]:
     """Every pair of pillars, in their order along the line, with full covariance."""
-    s, n = found.solution, len(found.names)
+    s, n = calibration.solution, len(calibration.names)
     rows, covariance = s.places
-    made = []
-    for i, j in combinations(found.order.tolist(), 2):
+    spans = []
+    for i, j in combinations(calibration.order.tolist(), 2):
         dx, dy = s.x[j] - s.x[i], s.y[j] - s.y[i]
         d = float(np.hypot(dx, dy))
         slope = np.zeros(2 * n)
         slope[[i, j, n + i, n + j]] = np.array([-dx, dx, -dy, dy]) / d
         g = slope[rows]
-        made.append(Span(found.names[i], found.names[j], d, float(np.sqrt(g @ covariance @ g))))
-    return made
+        spans.append(Span(calibration.names[i], calibration.names[j], d, float(np.sqrt(g @ covariance @ g))))
+    return spans
 
 
-def baseline_object(found: "BaselineCalibration") -> dict[str, Any]:
+def baseline_object(calibration: "BaselineCalibration") -> dict[str, Any]:
     """A baseline as `catseye baseline --json` gives it."""
-    s, test = found.solution, found.test
+    s, test = calibration.solution, calibration.test
     zero, u_zero = s.of("zero")
     scale, u_scale = s.of("scale")
     full = test if isinstance(test, FullTest) else None
     rows, covariance = s.places
-    n = len(found.names)
+    n = len(calibration.names)
     return {
         "format": FORMAT,
-        "observations": {"shots": len(found.keep), "used": int(found.keep.sum()), "sets": len(s.residual)},
+        "observations": {"shots": len(calibration.keep), "used": int(calibration.keep.sum()), "sets": len(s.residual)},
         "sign": "observed = (1 + scale) distance + zero + cyclic; zero_correction is added to what is shown",
         "zero": zero,
         "u_zero": u_zero,
         "zero_correction": -zero,
         "scale_ppm": scale / PPM,
         "u_scale_ppm": u_scale / PPM,
-        "cyclic": _cyclic(found),
+        "cyclic": _cyclic(calibration),
         "s": full.s if full else None,
         "u_s": full.s / np.sqrt(2.0 * full.degrees_of_freedom) if full else None,
         "degrees_of_freedom": full.degrees_of_freedom if full else None,
-        "tests": [d.__dict__ for d in found.decisions],
-        "iso17123_4": _full(found),
-        "noise": _noise(found),
+        "tests": [d.__dict__ for d in calibration.decisions],
+        "iso17123_4": _full(calibration),
+        "noise": _noise(calibration),
         "variance_factor": s.variance_factor,
-        "weather_followed": found.weather[0],
-        "u_weather_followed": found.weather[1],
-        "reference_height": found.reference_height,
-        "pillars": _pillars(found),
-        "distances": [{"from": a, "to": b, "distance": d, "u_distance": u} for a, b, d, u in spans(found)],
-        "covariance_order": [f"{'x' if r < n else 'y'} {found.names[r % n]}" for r in rows],
+        "weather_followed": calibration.weather[0],
+        "u_weather_followed": calibration.weather[1],
+        "reference_height": calibration.reference_height,
+        "pillars": _pillars(calibration),
+        "distances": [{"from": a, "to": b, "distance": d, "u_distance": u} for a, b, d, u in spans(calibration)],
+        "covariance_order": [f"{'x' if r < n else 'y'} {calibration.names[r % n]}" for r in rows],
         "covariance": covariance,
-        "correlation_zero_scale": _correlation(found),
+        "correlation_zero_scale": _correlation(calibration),
         "budget": {cause: dict(zip(s.names, part.tolist(), strict=True)) for cause, part in s.parts.items()},
         "suspects": [
             {"kind": x.kind, "rows": [r + 1 for r in x.rows], "w": x.w, "p": x.p, "or_rows": [r + 1 for r in x.twins]}
-            for x in found.suspects
+            for x in calibration.suspects
         ],
-        "rejected": {str(k + 1): why for k, why in enumerate(found.rejected) if why},
-        "notes": found.notes,
+        "rejected": {str(k + 1): why for k, why in enumerate(calibration.rejected) if why},
+        "notes": calibration.notes,
     }
 
 
-def _correlation(found: "BaselineCalibration") -> float:
-    s = found.solution
+def _correlation(calibration: "BaselineCalibration") -> float:
+    s = calibration.solution
     if "scale" not in s.names:
         return float("nan")
     i, j = s.names.index("zero"), s.names.index("scale")
     return float(s.covariance[i, j] / np.sqrt(s.covariance[i, i] * s.covariance[j, j]))
 
 
-def _cyclic(found: "BaselineCalibration") -> dict[str, Any] | None:
-    if not found.cyclic:
+def _cyclic(calibration: "BaselineCalibration") -> dict[str, Any] | None:
+    if not calibration.cyclic:
         return None
     terms = []
-    for order in range(1, len(found.cyclic) // 2 + 1):
-        (c, u_c), (s, u_s) = (found.solution.of(f"cyclic {f} {order}") for f in ("cosine", "sine"))
+    for order in range(1, len(calibration.cyclic) // 2 + 1):
+        (c, u_c), (s, u_s) = (calibration.solution.of(f"cyclic {f} {order}") for f in ("cosine", "sine"))
         amplitude = float(np.hypot(c, s))
         terms.append({"order": order, "cosine": c, "u_cosine": u_c, "sine": s, "u_sine": u_s, "amplitude": amplitude})
-    return {"unit_length": found.settings.unit_length, "terms": terms}
+    return {"unit_length": calibration.settings.unit_length, "terms": terms}
 
 
-def _full(found: "BaselineCalibration") -> dict[str, Any] | None:
-    test, every = found.test, found.all_shots
+def _full(calibration: "BaselineCalibration") -> dict[str, Any] | None:
+    test, every = calibration.test, calibration.all_shots
     if not isinstance(test, FullTest):
         return {"status": test}
     return {
@@ -114,63 +114,64 @@ def _full(found: "BaselineCalibration") -> dict[str, Any] | None:
     }
 
 
-def _noise(found: "BaselineCalibration") -> dict[str, Any]:
+def _noise(calibration: "BaselineCalibration") -> dict[str, Any]:
     """Standard deviations, and their standard uncertainties by the first-order rule."""
-    noise, u = found.solution.noise, found.solution.u_noise
-    made: dict[str, Any] = {}
+    noise, u = calibration.solution.noise, calibration.solution.u_noise
+    parts: dict[str, Any] = {}
     for k, (key, variance, unit) in enumerate(
         (("shot", noise.shot, 1.0), ("set", noise.set, 1.0), ("air_ppm", noise.air, PPM))
     ):
         root = float(np.sqrt(variance))
-        made[key] = root / unit
-        made[f"u_{key}"] = float(u[k]) / (2.0 * root) / unit if root > 0.0 else None
-    return made
+        parts[key] = root / unit
+        parts[f"u_{key}"] = float(u[k]) / (2.0 * root) / unit if root > 0.0 else None
+    return parts
 
 
-def _pillars(found: "BaselineCalibration") -> dict[str, Any]:
-    s = found.solution
+def _pillars(calibration: "BaselineCalibration") -> dict[str, Any]:
+    s = calibration.solution
     rows, covariance = s.places
-    u = np.zeros(2 * len(found.names))
+    u = np.zeros(2 * len(calibration.names))
     u[rows] = np.sqrt(np.diag(covariance))
-    n = len(found.names)
+    n = len(calibration.names)
     return {
-        found.names[i]: {
+        calibration.names[i]: {
             "x": s.x[i],
             "y": s.y[i],
             "u_x": u[i],
             "u_y": u[n + i],
-            "height": None if found.heights is None else found.heights[i],
+            "height": None if calibration.heights is None else calibration.heights[i],
         }
-        for i in found.order
+        for i in calibration.order
     }
 
 
-def passages(found: "BaselineCalibration") -> list[Passage]:
+def passages(calibration: "BaselineCalibration") -> list[Passage]:
     """What a person should know, in order."""
-    s, test = found.solution, found.test
+    s, test = calibration.solution, calibration.test
     zero, u_zero = (v / MILLIMETRE for v in s.of("zero"))
-    seen = found.observations
-    made = [
+    shots = calibration.observations
+    passages = [
         Passage(
             "The shots",
-            f"{found.keep.sum()} of {len(seen)} used, in {len(s.residual)} sets between {len(found.names)} pillars",
+            f"{calibration.keep.sum()} of {len(shots)} used, in {len(s.residual)} sets between "
+            f"{len(calibration.names)} pillars",
         ),
         Passage("Zero", f"{zero:+.3f} ± {u_zero:.3f} mm (observed minus true; add {-zero:+.3f} mm to readings)"),
     ]
     scale, u_scale = (v / PPM for v in s.of("scale"))
     if np.isfinite(scale):
-        made.append(Passage("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm (shows too long where above zero)"))
+        passages.append(Passage("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm (shows too long where above zero)"))
     else:
-        made.append(Passage("Scale", "not determined without a known baseline"))
-    cyclic = _cyclic(found)
+        passages.append(Passage("Scale", "not determined without a known baseline"))
+    cyclic = _cyclic(calibration)
     for term in cyclic["terms"] if cyclic else ():
         text = (
             f"order {term['order']}: cosine {term['cosine'] / MILLIMETRE:+.3f} ± {term['u_cosine'] / MILLIMETRE:.3f}, "
             f"sine {term['sine'] / MILLIMETRE:+.3f} ± {term['u_sine'] / MILLIMETRE:.3f} mm"
         )
-        made.append(Passage("Cyclic", text))
+        passages.append(Passage("Cyclic", text))
     noise = s.noise
-    made.append(
+    passages.append(
         Passage(
             "Scatter",
             f"of a shot within its set {noise.shot**0.5 / MILLIMETRE:.3f} mm; from set to set "
@@ -180,9 +181,9 @@ def passages(found: "BaselineCalibration") -> list[Passage]:
     if isinstance(test, FullTest):
         freedom = f"{test.degrees_of_freedom} degrees of freedom"
         text = f"s = {test.s / MILLIMETRE:.3f} mm of one distance (a set's mean), {freedom}"
-        made.append(Passage("ISO 17123-4", text))
-    for d in found.decisions:
+        passages.append(Passage("ISO 17123-4", text))
+    for d in calibration.decisions:
         verdict = {True: "passed", False: "FAILED", None: "not possible"}[d.passed]
         numbers = f" ({d.statistic:.3g}, limit {d.limit:.3g})" if np.isfinite(d.limit) else ""
-        made.append(Passage("Test", f"{d.name}: {verdict}{numbers}. {d.text}"))
-    return made + [Passage("Note", note) for note in found.notes]
+        passages.append(Passage("Test", f"{d.name}: {verdict}{numbers}. {d.text}"))
+    return passages + [Passage("Note", note) for note in calibration.notes]

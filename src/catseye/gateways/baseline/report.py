@@ -30,40 +30,40 @@ CONTENTS = {
 }
 
 
-def baseline_report(found: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
+def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page.
 
-    found    a calibration
-    when     UTC
-    inputs   SHA-256 of each file read, by its name
+    calibration   a calibration
+    when          UTC
+    inputs        SHA-256 of each file read, by its name
     """
-    drawn = baseline_figures(found)
+    drawn = baseline_figures(calibration)
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
-        f"<header><h1>{escape(Path(found.observations.file).name)}: EDM baseline</h1>"
+        f"<header><h1>{escape(Path(calibration.observations.file).name)}: EDM baseline</h1>"
         f'<div class="faint">adjusted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; '
         f"observed = (1 + scale) × distance + zero + cyclic</div><nav>{links}</nav></header>"
     )
     body = [
         header,
-        _summary(found),
-        _pillars(found, drawn),
+        _summary(calibration),
+        _pillars(calibration, drawn),
         _residuals(drawn),
-        _tests(found),
-        _budget(found),
-        _sets(found),
-        _provenance(found, when, inputs),
+        _tests(calibration),
+        _budget(calibration),
+        _sets(calibration),
+        _provenance(calibration, when, inputs),
     ]
     return page("catseye: EDM baseline", "\n".join(body))
 
 
-def _summary(found: "BaselineCalibration") -> str:
-    s, test = found.solution, found.test
+def _summary(calibration: "BaselineCalibration") -> str:
+    s, test = calibration.solution, calibration.test
     zero, u_zero = (v / MILLIMETRE for v in s.of("zero"))
     scale, u_scale = (v / PPM for v in s.of("scale"))
     known = np.isfinite(scale)
-    failed = [d for d in found.decisions if d.passed is False]
-    longest = max(spans(found), key=lambda span: span.distance)
+    failed = [d for d in calibration.decisions if d.passed is False]
+    longest = max(spans(calibration), key=lambda span: span.distance)
     cards = [
         card("Zero", f"{zero:+.3f} ± {u_zero:.3f} mm", "observed minus true"),
         card("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm" if known else "not determined", "shows too long above zero"),
@@ -75,7 +75,7 @@ def _summary(found: "BaselineCalibration") -> str:
         card(f"{longest.start} to {longest.end}", f"{longest.distance:.4f} m", f"u = {longest.u / MILLIMETRE:.2f} mm"),
     ]
     words = "".join(
-        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(found) if p.title != "Test"
+        f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration) if p.title != "Test"
     )
     verdict = "Every test passes." if not failed else f"Failed: {'; '.join(d.name for d in failed)}."
     return section(
@@ -87,14 +87,16 @@ def _summary(found: "BaselineCalibration") -> str:
     )
 
 
-def _pillars(found: "BaselineCalibration", drawn: dict[str, str]) -> str:
+def _pillars(calibration: "BaselineCalibration", drawn: dict[str, str]) -> str:
     rows = [
         (name, f"{p['x']:.5f}", f"{p['u_x'] / MILLIMETRE:.3f}", f"{p['y']:.5f}", f"{p['u_y'] / MILLIMETRE:.3f}",
          "" if p["height"] is None else f"{p['height']:.4f}")
-        for name, p in baseline_object(found)["pillars"].items()
+        for name, p in baseline_object(calibration)["pillars"].items()
     ]  # fmt: skip
-    pairs = [(a, b, f"{d:.5f}", f"{u / MILLIMETRE:.3f}") for a, b, d, u in spans(found)]
-    height = "one height" if found.reference_height is None else f"the height {found.reference_height:.3f} m"
+    pairs = [(a, b, f"{d:.5f}", f"{u / MILLIMETRE:.3f}") for a, b, d, u in spans(calibration)]
+    height = (
+        "one height" if calibration.reference_height is None else f"the height {calibration.reference_height:.3f} m"
+    )
     return section(
         "pillars",
         CONTENTS["pillars"],
@@ -118,33 +120,33 @@ def _residuals(drawn: dict[str, str]) -> str:
     return section("residuals", CONTENTS["residuals"], *parts)
 
 
-def _tests(found: "BaselineCalibration") -> str:
+def _tests(calibration: "BaselineCalibration") -> str:
     verdict = {True: "passed", False: "failed", None: "not possible"}
     rows = [
         (d.name, f"{d.statistic:.4g}" if np.isfinite(d.statistic) else "",
          f"{d.limit:.4g}" if np.isfinite(d.limit) else "", verdict[d.passed], d.text)
-        for d in found.decisions
+        for d in calibration.decisions
     ]  # fmt: skip
     return section(
         "tests",
         CONTENTS["tests"],
         paragraph(
-            f"Each at the level {found.settings.level:g}. Limits come from the claim and the degrees of freedom, "
+            f"Each at the level {calibration.settings.level:g}. Limits come from the claim and the degrees of freedom, "
             "never from the scatter that they judge. A set, its repeats averaged, counts as one distance."
         ),
         table(("test", "statistic", "limit", "outcome", "meaning"), rows, "wnntw"),
     )
 
 
-def _budget(found: "BaselineCalibration") -> str:
-    s = found.solution
-    last = f"x {found.order[-1]}"
-    wanted = [n for n in ("zero", "scale", *found.cyclic, last) if n in s.names]
+def _budget(calibration: "BaselineCalibration") -> str:
+    s = calibration.solution
+    last = f"x {calibration.order[-1]}"
+    wanted = [n for n in ("zero", "scale", *calibration.cyclic, last) if n in s.names]
     at = [s.names.index(n) for n in wanted]
     unit = [PPM if n == "scale" else MILLIMETRE for n in wanted]
     rows = [(cause, *(f"{part[i] / u:.4f}" for i, u in zip(at, unit, strict=True))) for cause, part in s.parts.items()]
     rows.append(("all together", *(f"{s.of(n)[1] / u:.4f}" for n, u in zip(wanted, unit, strict=True))))
-    heads = [f"x of {found.names[found.order[-1]]}" if n == last else n for n in wanted]
+    heads = [f"x of {calibration.names[calibration.order[-1]]}" if n == last else n for n in wanted]
     heads = [f"{h} ({'ppm' if n == 'scale' else 'mm'})" for h, n in zip(heads, wanted, strict=True)]
     return section(
         "budget",
@@ -154,17 +156,19 @@ def _budget(found: "BaselineCalibration") -> str:
     )
 
 
-def _sets(found: "BaselineCalibration") -> str:
-    s, seen = found.solution, found.observations
-    first = np.flatnonzero(found.keep)[s.used.first]
-    scatter = [float(np.std(shot_residuals(found)[found.keep][s.used.set == k])) for k in range(len(s.residual))]
+def _sets(calibration: "BaselineCalibration") -> str:
+    s, shots = calibration.solution, calibration.observations
+    first = np.flatnonzero(calibration.keep)[s.used.first]
+    scatter = [
+        float(np.std(shot_residuals(calibration)[calibration.keep][s.used.set == k])) for k in range(len(s.residual))
+    ]
     rows = [
         (
-            found.names[seen.start[row]],
-            found.names[seen.end[row]],
+            calibration.names[shots.start[row]],
+            calibration.names[shots.end[row]],
             str(s.used.shots[k]),
-            f"{found.lengths.distance[row]:.4f}",
-            f"{seen.temperature_c[row]:.1f}",
+            f"{calibration.lengths.distance[row]:.4f}",
+            f"{shots.temperature_c[row]:.1f}",
             f"{s.residual[k] / MILLIMETRE:+.3f}",
             f"{scatter[k] / MILLIMETRE:.3f}",
             f"{s.w_set[k]:+.2f}" if np.isfinite(s.w_set[k]) else "",
@@ -173,7 +177,7 @@ def _sets(found: "BaselineCalibration") -> str:
         for k, row in enumerate(first)
     ]
     columns = ("from", "to", "shots", "distance (m)", "°C", "residual (mm)", "repeats (mm)", "w", "redundancy")
-    left_out = [f"row {k + 1}: {why}" for k, why in enumerate(found.rejected) if why]
+    left_out = [f"row {k + 1}: {why}" for k, why in enumerate(calibration.rejected) if why]
     return section(
         "sets",
         CONTENTS["sets"],
@@ -183,8 +187,8 @@ def _sets(found: "BaselineCalibration") -> str:
     )
 
 
-def _provenance(found: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
-    facts = [*((k, v) for k, v in versions().items()), *((k, str(v)) for k, v in found.settings.__dict__.items())]
+def _provenance(calibration: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
+    facts = [*((k, v) for k, v in versions().items()), *((k, str(v)) for k, v in calibration.settings.__dict__.items())]
     return section(
         "provenance",
         CONTENTS["provenance"],

@@ -18,57 +18,57 @@ OBSERVATIONS = (
 )  # fmt: skip
 
 
-def pillars_csv(found: "BaselineCalibration") -> str:
+def pillars_csv(calibration: "BaselineCalibration") -> str:
     """Pillars along the line with their standard uncertainties."""
     rows = [
         (name, f"{p['x']:.6f}", f"{p['y']:.6f}", cell(p["height"], ".6f"), f"{p['u_x'] / MILLIMETRE:.4f}",
          f"{p['u_y'] / MILLIMETRE:.4f}")
-        for name, p in baseline_object(found)["pillars"].items()
+        for name, p in baseline_object(calibration)["pillars"].items()
     ]  # fmt: skip
     return csv_text(("pillar", "x_m", "y_m", "height_m", "u_x_mm", "u_y_mm"), rows)
 
 
-def distances_csv(found: "BaselineCalibration") -> str:
+def distances_csv(calibration: "BaselineCalibration") -> str:
     """Every pair of pillars: horizontal distance at the reference height, with its standard uncertainty."""
-    rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in spans(found)]
+    rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in spans(calibration)]
     return csv_text(("from_pillar", "to_pillar", "distance_m", "u_distance_mm"), rows)
 
 
-def shot_residuals(found: "BaselineCalibration") -> np.ndarray:
+def shot_residuals(calibration: "BaselineCalibration") -> np.ndarray:
     """(m,) observed minus adjusted of every shot, m; nan for those left out."""
-    used = found.solution.used
-    residual = np.full(len(found.keep), np.nan)
-    residual[found.keep] = found.solution.residual[used.set] + used.within
+    used = calibration.solution.used
+    residual = np.full(len(calibration.keep), np.nan)
+    residual[calibration.keep] = calibration.solution.residual[used.set] + used.within
     return residual
 
 
-def observations_csv(found: "BaselineCalibration") -> str:
+def observations_csv(calibration: "BaselineCalibration") -> str:
     """Every shot from what was shown to its residual."""
-    seen, way, s = found.observations, found.lengths, found.solution
-    residual = shot_residuals(found)
-    w_shot, w_set = np.full(len(seen), np.nan), np.full(len(seen), np.nan)
-    w_shot[found.keep], w_set[found.keep] = s.w_shot, s.w_set[s.used.set]
+    shots, way, s = calibration.observations, calibration.lengths, calibration.solution
+    residual = shot_residuals(calibration)
+    w_shot, w_set = np.full(len(shots), np.nan), np.full(len(shots), np.nan)
+    w_shot[calibration.keep], w_set[calibration.keep] = s.w_shot, s.w_set[s.used.set]
     rows = [
         (
             k + 1,
-            found.names[seen.start[k]],
-            found.names[seen.end[k]],
-            seen.set[k] + 1,
-            seen.setup[k] + 1,
-            f"{seen.slope[k]:.6f}",
+            calibration.names[shots.start[k]],
+            calibration.names[shots.end[k]],
+            shots.set[k] + 1,
+            shots.setup[k] + 1,
+            f"{shots.slope[k]:.6f}",
             f"{(way.index[k] - 1.0) / PPM:.4f}",
             f"{way.first[k] / MILLIMETRE:.4f}",
             f"{way.second[k] * 1e6:.4f}",
             f"{way.chord[k] * 1e6:.4f}",
             f"{way.level[k] / MILLIMETRE:.4f}",
             f"{way.distance[k]:.7f}",
-            cell(seen.direction[k] / DEGREE, ".7f"),
+            cell(shots.direction[k] / DEGREE, ".7f"),
             cell(residual[k] / MILLIMETRE, "+.4f"),
             cell(w_shot[k], "+.3f"),
             cell(w_set[k], "+.3f"),
-            found.rejected[k] or "used",
-            seen.where[k],
+            calibration.rejected[k] or "used",
+            shots.where[k],
         )
-        for k in range(len(seen))
+        for k in range(len(shots))
     ]
     return csv_text(OBSERVATIONS, rows)

@@ -32,28 +32,28 @@ HEAD = {
 }
 
 
-def certificate(found: Calibration, when: datetime) -> str:
+def certificate(calibration: Calibration, when: datetime) -> str:
     """The whole page.
 
-    found   the calibration
-    when    UTC, of the computation
+    calibration   the calibration
+    when          UTC, of the computation
     """
-    said = found.provenance
-    rows = "".join(f"<dt>{name}</dt><dd>{escape(str(said[key]))}</dd>" for key, name in HEAD.items())
+    provenance = calibration.provenance
+    rows = "".join(f"<dt>{name}</dt><dd>{escape(str(provenance[key]))}</dd>" for key, name in HEAD.items())
     body = [
         LINES,
-        f'<header><h1>{TITLE}</h1><div class="faint">{escape(found.title)}</div></header>',
+        f'<header><h1>{TITLE}</h1><div class="faint">{escape(calibration.title)}</div></header>',
         f'<dl class="head">{rows}</dl>',
-        _results(found),
-        section("method", "Method", paragraph(found.method)),
-        _tests(found),
-        section("figure", "Readings and residuals", picture(calibration_figure(found), found.title)),
-        _notes(found),
-        _readings(found),
-        _inputs(found, when),
+        _results(calibration),
+        section("method", "Method", paragraph(calibration.method)),
+        _tests(calibration),
+        section("figure", "Readings and residuals", picture(calibration_figure(calibration), calibration.title)),
+        _notes(calibration),
+        _readings(calibration),
+        _inputs(calibration, when),
         '<div class="sign">' + "".join(f"<div>{name}, date, signature</div>" for name in SIGNATURES) + "</div>",
     ]
-    return page(f"{TITLE}: {found.title}", "\n".join(body))
+    return page(f"{TITLE}: {calibration.title}", "\n".join(body))
 
 
 def rounded(value: float, u: float) -> tuple[str, str]:
@@ -72,13 +72,13 @@ def rounded(value: float, u: float) -> tuple[str, str]:
     return f"{value:.{places}f}", f"{u:.{places}f}"
 
 
-def _results(found: Calibration) -> str:
+def _results(calibration: Calibration) -> str:
     return section(
         "results",
         "Results",
         table(
             ("quantity", "value", "u", "k", "U = k u", "interval", "unit", "what it is"),
-            [_result(q) for q in found.quantities],
+            [_result(q) for q in calibration.quantities],
             "tnnnnntw",
         ),
         paragraph(
@@ -87,8 +87,8 @@ def _results(found: Calibration) -> str:
             "rests on few readings (Student).",
             "faint",
         ),
-        _correlations(found),
-        _to_copy(found.record),
+        _correlations(calibration),
+        _to_copy(calibration.record),
     )
 
 
@@ -108,14 +108,14 @@ def _result(q: Quantity) -> tuple[str, ...]:
     )
 
 
-def _correlations(found: Calibration) -> str:
+def _correlations(calibration: Calibration) -> str:
     """Coefficients of correlation, where there are several quantities."""
-    if len(found.quantities) < 2:
+    if len(calibration.quantities) < 2:
         return ""
-    u = [q.u or 1.0 for q in found.quantities]
+    u = [q.u or 1.0 for q in calibration.quantities]
     rows = [
-        (f"{i + 1}  {q.key}", *(f"{found.covariance[i, j] / (u[i] * u[j]):+.3f}" for j in range(len(u))))
-        for i, q in enumerate(found.quantities)
+        (f"{i + 1}  {q.key}", *(f"{calibration.covariance[i, j] / (u[i] * u[j]):+.3f}" for j in range(len(u))))
+        for i, q in enumerate(calibration.quantities)
     ]
     return "<h3>Correlation</h3>" + table(("", *(str(j + 1) for j in range(len(u)))), rows, "t" + "n" * len(u))
 
@@ -136,14 +136,16 @@ def _readable(value: Any) -> Any:
     return float(f"{value:.9g}") if isinstance(value, float) else value
 
 
-def _tests(found: Calibration) -> str:
+def _tests(calibration: Calibration) -> str:
     rows = [
-        (d.name, _number(d.statistic, ".4g"), _number(d.limit, ".4g"), _outcome(d), d.text) for d in found.decisions
+        (d.name, _number(d.statistic, ".4g"), _number(d.limit, ".4g"), _outcome(d), d.text)
+        for d in calibration.decisions
     ]
     degrees = (
-        f"Variance factor {found.variance_factor:.3g} from {found.degrees_of_freedom} degrees of freedom (expected 1)."
-        if math.isfinite(found.variance_factor)
-        else f"{found.degrees_of_freedom} degrees of freedom."
+        f"Variance factor {calibration.variance_factor:.3g} from {calibration.degrees_of_freedom} degrees of freedom "
+        "(expected 1)."
+        if math.isfinite(calibration.variance_factor)
+        else f"{calibration.degrees_of_freedom} degrees of freedom."
     )
     return section(
         "tests", "Tests", paragraph(degrees), table(("test", "value", "limit", "", "what it means"), rows, "tnntw")
@@ -154,26 +156,26 @@ def _outcome(decision: TestOutcome) -> str:
     return "–" if decision.passed is None else "passed" if decision.passed else "FAILED"
 
 
-def _notes(found: Calibration) -> str:
-    lines = "".join(f"<li>{escape(note)}</li>" for note in found.notes)
+def _notes(calibration: Calibration) -> str:
+    lines = "".join(f"<li>{escape(note)}</li>" for note in calibration.notes)
     return section("notes", "Worth knowing", f'<ul class="notes">{lines}</ul>') if lines else ""
 
 
-def _readings(found: Calibration) -> str:
-    kinds = "".join("t" if isinstance(cell, str) else "n" for cell in found.rows[0])
-    forms = [_form(name) for name in found.columns]
-    rows = [tuple(_cell(cell, form) for cell, form in zip(row, forms, strict=True)) for row in found.rows]
-    return section("readings", f"{len(rows)} readings", table(found.columns, rows, kinds))
+def _readings(calibration: Calibration) -> str:
+    kinds = "".join("t" if isinstance(cell, str) else "n" for cell in calibration.rows[0])
+    forms = [_form(name) for name in calibration.columns]
+    rows = [tuple(_cell(cell, form) for cell, form in zip(row, forms, strict=True)) for row in calibration.rows]
+    return section("readings", f"{len(rows)} readings", table(calibration.columns, rows, kinds))
 
 
-def _inputs(found: Calibration, when: datetime) -> str:
-    said = found.provenance
-    settings = [(key, str(value)) for key, value in said["sheet"].items()]
+def _inputs(calibration: Calibration, when: datetime) -> str:
+    provenance = calibration.provenance
+    settings = [(key, str(value)) for key, value in provenance["sheet"].items()]
     return section(
         "provenance",
         "Provenance",
         paragraph(f"Computed {when:%Y-%m-%d %H:%M:%S} UTC by catseye {versions()['catseye']}."),
-        table(("input", "SHA-256"), list(said["inputs_sha256"].items()), "th"),
+        table(("input", "SHA-256"), list(provenance["inputs_sha256"].items()), "th"),
         "<h3>Stated in the sheet</h3>",
         table(("key", "value"), settings, "tt"),
         folded("Programs", table(("part", "version"), list(versions().items()), "tt")),
@@ -199,26 +201,26 @@ def _number(value: float, form: str) -> str:
     return str(value) if isinstance(value, int) else format(value, form)
 
 
-def passages(found: Calibration) -> Iterator[tuple[str, str]]:
+def passages(calibration: Calibration) -> Iterator[tuple[str, str]]:
     """(title, text) of each paragraph that a terminal shows of a calibration."""
-    said = found.provenance
+    provenance = calibration.provenance
     yield (
         "Calibration",
-        f"{found.title}; serial {said['serial']}, measured on {said['measured_on']} by {said['by']}, valid until "
-        f"{said['valid_until']}.",
+        f"{calibration.title}; serial {provenance['serial']}, measured on {provenance['measured_on']} by "
+        f"{provenance['by']}, valid until {provenance['valid_until']}.",
     )
-    for number, q in enumerate(found.quantities):
+    for number, q in enumerate(calibration.quantities):
         value, u = rounded(q.value, q.u)
         yield "" if number else "Found", f"{q.key} = {value}, u {u} {q.unit}: {q.meaning}"
-    for number, decision in enumerate(found.decisions):
+    for number, decision in enumerate(calibration.decisions):
         outcome = {True: "passed", False: "FAILED", None: "not judged"}[decision.passed]
         numbers = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.limit == decision.limit else ""
         yield "" if number else "Tests", f"{decision.name}{numbers}: {outcome}; {decision.text}"
-    odd = [f"{number} ({state})" for number, state in enumerate(found.states, start=1) if state != "used"]
+    odd = [f"{number} ({state})" for number, state in enumerate(calibration.states, start=1) if state != "used"]
     if odd:
         more = f" and {len(odd) - SHOWN} more" if len(odd) > SHOWN else ""
-        yield "Readings", f"{len(found.rows)}, of which {', '.join(odd[:SHOWN])}{more}"
-    elif found.states:
-        yield "Readings", f"{len(found.rows)}, all used"
-    for number, note in enumerate(found.notes):
+        yield "Readings", f"{len(calibration.rows)}, of which {', '.join(odd[:SHOWN])}{more}"
+    elif calibration.states:
+        yield "Readings", f"{len(calibration.rows)}, all used"
+    for number, note in enumerate(calibration.notes):
         yield "" if number else "Notes", note

@@ -19,14 +19,14 @@ MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def calibration_object(found: Calibration) -> dict[str, Any]:
+def calibration_object(calibration: Calibration) -> dict[str, Any]:
     """A calibration as `catseye calibrate --json` gives it; units are in the keys, null stands for undefined."""
     return plain(
         {
             "format": FORMAT,
-            "kind": found.kind,
-            "title": found.title,
-            **found.provenance,
+            "kind": calibration.kind,
+            "title": calibration.title,
+            **calibration.provenance,
             "quantities": {
                 q.key: {
                     "value": q.value,
@@ -37,46 +37,51 @@ def calibration_object(found: Calibration) -> dict[str, Any]:
                     "unit": q.unit,
                     "meaning": q.meaning,
                 }
-                for q in found.quantities
+                for q in calibration.quantities
             },
-            "covariance_order": [q.key for q in found.quantities],
-            "covariance": found.covariance,
-            "record": found.record,
-            "variance_factor": found.variance_factor,
-            "degrees_of_freedom": found.degrees_of_freedom,
-            "decisions": [vars(decision) for decision in found.decisions],
-            "notes": found.notes,
-            "readings": [dict(zip(found.columns, row, strict=True)) for row in found.rows],
-            "not_used": [number for number, state in enumerate(found.states) if state not in ("used", "suspect")],
+            "covariance_order": [q.key for q in calibration.quantities],
+            "covariance": calibration.covariance,
+            "record": calibration.record,
+            "variance_factor": calibration.variance_factor,
+            "degrees_of_freedom": calibration.degrees_of_freedom,
+            "decisions": [vars(decision) for decision in calibration.decisions],
+            "notes": calibration.notes,
+            "readings": [dict(zip(calibration.columns, row, strict=True)) for row in calibration.rows],
+            "not_used": [number for number, state in enumerate(calibration.states) if state not in ("used", "suspect")],
         }
     )
 
 
-def calibration_toml(found: Calibration) -> str:
+def calibration_toml(calibration: Calibration) -> str:
     """A calibration as its record: RECORD.toml, which `records.laboratory.calibration.CalibrationRecord` reads back."""
-    said = found.provenance
+    provenance = calibration.provenance
     head = {
-        "kind": found.kind,
-        "title": found.title,
-        **{key: said[key] for key in PROVENANCE},
+        "kind": calibration.kind,
+        "title": calibration.title,
+        **{key: provenance[key] for key in PROVENANCE},
         "made_by": f"catseye {__version__}",
-        "variance_factor": found.variance_factor,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "method": found.method,
-        "notes": list(found.notes),
+        "variance_factor": calibration.variance_factor,
+        "degrees_of_freedom": calibration.degrees_of_freedom,
+        "method": calibration.method,
+        "notes": list(calibration.notes),
     }
     lines = [MARK, *_pairs(head)]
-    lines += ["", "# to copy into the record of the instrument", *_table("record", found.record)]
-    for q in found.quantities:
+    lines += ["", "# to copy into the record of the instrument", *_table("record", calibration.record)]
+    for q in calibration.quantities:
         lines += ["", "[[quantity]]", *_pairs(vars(q))]
-    matrix = ",\n".join(f"  {_value([float(v) for v in row])}" for row in np.atleast_2d(found.covariance))
-    lines += ["", "[covariance]", f"order = {_value([q.key for q in found.quantities])}", f"matrix = [\n{matrix},\n]"]
-    for decision in found.decisions:
+    matrix = ",\n".join(f"  {_value([float(v) for v in row])}" for row in np.atleast_2d(calibration.covariance))
+    lines += [
+        "",
+        "[covariance]",
+        f"order = {_value([q.key for q in calibration.quantities])}",
+        f"matrix = [\n{matrix},\n]",
+    ]
+    for decision in calibration.decisions:
         lines += ["", "[[decision]]", *_pairs(vars(decision))]
-    rows = ",\n".join(f"  {_value([_cell(cell) for cell in row])}" for row in found.rows)
-    lines += ["", "[readings]", f"columns = {_value(list(found.columns))}", f"rows = [\n{rows},\n]"]
+    rows = ",\n".join(f"  {_value([_cell(cell) for cell in row])}" for row in calibration.rows)
+    lines += ["", "[readings]", f"columns = {_value(list(calibration.columns))}", f"rows = [\n{rows},\n]"]
     for name in ("inputs_sha256", "sheet"):
-        lines += ["", *_table(name, said[name])]
+        lines += ["", *_table(name, provenance[name])]
     return "\n".join(lines) + "\n"
 
 

@@ -143,22 +143,24 @@ def _matrix(report: Report, rule: str) -> str:
 
 def _notes(report: Report) -> str:
     missing = report.missing
-    said = ""
+    blank_note = ""
     if missing:
         names = ", ".join(entry.name for entry in missing)
         count = f"{len(missing)} field{'' if len(missing) == 1 else 's'}"
-        said = f"{count} not in the record and left blank: {escape(names)}."
+        blank_note = f"{count} not in the record and left blank: {escape(names)}."
     lines = [escape(line) for line in report.notes.splitlines()]
-    return f'<h2>NOTES</h2><div class="notes">{"<br>".join([*lines, *([said] if said else [])])}</div>'
+    return f'<h2>NOTES</h2><div class="notes">{"<br>".join([*lines, *([blank_note] if blank_note else [])])}</div>'
 
 
 def _origin(report: Report, when: datetime) -> str:
     if not report.file:
         return f"Blank form of catseye {__version__}. u is the standard uncertainty (1σ). {DRAWN}"
     words = {"serial": "serial", "valid_until": "valid until", "report": "report"}
-    said = "".join(f", {word} {report.said[key]}" for key, word in words.items() if report.said[key] is not None)
+    provenance = "".join(
+        f", {word} {report.provenance[key]}" for key, word in words.items() if report.provenance[key] is not None
+    )
     return (
-        f"From {report.file}, SHA-256 {report.sha256}{said}. Printed by catseye {__version__}, "
+        f"From {report.file}, SHA-256 {report.sha256}{provenance}. Printed by catseye {__version__}, "
         f"{when:%Y-%m-%d %H:%M:%S} UTC. u is the standard uncertainty (1σ), empty where the record does not say it. "
         f"{DRAWN}"
     )
@@ -171,7 +173,7 @@ def _small(text: str) -> str:
 def sketches(kind: str) -> str:
     """The axes and the positive senses, drawn with the same rotations that compute the matrix.
 
-    kind    monument or mirror
+    kind   monument or mirror
     """
     drawn = (_plan(), _tip(), _pitch()) if kind == "monument" else (_turned_plan(), _turned_side(), _face())
     return "\n".join(drawn)
@@ -193,8 +195,8 @@ def _plan() -> str:
         _turn(o, lambda t: gamma(t * alpha1, 0.0, 0.0)[2, :2], "α₁", 46.0),
         _turn(o, lambda t: (np.sin(t * azimuth), np.cos(t * azimuth)), "azimuth", 22.0, named=0.56),
         _through(o, "ŷ up", (-24, 0)),
-        _said((192, 148), "ẑ: fixed point"),
-        _said((192, 162), "to v-block"),
+        _caption((192, 148), "ẑ: fixed point"),
+        _caption((192, 162), "to v-block"),
     )
 
 
@@ -291,8 +293,8 @@ def _offset_axes(
         _arrow(point, axes(1)[up], names[3], length=0.8 * AXIS),
         _dashed(point, corner),
         _dashed(point, (ball[0], point[1])),
-        _said(corner + np.array([-31, 10]), marks[0]),
-        _said((point[0] + 15, 0.5 * (point[1] + ball[1]) + 8), marks[1]),
+        _caption(corner + np.array([-31, 10]), marks[0]),
+        _caption((point[0] + 15, 0.5 * (point[1] + ball[1]) + 8), marks[1]),
         _turn(point, lambda t: axes(t)[right], marks[2], 62.0),
         _through(ball, third, (-14, 17), away="away" in third),
         f'<circle cx="{point[0]:.1f}" cy="{point[1]:.1f}" r="3.5"/>',
@@ -310,7 +312,7 @@ def _face() -> str:
         _arrow(o, (np.cos(theta), np.sin(theta)), "beam", old=True),
         _turn(o, lambda t: (np.cos(t * theta), np.sin(t * theta)), "Θ", 34.0),
         _through(o, "z̃ towards you", (-2, 17)),
-        _said((125, 122), "beam (sinΦ cosΘ, sinΦ sinΘ, cosΦ)"),
+        _caption((125, 122), "beam (sinΦ cosΘ, sinΦ sinΘ, cosΦ)"),
     )
 
 
@@ -365,12 +367,12 @@ def _through(at: np.ndarray, name: str, shift: tuple[float, float], *, away: boo
     x, y = at
     ring = f'<circle cx="{x}" cy="{y}" r="6" fill="#fff" stroke="#1f5a99" stroke-width="1.6"/>'
     cross = f'<path d="M{x - 4} {y - 4}L{x + 4} {y + 4}M{x - 4} {y + 4}L{x + 4} {y - 4}" stroke="#1f5a99"/>'
-    return ring + (cross if away else f'<circle cx="{x}" cy="{y}" r="2.2"/>') + _said(at + shift, name)
+    return ring + (cross if away else f'<circle cx="{x}" cy="{y}" r="2.2"/>') + _caption(at + shift, name)
 
 
 def _dashed(a: np.ndarray, b: Sequence[float] | np.ndarray) -> str:
     return f'<line x1="{a[0]}" y1="{a[1]}" x2="{b[0]}" y2="{b[1]}" stroke="#22303c" stroke-dasharray="2 2"/>'
 
 
-def _said(at: Sequence[float] | np.ndarray, text: str) -> str:
+def _caption(at: Sequence[float] | np.ndarray, text: str) -> str:
     return f'<text class="said" x="{at[0]:.1f}" y="{at[1]:.1f}">{text}</text>'

@@ -71,19 +71,19 @@ class ReportField:
 class Report:
     """A form filled from a record, or blank.
 
-    kind       monument or mirror
-    file       name of the record's file, empty for a blank form
-    sha256     of that file
-    fields     in the form's order, the matrix last
-    said       the record's provenance
-    notes      of the record
+    kind         monument or mirror
+    file         name of the record's file, empty for a blank form
+    sha256       of that file
+    fields       in the form's order, the matrix last
+    provenance   of the record: when, by whom, until when, from which report
+    notes        of the record
     """
 
     kind: str
     file: str
     sha256: str
     fields: tuple[ReportField, ...]
-    said: dict[str, Any]
+    provenance: dict[str, Any]
     notes: str = ""
 
     @property
@@ -197,8 +197,10 @@ def read_report(kind: str, path: Path) -> Report:
     """
     folder = Folder(path.parent)
     record = folder.record(path.name, FORMS[kind].record)
-    said = {key: getattr(record, key) for key in PROVENANCE}
-    return Report(kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), said, record.notes or "")
+    provenance = {key: getattr(record, key) for key in PROVENANCE}
+    return Report(
+        kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), provenance, record.notes or ""
+    )
 
 
 def blank_report(kind: str) -> Report:
@@ -209,7 +211,7 @@ def blank_report(kind: str) -> Report:
 def report_object(report: Report, written: str | None) -> dict[str, Any]:
     """A report as `catseye certificate --json` gives it; units stand beside the values, null where nothing is said.
 
-    written    path of the page, as the user gave it
+    written   path of the page, as the user gave it
     """
     return {
         "kind": report.kind,

@@ -17,7 +17,7 @@ SMALLEST_SHARE = 5e-5  # of a line in the text's table
 START_OF_MJD = datetime(1858, 11, 17)
 
 
-def explanation_object(found: Explanation, seed: int | None = None) -> dict[str, Any]:
+def explanation_object(explanation: Explanation, seed: int | None = None) -> dict[str, Any]:
     """An explanation as `catseye explain --json` gives it: metres, shares of 1, null where there is nothing to tell.
 
     seed   of the Monte Carlo, where there was one
@@ -25,17 +25,17 @@ def explanation_object(found: Explanation, seed: int | None = None) -> dict[str,
     An input's value and standard uncertainty are in its unit, its sensitivity is metres a unit, its contribution
     metres. Infinite degrees of freedom are null, and `agrees` where the draws are too few to tell.
     """
-    budget, cycles = found.budget, found.cycles
+    budget, cycles = explanation.budget, explanation.cycles
     return {
-        "shot": found.shot,
-        "ranger": found.ranger,
-        "target": found.target,
-        "mjd_utc": found.mjd_utc,
-        "status": found.status,
-        "reason": found.reason or "",
-        "amplitude": abs(found.phasor),
-        "phase": float(np.mod(np.angle(found.phasor), 2.0 * np.pi)),
-        "u_phase": found.u_across / abs(found.phasor) if found.phasor else None,
+        "shot": explanation.shot,
+        "ranger": explanation.ranger,
+        "target": explanation.target,
+        "mjd_utc": explanation.mjd_utc,
+        "status": explanation.status,
+        "reason": explanation.reason or "",
+        "amplitude": abs(explanation.phasor),
+        "phase": float(np.mod(np.angle(explanation.phasor), 2.0 * np.pi)),
+        "u_phase": explanation.u_across / abs(explanation.phasor) if explanation.phasor else None,
         "range": budget and budget.value,
         "u_range": budget and budget.u,
         "expanded_uncertainty": budget and budget.expanded,
@@ -45,18 +45,18 @@ def explanation_object(found: Explanation, seed: int | None = None) -> dict[str,
         "cycles": cycles and int(cycles.cycles),
         "margin": cycles and float(cycles.margin),
         "slip_probability": cycles and float(cycles.slip_probability),
-        "coarse_from": found.coarse or None,
-        "inputs": _inputs(found),
-        "correlations": _correlations(found),
-        "monte_carlo": _monte_carlo(found, seed),
-        "adjusted": _adjusted(found),
-        "references": [{"shot": s, "after": after, "weight": w} for s, after, w in found.references],
-        "notes": list(found.notes),
+        "coarse_from": explanation.coarse or None,
+        "inputs": _inputs(explanation),
+        "correlations": _correlations(explanation),
+        "monte_carlo": _monte_carlo(explanation, seed),
+        "adjusted": _adjusted(explanation),
+        "references": [{"shot": s, "after": after, "weight": w} for s, after, w in explanation.references],
+        "notes": list(explanation.notes),
     }
 
 
-def _inputs(found: Explanation) -> list[dict[str, Any]]:
-    budget = found.budget
+def _inputs(explanation: Explanation) -> list[dict[str, Any]]:
+    budget = explanation.budget
     if budget is None:
         return []
     return [
@@ -72,24 +72,24 @@ def _inputs(found: Explanation) -> list[dict[str, Any]]:
             "share": share,
             "source": item.source,
         }
-        for item, contribution, share in zip(found.items, budget.contribution, budget.share, strict=True)
+        for item, contribution, share in zip(explanation.items, budget.contribution, budget.share, strict=True)
     ]
 
 
-def _correlations(found: Explanation) -> list[dict[str, Any]]:
-    if found.budget is None:
+def _correlations(explanation: Explanation) -> list[dict[str, Any]]:
+    if explanation.budget is None:
         return []
-    r = found.budget.correlation
+    r = explanation.budget.correlation
     return [
-        {"first": found.items[i].given.name, "second": found.items[j].given.name, "correlation": r[i, j]}
+        {"first": explanation.items[i].given.name, "second": explanation.items[j].given.name, "correlation": r[i, j]}
         for i in range(len(r))
         for j in range(i)
         if r[i, j] != 0.0
     ]
 
 
-def _monte_carlo(found: Explanation, seed: int | None) -> dict[str, Any] | None:
-    scattered, budget = found.scattered, found.budget
+def _monte_carlo(explanation: Explanation, seed: int | None) -> dict[str, Any] | None:
+    scattered, budget = explanation.scattered, explanation.budget
     if scattered is None or budget is None:
         return None
     return {
@@ -105,8 +105,8 @@ def _monte_carlo(found: Explanation, seed: int | None) -> dict[str, Any] | None:
     }
 
 
-def _adjusted(found: Explanation) -> dict[str, Any] | None:
-    adjusted = found.adjusted
+def _adjusted(explanation: Explanation) -> dict[str, Any] | None:
+    adjusted = explanation.adjusted
     if adjusted is None:
         return None
     return {
@@ -121,22 +121,22 @@ def _adjusted(found: Explanation) -> dict[str, Any] | None:
     }
 
 
-def explanation_passages(found: Explanation) -> list[Passage]:
+def explanation_passages(explanation: Explanation) -> list[Passage]:
     """The shot, its return, its range, cycles, Monte Carlo, the network's word, and what else there is to know."""
-    told = [Passage(f"Shot {found.shot}", _shot(found)), Passage("The return", _return(found))]
-    if found.budget is not None:
-        told += [Passage("The range", _range(found)), Passage("Whole cycles", _cycles(found))]
-        told.append(Passage("Correlation", _shared(found)))
-    if found.scattered is not None:
-        told.append(Passage("Monte Carlo", _scatter(found)))
-    if found.adjusted is not None:
-        told.append(Passage("The network", _network(found)))
-    return [*told, *([Passage("Notes", "; ".join(found.notes) + ".")] if found.notes else [])]
+    passages = [Passage(f"Shot {explanation.shot}", _shot(explanation)), Passage("The return", _return(explanation))]
+    if explanation.budget is not None:
+        passages += [Passage("The range", _range(explanation)), Passage("Whole cycles", _cycles(explanation))]
+        passages.append(Passage("Correlation", _shared(explanation)))
+    if explanation.scattered is not None:
+        passages.append(Passage("Monte Carlo", _scatter(explanation)))
+    if explanation.adjusted is not None:
+        passages.append(Passage("The network", _network(explanation)))
+    return [*passages, *([Passage("Notes", "; ".join(explanation.notes) + ".")] if explanation.notes else [])]
 
 
-def when(found: Explanation) -> str:
+def when(explanation: Explanation) -> str:
     """Calendar date and time of the trigger."""
-    return f"{START_OF_MJD + timedelta(days=found.mjd_utc):%Y-%m-%d %H:%M:%S} UTC"
+    return f"{START_OF_MJD + timedelta(days=explanation.mjd_utc):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def metres(length: float) -> str:
@@ -165,31 +165,33 @@ def distribution(given: Input) -> str:
     return given.distribution + (f", {degrees:.0f}" if np.isfinite(degrees) else "")
 
 
-def _shot(found: Explanation) -> str:
-    what = "its internal cube" if found.target == REFERENCE else found.target
-    start = f"{found.ranger} on {what} at {when(found)}. "
-    if found.status == "used":
+def _shot(explanation: Explanation) -> str:
+    what = "its internal cube" if explanation.target == REFERENCE else explanation.target
+    start = f"{explanation.ranger} on {what} at {when(explanation)}. "
+    if explanation.status == "used":
         return start + "It took part in the adjustment."
-    if found.status == "reference":
+    if explanation.status == "reference":
         return start + "It follows the drift of the electronics; a range it gives none."
-    meaning = MEANING.get(found.status, "")
-    meaning = f" ({meaning})" if found.reason and meaning and meaning not in found.reason else ""
-    return start + (f"Not used: {found.reason}{meaning}." if found.reason else f"Status: {found.status}.")
-
-
-def _return(found: Explanation) -> str:
-    amplitude = abs(found.phasor)
-    if not np.isfinite(found.u_across) or amplitude == 0.0:
-        return f"{amplitude:.4f} V after the leakage; its noise is unknown."
-    return (
-        f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(found.phasor), 2.0 * np.pi):.4f} rad; "
-        f"noise of the samples across it {1e3 * found.u_across:.2f} mV, that is "
-        f"{1e3 * found.u_across / amplitude:.2f} mrad."
+    meaning = MEANING.get(explanation.status, "")
+    meaning = f" ({meaning})" if explanation.reason and meaning and meaning not in explanation.reason else ""
+    return start + (
+        f"Not used: {explanation.reason}{meaning}." if explanation.reason else f"Status: {explanation.status}."
     )
 
 
-def _range(found: Explanation) -> str:
-    budget = found.budget
+def _return(explanation: Explanation) -> str:
+    amplitude = abs(explanation.phasor)
+    if not np.isfinite(explanation.u_across) or amplitude == 0.0:
+        return f"{amplitude:.4f} V after the leakage; its noise is unknown."
+    return (
+        f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(explanation.phasor), 2.0 * np.pi):.4f} rad; "
+        f"noise of the samples across it {1e3 * explanation.u_across:.2f} mV, that is "
+        f"{1e3 * explanation.u_across / amplitude:.2f} mrad."
+    )
+
+
+def _range(explanation: Explanation) -> str:
+    budget = explanation.budget
     assert budget is not None
     degrees = budget.degrees_of_freedom
     many = "infinitely many" if degrees > 1e6 else f"{degrees:.0f}"
@@ -197,32 +199,32 @@ def _range(found: Explanation) -> str:
         f"{metres(budget.value)}, u {micrometres(budget.u)}, scan point to reference point as this shot alone gives "
         f"it; with {100.0 * budget.probability:g} % within ±{micrometres(budget.expanded)} "
         f"(k {budget.coverage_factor:.2f}, {many} degrees of freedom)."
-        + (" That knows nothing of what this shot was rejected for." if found.reason else "")
+        + (" That knows nothing of what this shot was rejected for." if explanation.reason else "")
     )
 
 
-def _cycles(found: Explanation) -> str:
-    cycles, scene = found.cycles, found.scene
+def _cycles(explanation: Explanation) -> str:
+    cycles, scene = explanation.cycles, explanation.scene
     assert cycles is not None
     assert scene is not None
     slip = float(cycles.slip_probability)
     chance = "below 1e-12" if slip < 1e-12 else f"{slip:.1e}"
     return (
-        f"{int(cycles.cycles)} half wavelengths, decided by {found.coarse}: margin "
+        f"{int(cycles.cycles)} half wavelengths, decided by {explanation.coarse}: margin "
         f"{float(cycles.margin) / MILLIMETRE:.2f} mm of {0.5 * scene.half / MILLIMETRE:.2f}, u of the coarse length "
         f"{float(cycles.u) / MILLIMETRE:.2g} mm; probability of another number {chance}."
     )
 
 
-def _shared(found: Explanation) -> str:
-    pairs = [f"{c['first']} and {c['second']}: {c['correlation']:+.2f}" for c in _correlations(found)]
+def _shared(explanation: Explanation) -> str:
+    pairs = [f"{c['first']} and {c['second']}: {c['correlation']:+.2f}" for c in _correlations(explanation)]
     return "What acts on target and references alike, such as leakage, is one input; " + (
         f"correlated are {', '.join(pairs)}." if pairs else "no two inputs are correlated."
     )
 
 
-def _scatter(found: Explanation) -> str:
-    scattered, budget = found.scattered, found.budget
+def _scatter(explanation: Explanation) -> str:
+    scattered, budget = explanation.scattered, explanation.budget
     assert scattered is not None
     assert budget is not None
     verdict = {
@@ -237,29 +239,29 @@ def _scatter(found: Explanation) -> str:
     )
 
 
-def _network(found: Explanation) -> str:
-    adjusted = found.adjusted
+def _network(explanation: Explanation) -> str:
+    adjusted = explanation.adjusted
     assert adjusted is not None
     side = "more" if adjusted.residual > 0.0 else "less"
-    mine = (
+    text = (
         f"with zero, leakage and air as estimated this shot gives {metres(adjusted.range_)} (u "
         f"{micrometres(adjusted.u_range)} of its own), {micrometres(abs(adjusted.residual))} {side} than between "
         f"the adjusted points, {metres(adjusted.distance)} (u {micrometres(adjusted.u_distance)}); "
         f"w {adjusted.standardised:+.1f}, redundancy {adjusted.redundancy:.2f}."
     )
-    return mine[0].upper() + mine[1:]
+    return text[0].upper() + text[1:]
 
 
-def budget_lines(found: Explanation) -> list[str]:
+def budget_lines(explanation: Explanation) -> list[str]:
     """The table of inputs for a terminal, largest share first, the smallest in one line."""
-    budget = found.budget
+    budget = explanation.budget
     if budget is None:
         return []
     lines = [f"{'share %':>7} {'µm':>7}  {'input':<35}{'value':>11}{'u':>10} {'unit':<5}{'mm/unit':>10}  distribution"]
     order = np.argsort(-np.abs(budget.share), kind="stable")
     shown = [k for k in order if abs(budget.share[k]) >= SMALLEST_SHARE]
     for k in shown:
-        item, given = found.items[k], found.items[k].given
+        item, given = explanation.items[k], explanation.items[k].given
         lines.append(
             f"{100.0 * budget.share[k]:7.2f} {abs(budget.contribution[k]) / MICROMETRE:7.2f}  {given.name:<35}"
             f"{given.value:>11.6g}{given.u:>10.2g} {item.unit:<5}{item.slope / MILLIMETRE:>10.4g}  "

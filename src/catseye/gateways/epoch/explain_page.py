@@ -33,35 +33,39 @@ GROUPS = (
 )
 
 
-def explanation_page(found: Explanation, campaign: Campaign, made: datetime) -> str:
+def explanation_page(explanation: Explanation, campaign: Campaign, made_at: datetime) -> str:
     """The whole page.
 
     campaign   that the shot is of
-    made       UTC
+    made_at    UTC
     """
     name = campaign.site.campaign.name
     header = (
-        f"<header><h1>Shot {found.shot} of {escape(name)}</h1>"
-        f'<div class="faint">{escape(found.ranger)} on {escape(found.target)}, {when(found)}; explained by catseye on '
-        f"{made:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>"
+        f"<header><h1>Shot {explanation.shot} of {escape(name)}</h1>"
+        f'<div class="faint">{escape(explanation.ranger)} on {escape(explanation.target)}, {when(explanation)}; '
+        f"explained by catseye on {made_at:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>"
     )
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(found))
-    body = [header, _cards(found), f"<dl>{words}</dl>"]
-    if found.budget is not None:
-        drawn = figures(found)
-        body += [_budget(found, drawn["contributions"]), _scattered(drawn.get("histogram")), _references(found)]
-    body.append(_provenance(found, campaign, made))
-    return page(f"catseye: shot {found.shot} of {name}", "\n".join(part for part in body if part))
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(explanation))
+    body = [header, _cards(explanation), f"<dl>{words}</dl>"]
+    if explanation.budget is not None:
+        drawn = figures(explanation)
+        body += [
+            _budget(explanation, drawn["contributions"]),
+            _scattered(drawn.get("histogram")),
+            _references(explanation),
+        ]
+    body.append(_provenance(explanation, campaign, made_at))
+    return page(f"catseye: shot {explanation.shot} of {name}", "\n".join(part for part in body if part))
 
 
-def figures(found: Explanation) -> dict[str, str]:
+def figures(explanation: Explanation) -> dict[str, str]:
     """The budget's contributions and, after a Monte Carlo, its histogram, as SVG text."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        drawn = {"contributions": _contributions(found)}
-        if found.scattered is not None:
-            drawn["histogram"] = _histogram(found)
+        drawn = {"contributions": _contributions(explanation)}
+        if explanation.scattered is not None:
+            drawn["histogram"] = _histogram(explanation)
         return {name: svg(figure) for name, figure in drawn.items()}
 
 
@@ -70,8 +74,8 @@ def _colour(key: str) -> str:
     return next(colour for _, colour, keys in GROUPS if first in keys)
 
 
-def _contributions(found: Explanation) -> Figure:
-    budget = found.budget
+def _contributions(explanation: Explanation) -> Figure:
+    budget = explanation.budget
     assert budget is not None
     order = [k for k in np.argsort(-np.abs(budget.share), kind="stable") if abs(budget.share[k]) >= SMALLEST_SHARE]
     size = np.abs(budget.contribution[order]) / MICROMETRE
@@ -79,7 +83,7 @@ def _contributions(found: Explanation) -> Figure:
     ax = figure.add_subplot()
     where = np.arange(len(order)) + 1
     ax.barh(0, budget.u / MICROMETRE, color=INK, height=0.62)
-    ax.barh(where, size, color=[_colour(found.items[k].key) for k in order], height=0.62)
+    ax.barh(where, size, color=[_colour(explanation.items[k].key) for k in order], height=0.62)
     ax.text(budget.u / MICROMETRE, 0, f"  u {micrometres(budget.u)}", va="center", color=INK, fontweight="bold")
     for y, k, length in zip(where, order, size, strict=True):
         share = 100.0 * budget.share[k]
@@ -90,19 +94,19 @@ def _contributions(found: Explanation) -> Figure:
             va="center",
             color=FAINT,
         )
-    ax.set_yticks([0, *where], ["together", *(found.items[k].given.name for k in order)])
+    ax.set_yticks([0, *where], ["together", *(explanation.items[k].given.name for k in order)])
     ax.invert_yaxis()
     ax.set_xlim(0.0, 1.16 * max(budget.u / MICROMETRE, float(size.max(initial=0.0))))
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("contribution to the standard uncertainty, µm (beside: share of its square)")
-    used = {_colour(found.items[k].key) for k in order}
+    used = {_colour(explanation.items[k].key) for k in order}
     handles = [mpl.patches.Patch(color=colour, label=name) for name, colour, _ in GROUPS if colour in used]
     ax.legend(handles=handles, loc="lower right")
     return figure
 
 
-def _histogram(found: Explanation) -> Figure:
-    budget, scattered = found.budget, found.scattered
+def _histogram(explanation: Explanation) -> Figure:
+    budget, scattered = explanation.budget, explanation.scattered
     assert budget is not None
     assert scattered is not None
     figure = Figure(figsize=(9.4, 3.4), layout="constrained")
@@ -118,10 +122,10 @@ def _histogram(found: Explanation) -> Figure:
     for k, end in enumerate((scattered.low, scattered.high)):
         label = f"{100.0 * scattered.probability:g} % of the draws" if not k else None
         ax.axvline((end - budget.value) / MICROMETRE, color=SERIES[1], lw=1.1, ls="--", label=label)
-    if found.adjusted is not None:
-        d = (found.adjusted.distance - budget.value) / MICROMETRE
+    if explanation.adjusted is not None:
+        d = (explanation.adjusted.distance - budget.value) / MICROMETRE
         if abs(d) < WIDE * u:
-            wide = found.adjusted.u_distance / MICROMETRE
+            wide = explanation.adjusted.u_distance / MICROMETRE
             ax.axvspan(d - wide, d + wide, color=SERIES[2] + "22", lw=0)
             ax.axvline(d, color=SERIES[2], lw=1.4, label="adjusted distance, ± u")
         else:
@@ -135,11 +139,11 @@ def _histogram(found: Explanation) -> Figure:
     return figure
 
 
-def _cards(found: Explanation) -> str:
-    budget, cycles = found.budget, found.cycles
-    cards = [card("Status", found.status, found.reason or "nothing speaks against this shot")]
+def _cards(explanation: Explanation) -> str:
+    budget, cycles = explanation.budget, explanation.cycles
+    cards = [card("Status", explanation.status, explanation.reason or "nothing speaks against this shot")]
     if budget is not None and cycles is not None:
-        biggest = found.items[int(np.argmax(np.abs(budget.share)))].given.name
+        biggest = explanation.items[int(np.argmax(np.abs(budget.share)))].given.name
         cards += [
             card("Range", metres(budget.value), "before any adjustment, scan point to reference point"),
             card("Standard uncertainty", micrometres(budget.u), f"most of it: {biggest}"),
@@ -152,12 +156,12 @@ def _cards(found: Explanation) -> str:
     return f'<div class="cards">{"".join(cards)}</div>'
 
 
-def _budget(found: Explanation, drawn: str) -> str:
-    budget = found.budget
+def _budget(explanation: Explanation, drawn: str) -> str:
+    budget = explanation.budget
     assert budget is not None
     rows = []
     for k in np.argsort(-np.abs(budget.share), kind="stable"):
-        item, given = found.items[k], found.items[k].given
+        item, given = explanation.items[k], explanation.items[k].given
         rows.append(
             (
                 given.name,
@@ -198,8 +202,8 @@ def _scattered(drawn: str | None) -> str:
     )
 
 
-def _references(found: Explanation) -> str:
-    rows = [(str(shot), f"{after:+.0f}", f"{weight:+.4f}") for shot, after, weight in found.references]
+def _references(explanation: Explanation) -> str:
+    rows = [(str(shot), f"{after:+.0f}", f"{weight:+.4f}") for shot, after, weight in explanation.references]
     return section(
         "references",
         "Reference shots",
@@ -210,13 +214,13 @@ def _references(found: Explanation) -> str:
     )
 
 
-def _provenance(found: Explanation, campaign: Campaign, made: datetime) -> str:
-    assumed = found.scene.assumptions if found.scene is not None else Assumptions()
-    told = {"made at": f"{made:%Y-%m-%d %H:%M:%S} UTC", **versions()}
-    told |= {f"assumed {key}": f"{value:g}" for key, value in vars(assumed).items()}
+def _provenance(explanation: Explanation, campaign: Campaign, made_at: datetime) -> str:
+    assumed = explanation.scene.assumptions if explanation.scene is not None else Assumptions()
+    rows = {"made at": f"{made_at:%Y-%m-%d %H:%M:%S} UTC", **versions()}
+    rows |= {f"assumed {key}": f"{value:g}" for key, value in vars(assumed).items()}
     return section(
         "provenance",
         "Provenance",
-        folded("Versions and assumptions", table(("what", "value"), told.items(), "tt")),
+        folded("Versions and assumptions", table(("what", "value"), rows.items(), "tt")),
         folded("SHA-256 of the files read", table(("file", "SHA-256"), campaign.hashes.items(), "th")),
     )

@@ -61,11 +61,11 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
     loose = np.array([r for r in rows if sigma[r, 1] >= LOOSE], dtype=int)
     extent = float(np.max(np.ptp(where[list(rows)], axis=0)))
     for kind, colour in COLOURS.items():
-        mine = [r for r in held if kinds[r] == kind]
-        if mine:
+        of_kind = [r for r in held if kinds[r] == kind]
+        if of_kind:
             marker = MARKERS.get(kind, "o")
             size = 22 if kind in MARKERS else 9
-            ax.scatter(*where[mine].T, s=size, c=colour, marker=marker, lw=0, zorder=3, label=kind)
+            ax.scatter(*where[of_kind].T, s=size, c=colour, marker=marker, lw=0, zorder=3, label=kind)
     if len(loose):
         ax.scatter(
             *where[loose].T, s=22, facecolors="white", edgecolors=COLOURS["benchmark"], lw=1.2, zorder=3,
@@ -226,7 +226,7 @@ def _dish(reduction: Reduction) -> Figure:
     ax = figure.add_subplot()
     deviation = surface.fit.deviation / MILLIMETRE
     limit = float(np.max(np.abs(deviation)))
-    seen = ax.scatter(
+    dots = ax.scatter(
         surface.fit.local[:, 0], surface.fit.local[:, 1], s=260, c=deviation, cmap="RdBu_r", vmin=-limit, vmax=limit,
         edgecolors=FAINT, linewidths=0.6, zorder=3,
     )  # fmt: skip
@@ -241,7 +241,7 @@ def _dish(reduction: Reduction) -> Figure:
     ax.set_aspect("equal")
     ax.set_xlabel("x in the dish's frame (m)")
     ax.set_ylabel("y in the dish's frame, from the vertex (m)")
-    figure.colorbar(seen, ax=ax, label="normal deviation, positive towards the focus (mm)", shrink=0.8)
+    figure.colorbar(dots, ax=ax, label="normal deviation, positive towards the focus (mm)", shrink=0.8)
     return figure
 
 
@@ -276,7 +276,7 @@ def _refractivity(reduction: Reduction) -> Figure | None:
     z = reduction.coordinates.x[:, 2]
     height = np.array([0.5 * (z[index[r]] + z[index[t]]) for r, t in zip(ranges.ranger, ranges.target, strict=True)])
     minutes = _minutes(reduction, shots.mjd_utc[ranges.shot])
-    seen = ax.scatter(
+    dots = ax.scatter(
         minutes[used], ranges.refractivity[used] / PPM, s=9, c=height[used], cmap="viridis", lw=0, alpha=0.9
     )
     ax.axhline(reduction.coordinates.refractivity_ppm, color=INK, lw=0.9, ls="--")
@@ -286,7 +286,7 @@ def _refractivity(reduction: Reduction) -> Figure | None:
     )  # fmt: skip
     ax.set_xlabel("minutes after the first shot")
     ax.set_ylabel("group refractivity (ppm)")
-    figure.colorbar(seen, ax=ax, label="mean height of the path (m)")
+    figure.colorbar(dots, ax=ax, label="mean height of the path (m)")
     return figure
 
 
@@ -302,9 +302,9 @@ def _weather(reduction: Reduction) -> Figure:
     )
     for ax, (values, label) in zip(panels, columns, strict=True):
         for i, each in enumerate(site.weather_station):
-            mine = station == each.name
+            there = station == each.name
             ax.plot(
-                minutes[mine], values[mine], ".-", ms=2.5, lw=0.7, color=SERIES[i % len(SERIES)],
+                minutes[there], values[there], ".-", ms=2.5, lw=0.7, color=SERIES[i % len(SERIES)],
                 label=f"{each.name}, {each.elevation_m:.0f} m above sea level",
             )  # fmt: skip
         ax.set_ylabel(label)

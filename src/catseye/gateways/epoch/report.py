@@ -93,7 +93,7 @@ def _summary(reduction: Reduction) -> str:
         cards.insert(
             3, card("Dish off nominal", f"{moved:.1f} mm, {tilt:.1f}″", "shift of the vertex, tilt of the axis")
         )
-    told = "".join(
+    words = "".join(
         f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(reduction) if p.title != "Notes"
     )
     notes = "".join(f"<li>{escape(note)}</li>" for note in reduction.notes)
@@ -101,7 +101,7 @@ def _summary(reduction: Reduction) -> str:
         "summary",
         CONTENTS["summary"],
         f'<div class="cards">{"".join(cards)}</div>',
-        f"<dl>{told}</dl>",
+        f"<dl>{words}</dl>",
         f'<h3>Worth knowing</h3><ul class="notes">{notes}</ul>' if notes else "",
     )
 
@@ -217,8 +217,8 @@ def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
     amplitude = reduction.phases.amplitude
     rows = []
     for name, (zero, u) in sorted(coordinates.zeros.items()):
-        mine = [k for k, ranger in enumerate(campaign.shots.ranger) if ranger == name]
-        used = [k for k in mine if reduction.status[k] == "used"]
+        shots = [k for k, ranger in enumerate(campaign.shots.ranger) if ranger == name]
+        used = [k for k in shots if reduction.status[k] == "used"]
         mirror = campaign.mirror_of(name)
         rows.append(
             (
@@ -229,7 +229,7 @@ def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
                 f"{u * 1e6:.1f}",
                 f"{mirror.u_d0_mm * 1e3:.1f}",
                 str(len(used)),
-                str(sum(int(campaign.shots.shot[k]) in reduction.rejected for k in mine)),
+                str(sum(int(campaign.shots.shot[k]) in reduction.rejected for k in shots)),
                 _number(float(np.median(amplitude[used])) if used else float("nan"), 2),
             )
         )

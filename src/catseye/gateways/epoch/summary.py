@@ -83,10 +83,10 @@ def _shots(reduction: Reduction) -> str:
         reduction.campaign.shots.target[k] == REFERENCE and shot not in reduction.rejected for shot, k in index.items()
     )
     words = Counter(reason.status for reason in reduction.rejected.values())
-    told = ", ".join(
+    reasons = ", ".join(
         f"{number} {word}" + (f" ({MEANING[word]})" if word in MEANING else "") for word, number in words.most_common()
     )
-    rejected = f"{len(reduction.rejected)} were rejected: {told}" if reduction.rejected else "none was rejected"
+    rejected = f"{len(reduction.rejected)} were rejected: {reasons}" if reduction.rejected else "none was rejected"
     return (
         f"{count[ShotStatus.USED]} ranges went into one adjustment; {references} shots on the reference cubes followed "
         f"the drift of the electronics; {rejected}."

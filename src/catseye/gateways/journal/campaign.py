@@ -98,8 +98,8 @@ def export_campaign(
         raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
     chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings))
     if not chosen:
-        told = "; ".join(left.notes()) or "no shots in the span"
-        raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {told}")
+        reasons = "; ".join(left.notes()) or "no shots in the span"
+        raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
     notes = left.notes()
     site = _as_it_stood(reader, run, site, chosen, readings, notes)
     with whole_directory(out, Path(reader.place)) as directory:
@@ -112,8 +112,8 @@ def export_campaign(
         (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
-        made = origin(datetime.now(UTC), stored.hashes)
-        seal(directory, reader, {"made_by": "catseye export", **made, "run": stored.uuid, "notes": notes})
+        provenance = origin(datetime.now(UTC), stored.hashes)
+        seal(directory, reader, {"made_by": "catseye export", **provenance, "run": stored.uuid, "notes": notes})
     return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes))
 
 
@@ -121,14 +121,14 @@ def _readings(
     reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
 ) -> list[LiveWeather]:
     """Whole readings of the site's stations, in order of time, an hour longer than the span."""
-    found: list[LiveWeather] = []
+    readings: list[LiveWeather] = []
     for _, entry in reader.events(run, kinds=["weather"]):
         if isinstance(entry, LiveWeather) and (span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN):
-            found.append(entry)
+            readings.append(entry)
     stations = {station.name for station in site.site.weather_station}
     kept: list[LiveWeather] = []
     latest: dict[str, int] = {}
-    for read in sorted(found, key=lambda read: read.ticks):
+    for read in sorted(readings, key=lambda read: read.ticks):
         which = f"{read.station} at {stamp(read.ticks)}"
         if read.station not in stations:
             left.add("a reading of a station that site.toml does not name", which)
@@ -166,7 +166,7 @@ def _chosen(
 ) -> list[ExportedShot]:
     """The shots that a campaign holds, in order of time."""
     refusal = _refusals(site, weather)
-    found: list[ExportedShot] = []
+    chosen: list[ExportedShot] = []
     for seq, entry in reader.shots(run):
         shot = entry.shot
         if span is not None and not span[0] <= shot.ticks < span[1]:
@@ -175,15 +175,15 @@ def _chosen(
             left.add(reason, f"shot {shot.number} of {shot.ranger}")
             continue
         taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
-        found.append(ExportedShot(shot.ticks, seq, *taken))
-    found.sort(key=lambda shot: (shot.ticks, shot.seq))
+        chosen.append(ExportedShot(shot.ticks, seq, *taken))
+    chosen.sort(key=lambda shot: (shot.ticks, shot.seq))
     kept: list[ExportedShot] = []
     latest: dict[str, int] = {}
-    for shot_ in found:
+    for shot_ in chosen:
         which = f"shot {shot_.number} of {shot_.ranger}"
         if shot_.ticks <= latest.get(shot_.ranger, -1):
             left.add("a shot not later than its ranger's last", which)
-        elif shot_.ticks - found[0].ticks > LONGEST_CAMPAIGN * TICKS_PER_DAY:
+        elif shot_.ticks - chosen[0].ticks > LONGEST_CAMPAIGN * TICKS_PER_DAY:
             left.add("a shot more than a day after the first", which)
         else:
             latest[shot_.ranger] = shot_.ticks
@@ -229,13 +229,13 @@ def _as_it_stood(
     """The site with the campaign's start and posture, and the stations that spoke."""
     start, end = chosen[0].ticks, chosen[-1].ticks
     named: dict[str, object] = {"start_mjd_utc": start / TICKS_PER_DAY}
-    seen = [
+    postures = [
         (entry.azimuth, entry.elevation)
         for _, entry in reader.events(run, kinds=["postures"])
         if isinstance(entry, LivePosture) and start <= entry.ticks <= end
     ]
-    if seen:
-        azimuth, elevation = np.unwrap([s[0] for s in seen]), np.array([s[1] for s in seen])
+    if postures:
+        azimuth, elevation = np.unwrap([s[0] for s in postures]), np.array([s[1] for s in postures])
         middle = np.median(azimuth), np.median(elevation)
         named |= {"azimuth_deg": float(middle[0] / DEGREE % 360.0), "elevation_deg": float(middle[1] / DEGREE)}
         moved = max(np.ptp(azimuth), np.ptp(elevation))

@@ -64,8 +64,8 @@ class ExportTable:
 def _shot(entry: Any) -> Iterable[Cells]:
     shot = entry.shot
     taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, shot.if_hz)
-    found = (entry.range_, entry.u_range / MILLIMETRE, entry.misfit / MILLIMETRE)
-    yield (*taken, shot.amplitude, shot.phase, entry.status, entry.text, *found)
+    lengths = (entry.range_, entry.u_range / MILLIMETRE, entry.misfit / MILLIMETRE)
+    yield (*taken, shot.amplitude, shot.phase, entry.status, entry.text, *lengths)
 
 
 def _solution(entry: EpochSolution) -> Iterable[Cells]:
@@ -197,7 +197,7 @@ def export_tables(
     """
     if not runs or not forms:
         raise InputError(f"--out {out}: no run or no form was named (expected at least one of each)")
-    found = [reader.run(run) for run in runs]
+    stored = [reader.run(run) for run in runs]
     counts = dict.fromkeys(TABLES, 0)
     with whole_directory(out, Path(reader.place)) as directory:
         for done, (name, table) in enumerate(TABLES.items()):
@@ -207,9 +207,9 @@ def export_tables(
                 rows = rows_of(reader, table, runs, span)
                 writer = _csv if form == "csv" else _fits
                 counts[name] = writer(directory / f"{name}.{form}", name, table, rows)
-        inputs = {f"run {run.run}: {path}": digest for run in found for path, digest in run.hashes.items()}
-        told = {"runs": {str(run.run): run.uuid for run in found}, "span_ticks": span, "rows": counts}
-        seal(directory, reader, {"made_by": "catseye export", **origin(datetime.now(UTC), inputs), **told})
+        inputs = {f"run {run.run}: {path}": digest for run in stored for path, digest in run.hashes.items()}
+        summary = {"runs": {str(run.run): run.uuid for run in stored}, "span_ticks": span, "rows": counts}
+        seal(directory, reader, {"made_by": "catseye export", **origin(datetime.now(UTC), inputs), **summary})
     return counts
 
 
@@ -274,22 +274,24 @@ def _fits(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> i
     from astropy.io import fits
 
     columns = list(zip(*rows, strict=True)) or [() for _ in RUN + table.fields]
-    made = []
+    fits_columns = []
     for field, cells in zip(RUN + table.fields, columns, strict=True):
         if field.name == "mjd_utc":
             ticks = np.array([int(cell.replace(".", "")) for cell in cells], dtype=np.int64)
-            made.append(fits.Column("DMJD", "D", unit="d", array=np.array(cells, dtype=np.float64)))
-            made.append(fits.Column("TICKS", "K", array=ticks))
+            fits_columns.append(fits.Column("DMJD", "D", unit="d", array=np.array(cells, dtype=np.float64)))
+            fits_columns.append(fits.Column("TICKS", "K", array=ticks))
         elif field.kind == "s":
             text = np.array([str(cell).encode("ascii", "backslashreplace") for cell in cells] or [b""])
             width = max(1, text.dtype.itemsize)
-            made.append(fits.Column(field.fits, f"{width}A", array=text[: len(cells)]))
+            fits_columns.append(fits.Column(field.fits, f"{width}A", array=text[: len(cells)]))
         elif field.kind == "i":
-            made.append(fits.Column(field.fits, "K", unit=field.unit or None, array=np.array(cells, dtype=np.int64)))
+            fits_columns.append(
+                fits.Column(field.fits, "K", unit=field.unit or None, array=np.array(cells, dtype=np.int64))
+            )
         else:
             values = np.array(cells, dtype=np.float64) * field.factor + field.shift
-            made.append(fits.Column(field.fits, "D", unit=field.unit or None, array=values))
-    page = fits.BinTableHDU.from_columns(made, name=name.upper())
+            fits_columns.append(fits.Column(field.fits, "D", unit=field.unit or None, array=values))
+    page = fits.BinTableHDU.from_columns(fits_columns, name=name.upper())
     page.header["TIMESYS"] = ("UTC", "time scale of DMJD")
     page.header["TICKDAY"] = (TICKS_PER_DAY, "TICKS in a day, since MJD 0")
     page.header["ORIGIN"] = "catseye"

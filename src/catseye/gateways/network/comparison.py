@@ -155,15 +155,15 @@ def _test(test: CongruenceTest) -> dict[str, Any]:
     return {"statistic": test.pvv, "degrees_of_freedom": test.degrees_of_freedom, "p": test.p}
 
 
-def _epoch(found: Findings) -> dict[str, Any]:
-    solution = found.solution
+def _epoch(epoch: Findings) -> dict[str, Any]:
+    solution = epoch.solution
     return {
-        "source": found.network.source,
+        "source": epoch.network.source,
         "status": solution.status,
         "datum": solution.datum,
         "variance_factor": solution.variance_factor,
         "degrees_of_freedom": solution.degrees_of_freedom,
-        "suspects": found.suspects,
+        "suspects": epoch.suspects,
     }
 
 
@@ -173,9 +173,9 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
     compared   two epochs
     """
     d = compared.deformation
-    told = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
+    passages = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
     for i, (name, word) in enumerate(zip(d.names, compared.verdicts, strict=True)):
-        if word == "moved" and len(told) <= NAMED:
+        if word == "moved" and len(passages) <= NAMED:
             parts = ", ".join(
                 f"d{axis} {value / MILLIMETRE:+.3f} (u {u / MILLIMETRE:.3f})"
                 for axis, value, u in zip(
@@ -183,12 +183,14 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
                 )
                 if np.isfinite(value)
             )
-            told.append(Passage(name, f"{parts} mm; by chance p = {d.p[i]:.2g}."))
+            passages.append(Passage(name, f"{parts} mm; by chance p = {d.p[i]:.2g}."))
     count = compared.verdicts.count("moved")
     if count > NAMED:
-        told.append(Passage("And more", f"{count - NAMED} more points moved."))
+        passages.append(Passage("And more", f"{count - NAMED} more points moved."))
     words = [word for word in compared.moved.words if word != d.status]
-    return told + ([Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else [])
+    return passages + (
+        [Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else []
+    )
 
 
 def displacements_csv(compared: ComparedEpochs) -> Iterator[str]:

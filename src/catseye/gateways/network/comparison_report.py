@@ -41,7 +41,7 @@ def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[
     when       UTC
     inputs     SHA-256 of each file read, by its name
     """
-    first, second = (found.network.source or word for found, word in ((compared.first, "A"), (compared.second, "B")))
+    first, second = (epoch.network.source or word for epoch, word in ((compared.first, "A"), (compared.second, "B")))
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
         f"<header><h1>{escape(second)} against {escape(first)}: what moved</h1>"
@@ -73,12 +73,13 @@ def _summary(compared: ComparedEpochs) -> str:
         else f"{factor.degrees_of_freedom:.0f} degrees of freedom"
     )
     cards.append(card("Variance factor", f"{factor.value:.3f}", f"of both epochs, {known}"))
-    seen = d.detectable[np.isfinite(d.detectable)]
+    detectable = d.detectable[np.isfinite(d.detectable)]
     text = f"{d.status[0].upper()}{d.status[1:]}."
-    if len(seen):
+    if len(detectable):
         text += (
             f" The test of all points finds a displacement of the usual point from "
-            f"{quantity(float(np.median(seen)), 'm')} on, in the direction seen worst, with probability {d.power:g}."
+            f"{quantity(float(np.median(detectable)), 'm')} on, in the direction seen worst, with probability "
+            f"{d.power:g}."
         )
     words = "".join(
         f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>"
@@ -139,13 +140,13 @@ def _cell(value: float, form: str) -> str:
 
 def _epochs(compared: ComparedEpochs) -> str:
     parts = []
-    for title, found in (("First epoch", compared.first), ("Second epoch", compared.second)):
-        good, text = verdict(found)
+    for title, epoch in (("First epoch", compared.first), ("Second epoch", compared.second)):
+        good, text = verdict(epoch)
         parts += [
-            f"<h3>{title}: {escape(found.network.source)}</h3>",
+            f"<h3>{title}: {escape(epoch.network.source)}</h3>",
             paragraph(text, "" if good else "bad"),
-            paragraph(f"Datum: {found.solution.datum}."),
-            f'<div class="cards">{"".join(network_cards(found))}</div>',
+            paragraph(f"Datum: {epoch.solution.datum}."),
+            f'<div class="cards">{"".join(network_cards(epoch))}</div>',
         ]
     return section("epochs", CONTENTS["epochs"], *parts)
 
@@ -163,9 +164,9 @@ def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
 
 
 def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]:
-    d, found = compared.deformation, compared.first
+    d, first = compared.deformation, compared.first
     axes = PLAN if bearing is None else elevation_view(bearing)
-    flat = found.solution.x @ axes.T
+    flat = first.solution.x @ axes.T
     if bearing is not None:
         flat[:, 0] -= flat[compared.rows, 0].min()
     low, high = flat[compared.rows].min(axis=0), flat[compared.rows].max(axis=0)
@@ -184,8 +185,8 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
         ax.scatter(*flat[~common].T, s=10, c=FAINT, marker="o", lw=0, zorder=2, label="not compared", alpha=0.6)
     if np.isfinite(scale):
         _arrows(ax, compared, (flat[compared.rows], scale * shift), (shown, scale * factor))
-    point_names(ax, found, np.where(common[:, None], flat, np.nan))
-    _labels(ax, found, bearing)
+    point_names(ax, first, np.where(common[:, None], flat, np.nan))
+    _labels(ax, first, bearing)
     figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
     view = "Plan." if bearing is None else f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
     if not np.isfinite(scale):
@@ -201,33 +202,33 @@ def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarr
     (base, shift), (shown, scale) = drawn, shape
     verdicts = np.array(compared.verdicts)
     for word, colour in (("stable", STILL), ("moved", BAD)):
-        mine = (verdicts == word) & np.isfinite(shift).all(axis=1)
-        if not mine.any():
+        here = (verdicts == word) & np.isfinite(shift).all(axis=1)
+        if not here.any():
             continue
         ax.add_collection(
             EllipseCollection(
-                2 * scale * shown.major[mine], 2 * scale * shown.minor[mine], 90.0 - shown.bearing[mine] / DEGREE,
-                units="xy", offsets=base[mine], offset_transform=ax.transData, facecolors=f"{colour}18",
+                2 * scale * shown.major[here], 2 * scale * shown.minor[here], 90.0 - shown.bearing[here] / DEGREE,
+                units="xy", offsets=base[here], offset_transform=ax.transData, facecolors=f"{colour}18",
                 edgecolors=colour, linewidths=0.7, zorder=2,
             )
         )  # fmt: skip
         ax.quiver(
-            *base[mine].T, *shift[mine].T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0022,
+            *base[here].T, *shift[here].T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0022,
             headwidth=4.0, headlength=5.0, headaxislength=4.5, minlength=0.1, zorder=4,
         )  # fmt: skip
-        ax.scatter(*base[mine].T, s=5, c=colour, lw=0, zorder=3, label=word)
+        ax.scatter(*base[here].T, s=5, c=colour, lw=0, zorder=3, label=word)
     for word, marker in (("held", "s"), ("not checked", "o")):
-        mine = verdicts == word
-        if mine.any():
+        here = verdicts == word
+        if here.any():
             ax.scatter(
-                *base[mine].T, s=20, facecolors="white", edgecolors=INK, marker=marker, lw=0.9, zorder=3, label=word
+                *base[here].T, s=20, facecolors="white", edgecolors=INK, marker=marker, lw=0.9, zorder=3, label=word
             )
 
 
-def _labels(ax: Any, found: Findings, bearing: float | None) -> None:
+def _labels(ax: Any, findings: Findings, bearing: float | None) -> None:
     if bearing is None:
-        file_ticks(ax.xaxis, found, 0, "east", "west")
-        file_ticks(ax.yaxis, found, 1, "north", "south")
+        file_ticks(ax.xaxis, findings, 0, "east", "west")
+        file_ticks(ax.yaxis, findings, 1, "north", "south")
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, found, 2, "up", "down")
+        file_ticks(ax.yaxis, findings, 2, "up", "down")

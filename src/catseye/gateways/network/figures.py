@@ -34,26 +34,26 @@ class CaptionedFigure:
     caption: str
 
 
-def network_figures(found: Findings) -> dict[str, CaptionedFigure]:
+def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
     """Plan, elevation, residuals and redundancy by name, in the axes x east, y north, z up.
 
-    found   what is told of a solution
+    findings   what is told of a solution
     """
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        drawn = {"plan": _view(found, None), "elevation": _view(found, looking(found))}
-        if np.isfinite(found.table.standardised).any():
-            drawn |= {"residuals": _residuals(found), "redundancy": _redundancy(found)}
+        drawn = {"plan": _view(findings, None), "elevation": _view(findings, looking(findings))}
+        if np.isfinite(findings.table.standardised).any():
+            drawn |= {"residuals": _residuals(findings), "redundancy": _redundancy(findings)}
         return {name: CaptionedFigure(svg(figure), caption) for name, (figure, caption) in drawn.items()}
 
 
-def looking(found: Findings) -> float:
+def looking(findings: Findings) -> float:
     """Bearing along which the elevation is seen, rad, a whole degree: across the network's longest extent in plan.
 
-    found   what is told of a solution
+    findings   what is told of a solution
     """
-    level = found.solution.x[:, :2] - np.nanmean(found.solution.x[:, :2], axis=0)
+    level = findings.solution.x[:, :2] - np.nanmean(findings.solution.x[:, :2], axis=0)
     spread = level.T @ level
     if not np.isfinite(spread).all():
         return 0.0
@@ -63,24 +63,24 @@ def looking(found: Findings) -> float:
     return float(np.round(across / DEGREE) % 180.0 * DEGREE)
 
 
-def enlargement(found: Findings) -> float:
+def enlargement(findings: Findings) -> float:
     """How many times larger than the network the ellipsoids are drawn, 1, 2 or 5 times a power of ten; nan for none.
 
-    found   what is told of a solution
+    findings   what is told of a solution
 
     The usual ellipsoid's longest axis becomes some hundredths of the network's extent, less where points are many.
     """
-    longest = found.ellipsoid.semi_axes[:, 0]
+    longest = findings.ellipsoid.semi_axes[:, 0]
     known = longest[np.isfinite(longest) & (longest > 0.0)]
     if not len(known):
         return np.nan
     share = SHARE / (1.0 + np.sqrt(len(known) / 150.0))
-    return nice(share * max(float(np.ptp(found.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
+    return nice(share * max(float(np.ptp(findings.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
 
 
-def _view(found: Findings, bearing: float | None) -> tuple[Figure, str]:
+def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     """Points, lines of observations and ellipses, seen from above or along a bearing."""
-    solution = found.solution
+    solution = findings.solution
     axes = PLAN if bearing is None else elevation_view(bearing)
     flat = solution.x @ axes.T
     known = np.isfinite(flat).all(axis=1)
@@ -89,19 +89,21 @@ def _view(found: Findings, bearing: float | None) -> tuple[Figure, str]:
     low, high = (flat[known].min(axis=0), flat[known].max(axis=0)) if known.any() else (np.zeros(2), np.ones(2))
     size = max(float(np.max(high - low)), 1e-3)
     figure, ax = view_frame(0.5 * (low + high), high - low + 0.16 * size)
-    lines = _lines(ax, found, flat)
-    scale = enlargement(found)
-    loose, ellipses = _ellipses(ax, found, flat, ellipse(projected(solution.covariance * found.factor, axes)), scale)
+    lines = _lines(ax, findings, flat)
+    scale = enlargement(findings)
+    loose, ellipses = _ellipses(
+        ax, findings, flat, ellipse(projected(solution.covariance * findings.factor, axes)), scale
+    )
     scale_bar(ax, nice(0.2 * size), scale)
-    _marks(ax, found, flat, loose)
-    point_names(ax, found, flat)
+    _marks(ax, findings, flat, loose)
+    point_names(ax, findings, flat)
     if bearing is None:
-        file_ticks(ax.xaxis, found, 0, "east", "west")
-        file_ticks(ax.yaxis, found, 1, "north", "south")
+        file_ticks(ax.xaxis, findings, 0, "east", "west")
+        file_ticks(ax.yaxis, findings, 1, "north", "south")
         words = "Plan."
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, found, 2, "up", "down")
+        file_ticks(ax.yaxis, findings, 2, "up", "down")
         words = f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
     figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
     return figure, " ".join([words, ellipses, lines])
@@ -121,18 +123,18 @@ def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
     return figure, ax
 
 
-def file_ticks(axis: Any, found: Findings, k: int, word: str, opposite: str) -> None:
+def file_ticks(axis: Any, findings: Findings, k: int, word: str, opposite: str) -> None:
     """Ticks that read the file's own coordinate, whichever way it counts."""
-    axes = found.network.axes
+    axes = findings.network.axes
     j = int(np.argmax(np.abs(axes[k])))
     sign = axes[k, j]
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{sign * value + 0.0:g}".replace("-", "\u2212")))
-    axis.set_label_text(f"{found.network.axis_names[j]}, {word if sign > 0.0 else opposite} (m)")
+    axis.set_label_text(f"{findings.network.axis_names[j]}, {word if sign > 0.0 else opposite} (m)")
 
 
-def _lines(ax: Any, found: Findings, flat: np.ndarray) -> str:
+def _lines(ax: Any, findings: Findings, flat: np.ndarray) -> str:
     """Thin lines of the active observations; the caption's sentence."""
-    table = found.table
+    table = findings.table
     start, end = table.ends[table.active, 0], table.ends[table.active, 1]
     both = (start >= 0) & (end >= 0)
     pairs = np.unique(np.sort(np.stack([start[both], end[both]], axis=1), axis=1), axis=0)
@@ -150,7 +152,7 @@ def _lines(ax: Any, found: Findings, flat: np.ndarray) -> str:
     return "Thin lines: observations." if every == 1 else f"Thin lines: one in {every} of {len(pairs)} observed pairs."
 
 
-def _ellipses(ax: Any, found: Findings, flat: np.ndarray, shown: Ellipse, scale: float) -> tuple[np.ndarray, str]:
+def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, shown: Ellipse, scale: float) -> tuple[np.ndarray, str]:
     """Outlines of the standard ellipsoids to scale; which points (n,) have none, and the caption's sentence."""
     known = np.isfinite(shown.major)
     if not np.isfinite(scale):
@@ -158,7 +160,7 @@ def _ellipses(ax: Any, found: Findings, flat: np.ndarray, shown: Ellipse, scale:
     usual = float(np.median(shown.major[known & (shown.major > 0.0)]))
     loose = ~known | (shown.major > LOOSE * usual)
     held = np.flatnonzero(~loose & (shown.major > 0.0))
-    colour = np.where(found.stations[held], STATION, TARGET)
+    colour = np.where(findings.stations[held], STATION, TARGET)
     many = len(held) > DENSE
     ax.add_collection(
         EllipseCollection(
@@ -167,7 +169,7 @@ def _ellipses(ax: Any, found: Findings, flat: np.ndarray, shown: Ellipse, scale:
             edgecolors=list(colour), linewidths=0.35 if many else 0.7, zorder=3, rasterized=many,
         )
     )  # fmt: skip
-    kind = "variance factor applied" if found.scaled else "a priori"
+    kind = "variance factor applied" if findings.scaled else "a priori"
     return loose, f"Outlines: standard ellipsoids (1σ, {kind}), enlarged {thousands(scale)} times."
 
 
@@ -200,35 +202,35 @@ def _length(value: float) -> str:
     return f"{value / MILLIMETRE:g} mm" if value >= 0.1 * MILLIMETRE else f"{value * 1e6:g} µm"
 
 
-def _marks(ax: Any, found: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
+def _marks(ax: Any, findings: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
     """Stations, targets, held and loose points, each with a mark of its own."""
-    held = found.network.points.fixed.all(axis=1)
+    held = findings.network.points.fixed.all(axis=1)
     many = len(flat) > DENSE
     for mine, marker, colour, area, name in (
-        (~found.stations & ~held & ~loose, "o", TARGET, 4 if many else 12, "target"),
-        (found.stations & ~held & ~loose, "^", STATION, 26, "station"),
-        (~found.stations & held, "s", HELD, 20, "held point"),
-        (found.stations & held, "^", HELD, 26, "held station"),
+        (~findings.stations & ~held & ~loose, "o", TARGET, 4 if many else 12, "target"),
+        (findings.stations & ~held & ~loose, "^", STATION, 26, "station"),
+        (~findings.stations & held, "s", HELD, 20, "held point"),
+        (findings.stations & held, "^", HELD, 26, "held station"),
     ):
         if mine.any():
             ax.scatter(*flat[mine].T, s=area, c=colour, marker=marker, lw=0, zorder=4, label=name, rasterized=many)
-    if loose.any() and found.answered:
+    if loose.any() and findings.answered:
         ax.scatter(
             *flat[loose].T, s=26, facecolors="white", edgecolors=BAD, lw=1.2, zorder=4,
             label=f"no ellipsoid: over {LOOSE:g} times the usual",
         )  # fmt: skip
     elif loose.any():
         ax.scatter(*flat[loose].T, s=20, facecolors="white", edgecolors=FAINT, lw=1.0, zorder=4, label="not adjusted")
-    chosen = found.network.points.datum.any(axis=1)
+    chosen = findings.network.points.datum.any(axis=1)
     if chosen.any() and not chosen.all() and not many:
         ax.scatter(*flat[chosen].T, s=85, facecolors="none", edgecolors=SERIES[4], lw=0.8, zorder=3, label="datum")
 
 
-def point_names(ax: Any, found: Findings, flat: np.ndarray) -> None:
+def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
     """Names where there is room for them, stations first; each beside its point where it covers least."""
-    order = [*np.flatnonzero(found.stations), *np.flatnonzero(~found.stations)]
+    order = [*np.flatnonzero(findings.stations), *np.flatnonzero(~findings.stations)]
     order = [i for i in order if np.isfinite(flat[i]).all()]
-    chosen = order if len(order) <= NAMED else [i for i in order if found.stations[i]][:NAMED]
+    chosen = order if len(order) <= NAMED else [i for i in order if findings.stations[i]][:NAMED]
     if not chosen:
         return
     where = ax.transData.transform(flat[chosen])
@@ -237,15 +239,15 @@ def point_names(ax: Any, found: Findings, flat: np.ndarray) -> None:
     point = ax.figure.dpi / 72.0
     taken = [*np.concatenate([where - 4.0 * point, where + 4.0 * point], axis=1)]  # left, low, right, high
     for i, at, out in zip(chosen, where, outward, strict=True):
-        half = point * np.array([2.5 * len(found.names[i]), 4.0])
+        half = point * np.array([2.5 * len(findings.names[i]), 4.0])
         centres = at + ROUND * (6.0 * point + half)
         boxes = np.concatenate([centres - half, centres + half], axis=1)
         cost = _overlap(boxes, np.array(taken)) - point * ROUND @ out
         best = int(np.argmin(cost))
         taken.append(boxes[best])
         ax.annotate(
-            found.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
-            va="center", fontsize=7.5, zorder=5, color=STATION if found.stations[i] else INK,
+            findings.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
+            va="center", fontsize=7.5, zorder=5, color=STATION if findings.stations[i] else INK,
             path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
 
@@ -257,15 +259,15 @@ def _overlap(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
 
 
-def _residuals(found: Findings) -> tuple[Figure, str]:
+def _residuals(findings: Findings) -> tuple[Figure, str]:
     """Standardised residuals in the order of the file, and their histogram against the normal distribution."""
-    table = found.table
-    shown = np.flatnonzero(np.isfinite(found.statistic))
-    w = found.statistic[shown]
+    table = findings.table
+    shown = np.flatnonzero(np.isfinite(findings.statistic))
+    w = findings.statistic[shown]
     figure = Figure(figsize=(WIDTH, 3.9), dpi=RASTER)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     figure.subplots_adjust(left=0.065, right=0.985, bottom=0.21, top=0.91, wspace=0.17)
-    span = max(1.25 * (found.critical if np.isfinite(found.critical) else 4.0), 4.0)
+    span = max(1.25 * (findings.critical if np.isfinite(findings.critical) else 4.0), 4.0)
     inside = np.abs(w) <= span
     many = len(w) > 5 * DENSE
     for k, kind in enumerate(table.kinds):
@@ -281,12 +283,12 @@ def _residuals(found: Findings) -> tuple[Figure, str]:
             shown[~inside], np.clip(far, -0.97 * span, 0.97 * span), s=26, c=BAD, marker="D", lw=0, zorder=3,
             label=f"beyond the edge, to {np.max(np.abs(far)):.3g}",
         )  # fmt: skip
-    for limit in (-found.critical, found.critical):
+    for limit in (-findings.critical, findings.critical):
         left.axhline(limit, color=BAD, lw=0.8, ls="--")
     left.set_ylim(-span, span)
     left.set_title("Every tested observation")
     left.set_xlabel("number in the file")
-    left.set_ylabel(f"test statistic {'τ' if found.test == 'tau' else 'w'}")
+    left.set_ylabel(f"test statistic {'τ' if findings.test == 'tau' else 'w'}")
     figure.legend(
         *left.get_legend_handles_labels(),
         loc="lower left",
@@ -305,15 +307,15 @@ def _residuals(found: Findings) -> tuple[Figure, str]:
     right.legend(loc="upper left", handlelength=1.2)
     right.set_ylim(top=right.get_ylim()[1] * 1.25)
     return figure, (
-        f"Left: test statistics of {len(w)} observations; dashed: ±{found.critical:.2f}, beyond which an observation "
-        f"is suspect (level {found.level:g} for all of them together). Right: their histogram, and the normal "
-        "distribution that the claimed uncertainties predict."
+        f"Left: test statistics of {len(w)} observations; dashed: ±{findings.critical:.2f}, beyond which an "
+        f"observation is suspect (level {findings.level:g} for all of them together). Right: their histogram, and the "
+        "normal distribution that the claimed uncertainties predict."
     )
 
 
-def _redundancy(found: Findings) -> tuple[Figure, str]:
+def _redundancy(findings: Findings) -> tuple[Figure, str]:
     """How much of an error each observation would show, kind by kind."""
-    table = found.table
+    table = findings.table
     active = table.active & np.isfinite(table.redundancy)
     kinds = [k for k in range(len(table.kinds)) if (active & (table.kind == k)).any()]
     figure = Figure(figsize=(WIDTH, 2.6))

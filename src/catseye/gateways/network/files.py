@@ -29,7 +29,7 @@ def input_hashes(source: Path) -> dict[str, str]:
 
 
 def write_network(
-    found: Findings,
+    findings: Findings,
     directory: Path,
     inputs: Mapping[str, str],
     progress: Progress | None = None,
@@ -38,15 +38,17 @@ def write_network(
 ) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others.
 
-    found       what is told of a solution
+    findings    what is told of a solution
     directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name, see `input_hashes`
     progress    told of each file
     treated     how observations were treated, where that was asked for
     """
     when = datetime.now(UTC)
-    made = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(found)}
-    write_files(_files(found, when, inputs, treated=treated), directory, {**made, **origin(when, inputs)}, progress)
+    provenance = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(findings)}
+    write_files(
+        _files(findings, when, inputs, treated=treated), directory, {**provenance, **origin(when, inputs)}, progress
+    )
 
 
 def write_comparison(
@@ -77,16 +79,16 @@ def write_comparison(
         "datums_may_differ_by": d.datum,
         "variance_factor": compared.variance_factor.value,
     }
-    made = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    provenance = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
 
 
-def _settings(found: Findings) -> dict[str, Any]:
-    return {"level": found.level, "scaled": found.scaled, "test": found.test, "datum": found.solution.datum}
+def _settings(findings: Findings) -> dict[str, Any]:
+    return {"level": findings.level, "scaled": findings.scaled, "test": findings.test, "datum": findings.solution.datum}
 
 
 def _files(
-    found: Findings,
+    findings: Findings,
     when: datetime,
     inputs: Mapping[str, str],
     *,
@@ -96,11 +98,11 @@ def _files(
     from catseye.gateways.network.report import network_report  # matplotlib is heavy
 
     files: Files = {
-        "coordinates.csv": lambda: coordinates_csv(found),
-        "observations.csv": lambda: observations_csv(found),
-        "parameters.csv": lambda: parameters_csv(found),
-        "adjustment.json": lambda: network_json(found, lines=True, treated=treated),
-        "adjustment.xml": lambda: network_xml(found),
-        "report.html": lambda: [network_report(found, when, inputs, prefix=prefix, treated=treated)],
+        "coordinates.csv": lambda: coordinates_csv(findings),
+        "observations.csv": lambda: observations_csv(findings),
+        "parameters.csv": lambda: parameters_csv(findings),
+        "adjustment.json": lambda: network_json(findings, lines=True, treated=treated),
+        "adjustment.xml": lambda: network_xml(findings),
+        "report.html": lambda: [network_report(findings, when, inputs, prefix=prefix, treated=treated)],
     }
     return {prefix + name: pieces for name, pieces in files.items()}

@@ -20,33 +20,33 @@ FORMAT = "catseye-adjustment-1"
 PIECE = 5_000  # rows of a piece
 
 
-def network_object(found: Findings, treated: "AdjustedNetwork | None" = None) -> dict[str, Any]:
+def network_object(findings: Findings, treated: "AdjustedNetwork | None" = None) -> dict[str, Any]:
     """An adjusted network as `catseye adjust --json` gives it, whole.
 
-    found     what is told of a solution
-    treated   how its observations were treated, where that was asked for
+    findings   what is told of a solution
+    treated    how its observations were treated, where that was asked for
 
     Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test at 0.1 % with
     power 80 %; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of tests. `from`, `to`,
     `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters stand in x east, y north,
     z up.
     """
-    points = {name: value for low in _starts(len(found.names)) for name, value in _points(found, low)}
+    points = {name: value for low in _starts(len(findings.names)) for name, value in _points(findings, low)}
     observations = [
         dict(zip(columns, values, strict=True))
-        for low in _starts(len(found.table))
-        if (columns := _observations(found, low, treated))
+        for low in _starts(len(findings.table))
+        if (columns := _observations(findings, low, treated))
         for values in zip(*columns.values(), strict=True)
     ]
-    return {**_head(found, treated), "points": points, "observations": observations}
+    return {**_head(findings, treated), "points": points, "observations": observations}
 
 
-def network_json(found: Findings, *, lines: bool = False, treated: "AdjustedNetwork | None" = None) -> Iterator[str]:
+def network_json(findings: Findings, *, lines: bool = False, treated: "AdjustedNetwork | None" = None) -> Iterator[str]:
     """The text of `network_object` in pieces.
 
-    found     what is told of a solution
-    treated   how its observations were treated, where that was asked for
-    lines     a line for each entry, for reading; else all on one line, for programs
+    findings   what is told of a solution
+    treated    how its observations were treated, where that was asked for
+    lines      a line for each entry, for reading; else all on one line, for programs
 
     >>> from itertools import chain
     >>> list(chain(_joined(iter([["a", "b"], ["c"]]), ", ")))
@@ -54,12 +54,18 @@ def network_json(found: Findings, *, lines: bool = False, treated: "AdjustedNetw
     """
     end, deep = ("\n", "    ") if lines else ("", "")
     comma = f",{end}{deep}" if lines else ", "
-    head = (",\n  " if lines else ", ").join(f"{json.dumps(k)}: {_text(v)}" for k, v in _head(found, treated).items())
+    head = (",\n  " if lines else ", ").join(
+        f"{json.dumps(k)}: {_text(v)}" for k, v in _head(findings, treated).items()
+    )
     yield f'{{{end}{"  " if lines else ""}{head},{end or " "}{"  " if lines else ""}"points": {{{end}{deep}'
-    points = ([f"{json.dumps(k)}: {_text(v)}" for k, v in _points(found, low)] for low in _starts(len(found.names)))
+    points = (
+        [f"{json.dumps(k)}: {_text(v)}" for k, v in _points(findings, low)] for low in _starts(len(findings.names))
+    )
     yield from _joined(points, comma)
     yield f'{end}{"  " if lines else ""}}},{end or " "}{"  " if lines else ""}"observations": [{end}{deep}'
-    yield from _joined((_row_texts(_observations(found, low, treated)) for low in _starts(len(found.table))), comma)
+    yield from _joined(
+        (_row_texts(_observations(findings, low, treated)) for low in _starts(len(findings.table))), comma
+    )
     yield f"{end}{'  ' if lines else ''}]{end}}}{end}"
 
 
@@ -78,23 +84,23 @@ def _starts(count: int) -> range:
     return range(0, count, PIECE)
 
 
-def _head(found: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
+def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
     """All but the points and the observations."""
-    solution, whole = found.solution, found.whole
+    solution, whole = findings.solution, findings.whole
     degrees = solution.degrees_of_freedom
     return plain(
         {
             "format": FORMAT,
-            "source": found.network.source,
-            "description": found.network.description,
+            "source": findings.network.source,
+            "description": findings.network.description,
             "status": solution.status,
             "datum": solution.datum,
-            "axes": list(found.network.axis_names),
+            "axes": list(findings.network.axis_names),
             "iterations": solution.iterations,
             "approximate": list(solution.approximate),
             "variance_factor": solution.variance_factor,
             "degrees_of_freedom": degrees,
-            "scaled": found.scaled,
+            "scaled": findings.scaled,
             "chi_square": {
                 "statistic": whole.factor * degrees,
                 "degrees": degrees,
@@ -102,17 +108,17 @@ def _head(found: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
                 "upper": whole.upper * degrees,
                 "p": whole.p,
                 "passed": whole.lower <= whole.factor <= whole.upper if np.isfinite(whole.p) else None,
-                "level": found.level,
+                "level": findings.level,
                 "verdict": whole.verdict,
             },
             "critical": {
-                "test": found.test,
-                "level": found.level,
-                "level_single": found.level_single,
-                "value": found.critical,
+                "test": findings.test,
+                "level": findings.level,
+                "level_single": findings.level_single,
+                "value": findings.critical,
                 "noncentrality": NONCENTRALITY,
             },
-            "treatment": None if treated is None else _treatment(found, treated),
+            "treatment": None if treated is None else _treatment(findings, treated),
             "relative": [
                 {
                     "from": r.first,
@@ -122,37 +128,39 @@ def _head(found: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
                     "covariance": r.covariance,
                     "ellipsoid": {"semi_axes": r.ellipsoid.semi_axes, "directions": r.ellipsoid.directions.T},
                 }
-                for r in found.relative
+                for r in findings.relative
             ],
-            "suspects": found.suspects,
-            "unchecked": np.flatnonzero(found.table.active & ~found.table.checked),
+            "suspects": findings.suspects,
+            "unchecked": np.flatnonzero(findings.table.active & ~findings.table.checked),
             "parameters": {
                 p.name: {"value": value, "u": u, "unit": p.unit, "prior_u": p.sigma}
-                for p, value, u in zip(found.network.parameters, solution.parameters, found.u_parameters, strict=True)
+                for p, value, u in zip(
+                    findings.network.parameters, solution.parameters, findings.u_parameters, strict=True
+                )
             },
         }
     )
 
 
-def _treatment(found: Findings, treated: "AdjustedNetwork") -> dict[str, Any]:
+def _treatment(findings: Findings, treated: "AdjustedNetwork") -> dict[str, Any]:
     """What was left out or weighed down, by rows of the observations; and estimated components of variance."""
-    sign, components = found.table.sign, treated.components
+    sign, components = findings.table.sign, treated.components
     rejections = []
     for rejection in treated.rejections:
-        row = found.row_of(rejection.group, rejection.row)
+        row = findings.row_of(rejection.group, rejection.row)
         rejections.append(
             {
                 "observation": row,
                 "statistic": sign[row] * rejection.statistic,
                 "estimated_error": sign[row] * rejection.estimated_error,
                 "margin": rejection.margin,
-                "rival": None if rejection.rival is None else found.row_of(*rejection.rival),
+                "rival": None if rejection.rival is None else findings.row_of(*rejection.rival),
             }
         )
     return {
         "method": treated.treatment,
-        "rejected": np.flatnonzero(found.in_table(treated.rejected)),
-        "undecided": np.flatnonzero(found.in_table(treated.undecided)),
+        "rejected": np.flatnonzero(findings.in_table(treated.rejected)),
+        "undecided": np.flatnonzero(findings.in_table(treated.undecided)),
         "rejections": rejections,
         "variance_components": None
         if components is None
@@ -164,23 +172,25 @@ def _treatment(found: Findings, treated: "AdjustedNetwork") -> dict[str, Any]:
     }
 
 
-def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
+def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
     """Name and object of the points from row `low` on, a piece of them."""
     part = slice(low, low + PIECE)
-    axes, names = np.abs(found.network.axes), np.array(found.network.axis_names)
-    fixed, datum = ((flags[part] @ axes) > 0.0 for flags in (found.network.points.fixed, found.network.points.datum))
+    axes, names = np.abs(findings.network.axes), np.array(findings.network.axis_names)
+    fixed, datum = (
+        (flags[part] @ axes) > 0.0 for flags in (findings.network.points.fixed, findings.network.points.datum)
+    )
     columns = (
-        found.names[part],
-        _numbers(found.x[part]),
-        _numbers(found.u[part]),
-        _numbers(found.covariance[part]),
-        _numbers(found.ellipsoid.semi_axes[part]),
-        _numbers(np.swapaxes(found.ellipsoid.directions[part], 1, 2)),
+        findings.names[part],
+        _numbers(findings.x[part]),
+        _numbers(findings.u[part]),
+        _numbers(findings.covariance[part]),
+        _numbers(findings.ellipsoid.semi_axes[part]),
+        _numbers(np.swapaxes(findings.ellipsoid.directions[part], 1, 2)),
         fixed,
         datum,
-        found.seen[part].tolist(),
+        findings.seen[part].tolist(),
     )
-    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, seen in zip(*columns, strict=True):
+    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, observations in zip(*columns, strict=True):
         yield (
             name,
             {
@@ -192,15 +202,15 @@ def _points(found: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
                 "ellipsoid": {"semi_axes": semi_axes, "directions": directions},
                 "fixed": names[held].tolist(),
                 "datum": names[chosen].tolist(),
-                "observations": seen,
+                "observations": observations,
             },
         )
 
 
-def _observations(found: Findings, low: int, treated: "AdjustedNetwork | None") -> dict[str, list[Any]]:
+def _observations(findings: Findings, low: int, treated: "AdjustedNetwork | None") -> dict[str, list[Any]]:
     """Columns of the observations from row `low` on, a piece of them."""
-    table, part = found.table, slice(low, low + PIECE)
-    names = [*found.names, None]  # the last one for none, which is -1
+    table, part = findings.table, slice(low, low + PIECE)
+    names = [*findings.names, None]  # the last one for none, which is -1
     columns: dict[str, list[Any]] = {"kind": [table.kinds[k] for k in table.kind[part].tolist()]}
     for role, end in zip(ROLES, table.ends.T, strict=True):
         if role in ROLES[:2] or np.any(end >= 0):
@@ -209,11 +219,11 @@ def _observations(found: Findings, low: int, treated: "AdjustedNetwork | None") 
         columns["component"] = [c or None for c in table.component[part].tolist()]
     columns["unit"] = table.unit[part].tolist()
     columns |= {name: _numbers(getattr(table, name)[part]) for name in MEASURES}
-    columns |= {"test": _numbers(found.statistic[part]), "p": _numbers(found.p[part])}
+    columns |= {"test": _numbers(findings.statistic[part]), "p": _numbers(findings.p[part])}
     columns |= {"active": table.active[part].tolist(), "checked": table.checked[part].tolist()}
     if treated is not None:
-        columns["weight"] = _numbers(found.in_table(treated.weights)[part])
-    groups, places = [g.name for g in found.network.groups], found.network.places
+        columns["weight"] = _numbers(findings.in_table(treated.weights)[part])
+    groups, places = [g.name for g in findings.network.groups], findings.network.places
     at = list(zip(table.group[part].tolist(), table.row[part].tolist(), strict=True))
     columns["group"] = [groups[g] for g, _ in at]
     columns["place"] = [places[g][r] if places and places[g] else None for g, r in at]

@@ -39,13 +39,13 @@ CONTENTS = {
 class PlanFindings:
     """What is told of a plan.
 
-    found     of its predicted solution
-    plan      see there
-    picked    the schedule of further ranges, empty where no budget was given
-    scatter   of measuring on paper, where asked
+    findings   of its predicted solution
+    plan       of the network, with the worth of its observations and the candidates
+    picked     the schedule of further ranges, empty where no budget was given
+    scatter    of measuring on paper, where asked
     """
 
-    found: Findings
+    findings: Findings
     plan: Plan
     picked: tuple[Candidate, ...]
     scatter: MonteCarloScatter | None
@@ -60,18 +60,20 @@ class PlanFindings:
     def worth(self) -> np.ndarray:
         """(m,) m, of every observation in the order of the table."""
         offset = np.cumsum([0, *(len(w) for w in self.plan.worth)])
-        return np.concatenate([np.zeros(0), *self.plan.worth])[offset[self.found.table.group] + self.found.table.row]
+        return np.concatenate([np.zeros(0), *self.plan.worth])[
+            offset[self.findings.table.group] + self.findings.table.row
+        ]
 
 
-def plan_object(told: PlanFindings) -> dict[str, Any]:
+def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
     """A plan as `catseye plan --json` gives it: the keys of an adjustment, predicted, and those of the plan."""
-    plan, found = told.plan, told.found
-    base = network_object(found)
-    for row, worth in zip(base["observations"], plain(told.worth.tolist()), strict=True):
+    plan, findings = plan_findings.plan, plan_findings.findings
+    base = network_object(findings)
+    for row, worth in zip(base["observations"], plain(plan_findings.worth.tolist()), strict=True):
         for key in ("observed", "residual", "standardised", "estimated_error", "test", "p"):
             row[key] = None  # not measured yet
         row["worth"] = worth
-    names, axes = found.names, found.network.axes
+    names, axes = findings.names, findings.network.axes
     extra = {
         "format": FORMAT,
         "status": "planned",
@@ -81,12 +83,12 @@ def plan_object(told: PlanFindings) -> dict[str, Any]:
         "interest": [name for name, chosen in zip(names, plan.interest, strict=True) if chosen],
         "weakest": [
             {"point": names[i], "u": plan.weakest[i], "direction": (plan.direction[i] @ axes).tolist()}
-            for i in told.weakest
+            for i in plan_findings.weakest
         ],
         "candidates": [_candidate(c, scheduled=False) for c in plan.candidates],
         "best_next": _candidate(plan.candidates[0], scheduled=False) if plan.candidates else None,
-        "schedule": [_candidate(c, scheduled=True) for c in told.picked],
-        "monte_carlo": _scatter(told.scatter),
+        "schedule": [_candidate(c, scheduled=True) for c in plan_findings.picked],
+        "monte_carlo": _scatter(plan_findings.scatter),
     }
     for key in ("chi_square", "critical", "iterations"):
         base.pop(key, None)
@@ -94,8 +96,8 @@ def plan_object(told: PlanFindings) -> dict[str, Any]:
 
 
 def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
-    found = {"kind": "slope_distance", "from": c.from_, "to": c.to, "u": c.u, "mean_u": c.mean_u, "gain": c.gain}
-    return {**found, "at_s": c.at_s} if scheduled else found
+    row = {"kind": "slope_distance", "from": c.from_, "to": c.to, "u": c.u, "mean_u": c.mean_u, "gain": c.gain}
+    return {**row, "at_s": c.at_s} if scheduled else row
 
 
 def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
@@ -112,33 +114,34 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     }
 
 
-def plan_json(told: PlanFindings) -> Iterator[str]:
+def plan_json(plan_findings: PlanFindings) -> Iterator[str]:
     """A plan as JSON text on one line."""
-    yield json.dumps(plan_object(told), allow_nan=False)
+    yield json.dumps(plan_object(plan_findings), allow_nan=False)
 
 
-def plan_passages(told: PlanFindings) -> list[Passage]:
+def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
     """Worth, weak points, single points of failure, what to measure next, and what measuring on paper said."""
-    plan, found = told.plan, told.found
+    plan, findings = plan_findings.plan, plan_findings.findings
     u = quantity(plan.mean_u, "m")
     passages = [
         Passage(
             "The plan",
-            f"{len(found.table)} observations of {len(found.names)} points would give the coordinates of "
+            f"{len(findings.table)} observations of {len(findings.names)} points would give the coordinates of "
             f"{int(plan.interest.sum())} points with a standard uncertainty of {u}, root mean square; "
-            f"datum: {found.solution.datum}.",
+            f"datum: {findings.solution.datum}.",
         )
     ]
     weak = [
-        f"{found.names[i]} {quantity(plan.weakest[i], 'm')} {direction_words(found, int(i))}" for i in told.weakest[:3]
+        f"{findings.names[i]} {quantity(plan.weakest[i], 'm')} {direction_words(findings, int(i))}"
+        for i in plan_findings.weakest[:3]
     ]
     if weak:
         passages.append(Passage("Weakest", "; ".join(weak) + "."))
-    table, worth = found.table, told.worth
+    table, worth = findings.table, plan_findings.worth
     needed = np.flatnonzero(np.isinf(worth))
     unchecked = int(np.sum(~table.checked))
     text = f"{len(needed)} observations cannot be spared: without one of them a point floats"
-    text += f", first {found.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
+    text += f", first {findings.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
     text = text if len(needed) else "No single observation is indispensable."
     if unchecked:
         text += f" {unchecked} are checked by no other: an error there would not show."
@@ -161,18 +164,18 @@ def plan_passages(told: PlanFindings) -> list[Passage]:
                 + ".",
             )
         )
-    if told.picked:
-        last = told.picked[-1]
-        order = ", ".join(f"{c.from_} - {c.to}" for c in told.picked[:6])
-        more = f" and {len(told.picked) - 6} more" if len(told.picked) > 6 else ""
+    if plan_findings.picked:
+        last = plan_findings.picked[-1]
+        order = ", ".join(f"{c.from_} - {c.to}" for c in plan_findings.picked[:6])
+        more = f" and {len(plan_findings.picked) - 6} more" if len(plan_findings.picked) > 6 else ""
         passages.append(
             Passage(
                 "In the time",
-                f"{len(told.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
+                f"{len(plan_findings.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
             )
         )
-    if told.scatter is not None:
-        passages.append(Passage("On paper", scatter_words(told.scatter)))
+    if plan_findings.scatter is not None:
+        passages.append(Passage("On paper", scatter_words(plan_findings.scatter)))
     return passages
 
 
@@ -188,10 +191,10 @@ def scatter_words(s: MonteCarloScatter) -> str:
     return text
 
 
-def candidates_csv(told: PlanFindings) -> Iterator[str]:
+def candidates_csv(plan_findings: PlanFindings) -> Iterator[str]:
     """Further ranges, the best first, then the schedule."""
     yield "list,from,to,u_mm,mean_u_mm,gain_um,at_s\n"
-    for name, rows in (("candidate", told.plan.candidates), ("schedule", told.picked)):
+    for name, rows in (("candidate", plan_findings.plan.candidates), ("schedule", plan_findings.picked)):
         for c in rows:
             at = f"{c.at_s:g}" if np.isfinite(c.at_s) else ""
             yield (
@@ -204,68 +207,45 @@ def _cell(text: str) -> str:
     return f'"{text.replace(chr(34), 2 * chr(34))}"' if any(c in text for c in ',"\n') else text
 
 
-def plan_report(told: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
+def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page of a plan, HTML."""
     from catseye.gateways.network.figures import network_figures
     from catseye.gateways.network.report import provenance_section
 
-    found, plan = told.found, told.plan
-    drawn = network_figures(found)
-    name = found.network.source or "network"
+    findings, plan = plan_findings.findings, plan_findings.plan
+    drawn = network_figures(findings)
+    name = findings.network.source or "network"
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
         f"<header><h1>{escape(name)}: plan of a network</h1>"
-        f'<div class="faint">{len(found.table)} observations of {len(found.names)} points, predicted by catseye on '
-        f"{when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
+        f'<div class="faint">{len(findings.table)} observations of {len(findings.names)} points, predicted by catseye '
+        f"on {when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
         f"<nav>{links}</nav></header>"
     )
-    told_ = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(told))
-    cards = [
-        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
-        card(
-            "Weakest point",
-            found.names[told.weakest[0]] if len(told.weakest) else "none",
-            f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
-        ),
-        card("Indispensable", str(int(np.isinf(told.worth).sum())), "observations without which a point floats"),
-        card("Unchecked", str(int(np.sum(~found.table.checked))), "observations whose error would not show"),
-    ]
-    weakest = table(
-        ("point", "longest axis (mm)", "towards"),
-        [
-            (found.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(found, int(i)))
-            for i in told.weakest[: 5 * LISTED]
-        ],
-        "tnt",
-    )
-    order = np.argsort(-told.worth, kind="stable")[: 5 * LISTED]
-    holds = table(
-        ("observation", "worth (µm)", "redundancy", "detectable"),
-        [
-            (
-                found.label(int(k)),
-                "∞" if np.isinf(told.worth[k]) else f"{told.worth[k] * 1e6:.4f}",
-                f"{found.table.redundancy[k]:.3f}",
-                quantity(found.table.mdb[k], str(found.table.unit[k])) if np.isfinite(found.table.mdb[k]) else "never",
-            )
-            for k in order
-        ],
-        "tnnn",
-    )
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(plan_findings))
     following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add: none are planned.")
     scheduled = (
-        "<h3>In the time given, one after the other</h3>" + _ranges(told.picked, scheduled=True) if told.picked else ""
+        "<h3>In the time given, one after the other</h3>" + _ranges(plan_findings.picked, scheduled=True)
+        if plan_findings.picked
+        else ""
     )
     scatter = (
-        paragraph(scatter_words(told.scatter)[0].upper() + scatter_words(told.scatter)[1:]) if told.scatter else ""
+        paragraph(scatter_words(plan_findings.scatter)[0].upper() + scatter_words(plan_findings.scatter)[1:])
+        if plan_findings.scatter
+        else ""
     )
     body = [
         header,
-        section("summary", CONTENTS["summary"], f'<div class="cards">{"".join(cards)}</div>', f"<dl>{told_}</dl>"),
+        section(
+            "summary",
+            CONTENTS["summary"],
+            f'<div class="cards">{"".join(_cards(plan_findings))}</div>',
+            f"<dl>{words}</dl>",
+        ),
         section(
             "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
         ),
-        section("weakest", CONTENTS["weakest"], weakest),
+        section("weakest", CONTENTS["weakest"], _weakest(plan_findings)),
         section(
             "next",
             CONTENTS["next"],
@@ -280,12 +260,61 @@ def plan_report(told: PlanFindings, when: datetime, inputs: Mapping[str, str]) -
             "observations",
             CONTENTS["observations"],
             paragraph("Worth: how much the mean standard uncertainty would grow were the observation left out."),
-            holds,
+            _worth(plan_findings),
         ),
         section("paper", CONTENTS["paper"], scatter or paragraph("Not asked for (--runs).", "faint")),
         provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
     ]
     return page(f"catseye plan: {name}", "\n".join(body))
+
+
+def _cards(plan_findings: PlanFindings) -> list[str]:
+    findings, plan = plan_findings.findings, plan_findings.plan
+    return [
+        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
+        card(
+            "Weakest point",
+            findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
+            f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
+        ),
+        card(
+            "Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "observations without which a point floats"
+        ),
+        card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
+    ]
+
+
+def _weakest(plan_findings: PlanFindings) -> str:
+    findings, plan = plan_findings.findings, plan_findings.plan
+    return table(
+        ("point", "longest axis (mm)", "towards"),
+        [
+            (findings.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(findings, int(i)))
+            for i in plan_findings.weakest[: 5 * LISTED]
+        ],
+        "tnt",
+    )
+
+
+def _worth(plan_findings: PlanFindings) -> str:
+    """What each observation holds, those of most worth first."""
+    findings = plan_findings.findings
+    order = np.argsort(-plan_findings.worth, kind="stable")[: 5 * LISTED]
+    return table(
+        ("observation", "worth (µm)", "redundancy", "detectable"),
+        [
+            (
+                findings.label(int(k)),
+                "∞" if np.isinf(plan_findings.worth[k]) else f"{plan_findings.worth[k] * 1e6:.4f}",
+                f"{findings.table.redundancy[k]:.3f}",
+                quantity(findings.table.mdb[k], str(findings.table.unit[k]))
+                if np.isfinite(findings.table.mdb[k])
+                else "never",
+            )
+            for k in order
+        ],
+        "tnnn",
+    )
 
 
 def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
@@ -305,7 +334,7 @@ def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
 
 
 def write_plan(
-    told: PlanFindings,
+    plan_findings: PlanFindings,
     directory: Path,
     inputs: Mapping[str, str],
     progress: Callable[[str, int, int], None] | None = None,
@@ -313,10 +342,10 @@ def write_plan(
     """Report, tables and object of a plan, and last the provenance with the hashes of the others."""
     when = datetime.now(UTC)
     files: Files = {
-        "report.html": lambda: plan_report(told, when, inputs),
-        "points.csv": lambda: "".join(coordinates_csv(told.found)),
-        "candidates.csv": lambda: "".join(candidates_csv(told)),
-        "plan.json": lambda: json_page(plan_object(told)),
+        "report.html": lambda: plan_report(plan_findings, when, inputs),
+        "points.csv": lambda: "".join(coordinates_csv(plan_findings.findings)),
+        "candidates.csv": lambda: "".join(candidates_csv(plan_findings)),
+        "plan.json": lambda: json_page(plan_object(plan_findings)),
     }
-    made = {"format": FORMAT, "made_by": "catseye plan"}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    provenance = {"format": FORMAT, "made_by": "catseye plan"}
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)

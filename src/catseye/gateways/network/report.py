@@ -33,7 +33,7 @@ UNCHECKED = 100  # unchecked observations named
 
 
 def network_report(
-    found: Findings,
+    findings: Findings,
     when: datetime,
     inputs: Mapping[str, str],
     *,
@@ -42,48 +42,49 @@ def network_report(
 ) -> str:
     """The whole page.
 
-    found    what is told of a solution
-    when     UTC
-    inputs   SHA-256 of each file read, by its name
-    prefix   of the names of the tables beside the report
-    treated  how observations were treated, where that was asked for
+    findings   what is told of a solution
+    when       UTC
+    inputs     SHA-256 of each file read, by its name
+    prefix     of the names of the tables beside the report
+    treated    how observations were treated, where that was asked for
     """
-    drawn = network_figures(found)
-    name = found.network.source or "network"
+    drawn = network_figures(findings)
+    name = findings.network.source or "network"
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
-    axes = ", ".join(found.network.axis_names)
+    axes = ", ".join(findings.network.axis_names)
     header = (
         f"<header><h1>{escape(name)}: network adjustment</h1>"
-        f'<div class="faint">{len(found.table)} observations of {len(found.names)} points, adjusted by catseye '
+        f'<div class="faint">{len(findings.table)} observations of {len(findings.names)} points, adjusted by catseye '
         f"on {when:%Y-%m-%d %H:%M} UTC; coordinates in the file's own axes ({escape(axes)}), u = standard uncertainty, "
-        f"1σ{', variance factor applied' if found.scaled else ', as claimed before'}</div><nav>{links}</nav></header>"
+        f"1σ{', variance factor applied' if findings.scaled else ', as claimed before'}</div>"
+        f"<nav>{links}</nav></header>"
     )
     body = [
         header,
-        _summary(found, treated),
+        _summary(findings, treated),
         _network(drawn),
-        _observations(found, drawn, f"{prefix}observations.csv"),
-        _reliability(found, drawn),
-        _points(found, f"{prefix}coordinates.csv"),
-        _datum(found),
+        _observations(findings, drawn, f"{prefix}observations.csv"),
+        _reliability(findings, drawn),
+        _points(findings, f"{prefix}coordinates.csv"),
+        _datum(findings),
         provenance_section(
-            when, inputs, {"level of the tests": f"{found.level:g}", "variance factor applied": str(found.scaled)}
+            when, inputs, {"level of the tests": f"{findings.level:g}", "variance factor applied": str(findings.scaled)}
         ),
     ]
     return page(f"catseye: {name}", "\n".join(body))
 
 
-def _summary(found: Findings, treated: "AdjustedNetwork | None") -> str:
-    axis = found.ellipsoid.semi_axes[:, 0]
+def _summary(findings: Findings, treated: "AdjustedNetwork | None") -> str:
+    axis = findings.ellipsoid.semi_axes[:, 0]
     known = axis[np.isfinite(axis) & (axis > 0.0)]
-    good, text = verdict(found)
-    cards = network_cards(found)
+    good, text = verdict(findings)
+    cards = network_cards(findings)
     if len(known):
         usual, worst = quantity(float(np.median(known)), "m"), quantity(float(known.max()), "m")
         cards.insert(1, card("Points known to", usual, f"longest axis of the usual ellipsoid; worst {worst}"))
-    told = [*passages(found)[1:], *([] if treated is None else treatment_passages(treated, found))]
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in told)
-    own = found.network.description.strip()
+    listed = [*passages(findings)[1:], *([] if treated is None else treatment_passages(treated, findings))]
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in listed)
+    own = findings.network.description.strip()
     return section(
         "summary",
         CONTENTS["summary"],
@@ -94,25 +95,27 @@ def _summary(found: Findings, treated: "AdjustedNetwork | None") -> str:
     )
 
 
-def network_cards(found: Findings) -> list[str]:
+def network_cards(findings: Findings) -> list[str]:
     """The numbers that matter first.
 
-    found   what is told of a solution
+    findings   what is told of a solution
     """
-    whole, active = found.whole, found.table.active
-    unchecked = int(np.sum(active & ~found.table.checked)) if found.answered else 0
+    whole, active = findings.whole, findings.table.active
+    unchecked = int(np.sum(active & ~findings.table.checked)) if findings.answered else 0
     interval = f"expected {whole.lower:.3f} to {whole.upper:.3f}" if np.isfinite(whole.p) else "not tested"
-    degrees = found.solution.degrees_of_freedom
-    suspects = str(len(found.suspects)) if found.answered else "unknown"
+    degrees = findings.solution.degrees_of_freedom
+    suspects = str(len(findings.suspects)) if findings.answered else "unknown"
     return [
         card(
             "Variance factor",
             f"{whole.factor:.3f}" if np.isfinite(whole.p) else "unknown",
             f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
         ),
-        card("Suspect observations", suspects, f"of {int(active.sum())}, level {found.level:g} for all"),
+        card("Suspect observations", suspects, f"of {int(active.sum())}, level {findings.level:g} for all"),
         card(
-            "Unchecked observations", str(unchecked) if found.answered else "unknown", "an error there would not show"
+            "Unchecked observations",
+            str(unchecked) if findings.answered else "unknown",
+            "an error there would not show",
         ),
     ]
 
@@ -123,10 +126,10 @@ def _network(drawn: dict[str, CaptionedFigure]) -> str:
     )
 
 
-def _observations(found: Findings, drawn: dict[str, CaptionedFigure], file: str) -> str:
-    rows = found.table.worst_first[:WORST]
-    total = len(found.table)
-    told = (
+def _observations(findings: Findings, drawn: dict[str, CaptionedFigure], file: str) -> str:
+    rows = findings.table.worst_first[:WORST]
+    total = len(findings.table)
+    note = (
         f"The {len(rows)} worst of {total}; all are in {file}." if len(rows) < total else f"All {total}, worst first."
     )
     return section(
@@ -134,49 +137,49 @@ def _observations(found: Findings, drawn: dict[str, CaptionedFigure], file: str)
         CONTENTS["observations"],
         picture(drawn["residuals"].svg, drawn["residuals"].caption) if "residuals" in drawn else "",
         paragraph(
-            f"{told} The residual is observed minus adjusted; the test statistic is the residual in units of its own "
+            f"{note} The residual is observed minus adjusted; the test statistic is the residual in units of its own "
             "uncertainty; the estimated error is what would explain it best if nothing else were wrong."
         ),
-        observation_rows(found, rows),
+        observation_rows(findings, rows),
     )
 
 
-def observation_rows(found: Findings, rows: Sequence[int] | np.ndarray) -> str:
+def observation_rows(findings: Findings, rows: Sequence[int] | np.ndarray) -> str:
     """A table of observations; lengths in mm, angles in arc seconds.
 
-    found   what is told of a solution
-    rows    of its table
+    findings   what is told of a solution
+    rows       of its table
     """
-    t, suspect = found.table, set(found.suspects.tolist())
+    t, suspect = findings.table, set(findings.suspects.tolist())
     fine = {"m": (MILLIMETRE, "mm"), "rad": (ARCSECOND, "″")}
     lines = []
     for i in rows:
         scale, unit = fine.get(str(t.unit[i]), (1.0, ""))
         what = "suspect" if i in suspect else "left out" if not t.active[i] else ""
-        what = "unchecked" if found.answered and t.active[i] and not t.checked[i] else what
+        what = "unchecked" if findings.answered and t.active[i] and not t.checked[i] else what
         lines.append(
             (
-                found.label(int(i)),
+                findings.label(int(i)),
                 *(_number(float(v[i]) / scale, form) for v, form in ((t.residual, "+.4g"), (t.u, ".4g"))),
                 unit,
-                _number(float(found.statistic[i]), "+.2f"),
-                _number(float(found.p[i]), ".2g"),
+                _number(float(findings.statistic[i]), "+.2f"),
+                _number(float(findings.p[i]), ".2g"),
                 _number(float(t.redundancy[i]), ".3f"),
                 *(_number(float(v[i]) / scale, form) for v, form in ((t.estimated_error, "+.4g"), (t.mdb, ".4g"))),
                 what,
             )
         )
     columns = (
-        "observation", "residual", "u", "unit", f"{found.test} statistic", "p of all", "redundancy", "estimated error",
-        "detectable error", "",
+        "observation", "residual", "u", "unit", f"{findings.test} statistic", "p of all", "redundancy",
+        "estimated error", "detectable error", "",
     )  # fmt: skip
     return table(columns, lines, "tnntnnnnnt")
 
 
-def _reliability(found: Findings, drawn: dict[str, CaptionedFigure]) -> str:
-    if not found.answered:
+def _reliability(findings: Findings, drawn: dict[str, CaptionedFigure]) -> str:
+    if not findings.answered:
         return section("reliability", CONTENTS["reliability"], paragraph("Unknown without an answer."))
-    rows = np.flatnonzero(found.table.active & ~found.table.checked)
+    rows = np.flatnonzero(findings.table.active & ~findings.table.checked)
     parts = [picture(drawn["redundancy"].svg, drawn["redundancy"].caption)] if "redundancy" in drawn else []
     if not len(rows):
         parts.append(paragraph("Every observation is checked by others."))
@@ -187,30 +190,30 @@ def _reliability(found: Findings, drawn: dict[str, CaptionedFigure]) -> str:
                 f"{len(rows)} observations are checked by no other; an error in one of them would not show{more}."
             )
         )
-        parts.append(observation_rows(found, rows[:UNCHECKED]))
+        parts.append(observation_rows(findings, rows[:UNCHECKED]))
     return section("reliability", CONTENTS["reliability"], *parts)
 
 
-def _points(found: Findings, file: str) -> str:
-    count = len(found.names)
-    rows, told = np.arange(count), ""
+def _points(findings: Findings, file: str) -> str:
+    count = len(findings.names)
+    rows, note = np.arange(count), ""
     if count > EVERY:
-        rows = np.argsort(-np.nan_to_num(found.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
-        told = f"The {WEAKEST} weakest of {count}; all are in {file}. "
-    names = found.network.axis_names
-    points = found.network.points
+        rows = np.argsort(-np.nan_to_num(findings.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
+        note = f"The {WEAKEST} weakest of {count}; all are in {file}. "
+    names = findings.network.axis_names
+    points = findings.network.points
     roles = np.where(points.datum.any(axis=1), "datum", "")
     roles = np.where(points.fixed.any(axis=1), np.where(points.fixed.all(axis=1), "held", "partly held"), roles)
-    u, axis = found.u / MILLIMETRE, found.ellipsoid.semi_axes / MILLIMETRE
+    u, axis = findings.u / MILLIMETRE, findings.ellipsoid.semi_axes / MILLIMETRE
     lines = [
         (
-            found.names[i],
-            "station" if found.stations[i] else "target",
+            findings.names[i],
+            "station" if findings.stations[i] else "target",
             str(roles[i]),
-            *(_number(float(v), ".7f") for v in found.x[i]),
+            *(_number(float(v), ".7f") for v in findings.x[i]),
             *(_number(float(v), ".4f") for v in u[i]),
             " / ".join(_number(float(v), ".4g") for v in axis[i]),
-            str(found.seen[i]),
+            str(findings.seen[i]),
         )
         for i in rows.tolist()
     ]
@@ -222,17 +225,17 @@ def _points(found: Findings, file: str) -> str:
         "points",
         CONTENTS["points"],
         paragraph(
-            f"{told}Semi-axes are those of the standard ellipsoid (1σ), “seen” is by how many observations. "
+            f"{note}Semi-axes are those of the standard ellipsoid (1σ), “seen” is by how many observations. "
             f"Covariances are in {file}."
         ),
         table(columns, lines, "tttnnnnnnnn"),
-        _relative(found),
+        _relative(findings),
     )
 
 
-def _relative(found: Findings) -> str:
+def _relative(findings: Findings) -> str:
     """The section on the pairs of points that were asked for."""
-    if not found.relative:
+    if not findings.relative:
         return ""
     rows = [
         (
@@ -241,24 +244,24 @@ def _relative(found: Findings) -> str:
             _number(r.u_distance / MILLIMETRE, ".4f"),
             " / ".join(_number(float(v) / MILLIMETRE, ".4g") for v in r.ellipsoid.semi_axes),
         )
-        for r in found.relative
+        for r in findings.relative
     ]
     return "<h3>From point to point</h3>" + table(
         ("pair", "distance (m)", "u (mm)", "semi-axes of the relative ellipsoid (mm)"), rows, "tnnn"
     )
 
 
-def _datum(found: Findings) -> str:
-    solution, parameters = found.solution, found.network.parameters
+def _datum(findings: Findings) -> str:
+    solution, parameters = findings.solution, findings.network.parameters
     parts = [
         paragraph(f"Datum: {solution.datum}. {solution.iterations} iterations. Status: {solution.status}."),
     ]
     rows = [
         (p.name, *parameter_cells(float(v), float(u), p.unit), _prior(p.start, p.sigma, p.unit))
-        for p, v, u in zip(parameters, solution.parameters, found.u_parameters, strict=True)
+        for p, v, u in zip(parameters, solution.parameters, findings.u_parameters, strict=True)
     ]
     if rows:
-        axes = "" if np.array_equal(found.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
+        axes = "" if np.array_equal(findings.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
         parts.append(paragraph(f"{len(rows)} parameters beside the points.{axes}"))
         parts.append(table(("parameter", "value", "u", "prior"), rows, "tnnt"))
     return section("datum", CONTENTS["datum"], *parts)

@@ -29,13 +29,13 @@ def quantity(value: float, unit: str) -> str:
     return f"{value / ARCSECOND:.3g}″" if unit == "rad" else f"{value:.3g}"
 
 
-def verdict(found: Findings) -> tuple[bool, str]:
+def verdict(findings: Findings) -> tuple[bool, str]:
     """Whether the adjustment can be trusted as it is, and a few plain words why.
 
-    found   what is told of a solution
+    findings   what is told of a solution
     """
-    status, whole = found.solution.status, found.whole
-    if not found.answered:
+    status, whole = findings.solution.status, findings.whole
+    if not findings.answered:
         return False, f"No answer: {status}."
     if status != "converged":
         return False, f"Not to be trusted: {status}."
@@ -44,79 +44,81 @@ def verdict(found: Findings) -> tuple[bool, str]:
     if whole.verdict == TOO_LARGE:
         more = 100.0 * (np.sqrt(whole.factor) - 1.0)
         text = f"Doubtful: the observations scatter {more:.0f} % more than their uncertainties claim."
-        return False, text + _suspects(found)
-    if len(found.suspects):
+        return False, text + _suspects(findings)
+    if len(findings.suspects):
         return False, "Good but for single observations: the whole agrees with the claimed uncertainties." + _suspects(
-            found
+            findings
         )
     if whole.verdict == TOO_SMALL:
         less = 100.0 * (1.0 - np.sqrt(whole.factor))
         text = f"Good, and better than claimed: the observations scatter {less:.0f} % less than claimed."
     else:
         text = "Good: the observations agree with each other as their uncertainties claim."
-    unchecked = int(np.sum(found.table.active & ~found.table.checked))
+    unchecked = int(np.sum(findings.table.active & ~findings.table.checked))
     return True, text + (f" But {unchecked} of them are checked by no other." if unchecked else "")
 
 
-def _suspects(found: Findings) -> str:
-    count = len(found.suspects)
+def _suspects(findings: Findings) -> str:
+    count = len(findings.suspects)
     if not count:
         return " No single observation stands out."
     noun = "observation is" if count == 1 else "observations are"
-    return f" {count} {noun} suspect, first {observation_words(found, int(found.suspects[0]))}."
+    return f" {count} {noun} suspect, first {observation_words(findings, int(findings.suspects[0]))}."
 
 
-def observation_words(found: Findings, row: int) -> str:
+def observation_words(findings: Findings, row: int) -> str:
     """An observation, its residual and its test, in words.
 
-    found   what is told of a solution
-    row     of its table
+    findings   what is told of a solution
+    row        of its table
     """
-    table, unit = found.table, str(found.table.unit[row])
-    words = f"{found.label(row)}: residual {quantity(table.residual[row], unit)}"
-    if np.isfinite(found.statistic[row]):
-        words += f", {abs(found.statistic[row]):.2f} of its standard uncertainties"
+    table, unit = findings.table, str(findings.table.unit[row])
+    words = f"{findings.label(row)}: residual {quantity(table.residual[row], unit)}"
+    if np.isfinite(findings.statistic[row]):
+        words += f", {abs(findings.statistic[row]):.2f} of its standard uncertainties"
         words += f", as if it were wrong by {quantity(table.estimated_error[row], unit)}"
     return words
 
 
-def passages(found: Findings) -> list[Passage]:
+def passages(findings: Findings) -> list[Passage]:
     """Verdict, network, points, observations, and what is not checked.
 
-    found   what is told of a solution
+    findings   what is told of a solution
     """
-    told = [Passage("Verdict", verdict(found)[1]), Passage("The network", _network(found))]
-    if found.answered:
-        told += [
-            Passage("The points", _points(found)),
-            Passage("The fit", _observations(found)),
-            Passage("The checks", _checks(found)),
+    passages = [Passage("Verdict", verdict(findings)[1]), Passage("The network", _network(findings))]
+    if findings.answered:
+        passages += [
+            Passage("The points", _points(findings)),
+            Passage("The fit", _observations(findings)),
+            Passage("The checks", _checks(findings)),
         ]
-    return told
+    return passages
 
 
-def treatment_passages(treated: "AdjustedNetwork", found: Findings) -> list[Passage]:
+def treatment_passages(treated: "AdjustedNetwork", findings: Findings) -> list[Passage]:
     """What was left out or weighed down, and which uncertainties the observations themselves ask for.
 
-    treated   how observations were treated
-    found     what is told of the solution
+    treated    how observations were treated
+    findings   what is told of the solution
     """
-    told = []
-    rejected, undecided = (np.flatnonzero(found.in_table(part)) for part in (treated.rejected, treated.undecided))
+    passages = []
+    rejected, undecided = (np.flatnonzero(findings.in_table(part)) for part in (treated.rejected, treated.undecided))
     if treated.treatment != "plain":
         how = (
             "Left out"
             if treated.treatment == "rejected"
             else f"Robust weights ({treated.treatment}); given next to none"
         )
-        text = f"{how}: {_listed([found.label(int(i)) for i in rejected[:NAMED]], len(rejected)) or 'no observation'}."
+        text = (
+            f"{how}: {_listed([findings.label(int(i)) for i in rejected[:NAMED]], len(rejected)) or 'no observation'}."
+        )
         if len(undecided):
-            names = _listed([found.label(int(i)) for i in undecided[:NAMED]], len(undecided))
+            names = _listed([findings.label(int(i)) for i in undecided[:NAMED]], len(undecided))
             text += f" Contradicted by others, and nothing says which is wrong: {names}."
-        told.append(Passage("The treatment", text))
+        passages.append(Passage("The treatment", text))
     if treated.components is not None:
-        told.append(Passage("The claims", _claims(treated)))
-    return told + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
+        passages.append(Passage("The claims", _claims(treated)))
+    return passages + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
 
 
 def _claims(treated: "AdjustedNetwork") -> str:
@@ -135,15 +137,15 @@ def _claims(treated: "AdjustedNetwork") -> str:
     return f"The observations themselves ask for: {_listed(words)}."
 
 
-def _network(found: Findings) -> str:
-    solution, table = found.solution, found.table
-    stations, total = int(found.stations.sum()), len(found.names)
+def _network(findings: Findings) -> str:
+    solution, table = findings.solution, findings.table
+    stations, total = int(findings.stations.sum()), len(findings.names)
     counts = np.bincount(table.kind, minlength=len(table.kinds))
     kinds = ", ".join(f"{k.replace('_', ' ')} {n}" for k, n in zip(table.kinds, counts, strict=True))
     text = f"{total} points, stations among them: {stations}. {len(table)} observations: {kinds or 'none'}."
     out = int(np.sum(~table.active))
     text += f" {out} were left out." if out else ""
-    if found.answered:
+    if findings.answered:
         text += f" Datum: {solution.datum}."
     if solution.approximate:
         text += f" Approximate coordinates were found, not given, for {_listed(solution.approximate)}."
@@ -152,45 +154,44 @@ def _network(found: Findings) -> str:
     if solution.replaced:
         named = _listed(solution.replaced)
         text += f" Given coordinates that the observations contradict grossly were no start: {named}."
-    lonely = [found.names[i] for i in np.flatnonzero(found.seen == 0)]
+    lonely = [findings.names[i] for i in np.flatnonzero(findings.seen == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 
 
-def _points(found: Findings) -> str:
-    axis = found.ellipsoid.semi_axes[:, 0]
+def _points(findings: Findings) -> str:
+    axis = findings.ellipsoid.semi_axes[:, 0]
     known = np.flatnonzero(np.isfinite(axis) & (axis > 0.0))
     if not len(known):
         return "Every point is held."
     usual, worst = float(np.median(axis[known])), int(known[np.argmax(axis[known])])
     text = (
         f"Along the longest axis of its ellipsoid the usual point is known to {quantity(usual, 'm')} (1σ), the worst, "
-        f"{found.names[worst]}, to {quantity(axis[worst], 'm')}, {direction_words(found, worst)}."
+        f"{findings.names[worst]}, to {quantity(axis[worst], 'm')}, {direction_words(findings, worst)}."
     )
     weak = known[axis[known] > WEAK * usual]
     weak = weak[np.argsort(-axis[weak], kind="stable")]
     if len(weak) > 1:
-        text += (
-            f" {len(weak)} points are over {WEAK:g} times worse than usual: {_listed([found.names[i] for i in weak])}."
-        )
-    for r in found.relative:
+        named = _listed([findings.names[i] for i in weak])
+        text += f" {len(weak)} points are over {WEAK:g} times worse than usual: {named}."
+    for r in findings.relative:
         text += (
             f" {r.first} - {r.second}: {r.distance:.5f} m, u {quantity(r.u_distance, 'm')}; its relative ellipsoid has "
             f"the semi-axes {', '.join(quantity(float(v), 'm') for v in r.ellipsoid.semi_axes)}."
         )
     return text + (
         " The variance factor is applied."
-        if found.scaled
+        if findings.scaled
         else " These rest on the claimed uncertainties of the observations."
     )
 
 
-def direction_words(found: Findings, point: int) -> str:
+def direction_words(findings: Findings, point: int) -> str:
     """The longest axis of a point's ellipsoid in words.
 
-    found   what is told of a solution
-    point   its row
+    findings   what is told of a solution
+    point      its row
     """
-    east, north, up = found.network.axes @ found.ellipsoid.directions[point, :, 0]
+    east, north, up = findings.network.axes @ findings.ellipsoid.directions[point, :, 0]
     steep = np.arcsin(min(abs(up), 1.0)) / DEGREE
     if steep > 60.0:
         return "mostly in height"
@@ -199,33 +200,34 @@ def direction_words(found: Findings, point: int) -> str:
     return f"towards azimuth {azimuth:.0f}° and back{tilt}"
 
 
-def _observations(found: Findings) -> str:
-    whole, table = found.whole, found.table
+def _observations(findings: Findings) -> str:
+    whole, table = findings.whole, findings.table
     if not np.isfinite(whole.p):
         return "Nothing is left over to compare them with."
     text = (
-        f"Variance factor {whole.factor:.3f} with {found.solution.degrees_of_freedom:.0f} degrees of freedom; by "
-        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {found.level:g}): {whole.verdict}."
+        f"Variance factor {whole.factor:.3f} with {findings.solution.degrees_of_freedom:.0f} degrees of freedom; by "
+        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): {whole.verdict}."
     )
-    text += _suspects(found) if len(found.suspects) else ""
-    if np.isfinite(table.standardised).any() and not len(found.suspects):
-        text += f" No observation is suspect; the worst is {observation_words(found, int(table.worst_first[0]))}."
+    text += _suspects(findings) if len(findings.suspects) else ""
+    if np.isfinite(table.standardised).any() and not len(findings.suspects):
+        text += f" No observation is suspect; the worst is {observation_words(findings, int(table.worst_first[0]))}."
     return text
 
 
-def _checks(found: Findings) -> str:
-    table = found.table
+def _checks(findings: Findings) -> str:
+    table = findings.table
     active = int(table.active.sum())
     unchecked = np.flatnonzero(table.active & ~table.checked)
     text = f"All {active} observations are checked by others." if not len(unchecked) else ""
     if len(unchecked):
-        names = _listed([found.label(int(i)) for i in unchecked[:NAMED]], len(unchecked))
+        names = _listed([findings.label(int(i)) for i in unchecked[:NAMED]], len(unchecked))
         text = f"{len(unchecked)} of {active} observations are checked by no other, where an error would not show: "
         text += f"{names}."
     mdb = [
-        f"{quantity(float(np.median(table.mdb[mine])), str(table.unit[np.argmax(mine)]))} of a {kind.replace('_', ' ')}"
+        f"{quantity(float(np.median(table.mdb[checked])), str(table.unit[np.argmax(checked)]))} of a "
+        f"{kind.replace('_', ' ')}"
         for k, kind in enumerate(table.kinds)
-        if (mine := (table.kind == k) & table.checked).any()
+        if (checked := (table.kind == k) & table.checked).any()
     ]
     if mdb:
         text += f" The smallest error that the test (0.1 %, power 80 %) usually finds: {', '.join(mdb)}."

@@ -55,44 +55,44 @@ PARAMETERS: Formats = {"parameter": "", "unit": "", "value": ".13g", "u": ".7g",
 TRIANGLE = np.triu_indices(3)
 
 
-def coordinates_csv(found: Findings) -> Iterator[str]:
+def coordinates_csv(findings: Findings) -> Iterator[str]:
     """Every point, with standard uncertainties, covariances, and semi-axes of the standard ellipsoid.
 
-    found   what is told of a solution; variances are multiplied by its variance factor where it is `scaled`
+    findings   what is told of a solution; variances are multiplied by its variance factor where it is `scaled`
     """
-    axes, names = np.abs(found.network.axes), [cell(n) for n in found.names]
-    letters = np.array([cell(n) for n in found.network.axis_names])
-    fixed, datum = ((flags @ axes) > 0.0 for flags in (found.network.points.fixed, found.network.points.datum))
-    triangle = found.covariance[:, *TRIANGLE] / MILLIMETRE**2
+    axes, names = np.abs(findings.network.axes), [cell(n) for n in findings.names]
+    letters = np.array([cell(n) for n in findings.network.axis_names])
+    fixed, datum = ((flags @ axes) > 0.0 for flags in (findings.network.points.fixed, findings.network.points.datum))
+    triangle = findings.covariance[:, *TRIANGLE] / MILLIMETRE**2
     yield from table(
         COORDINATES,
         len(names),
         lambda part: [
             names[part],
-            *found.x[part].T,
-            *(found.u[part].T / MILLIMETRE),
+            *findings.x[part].T,
+            *(findings.u[part].T / MILLIMETRE),
             *triangle[part].T,
-            *(found.ellipsoid.semi_axes[part].T / MILLIMETRE),
+            *(findings.ellipsoid.semi_axes[part].T / MILLIMETRE),
             [" ".join(letters[f]) for f in fixed[part]],
             [" ".join(letters[d]) for d in datum[part]],
-            found.seen[part],
+            findings.seen[part],
         ],
     )
 
 
-def observations_csv(found: Findings, *, worst_first: bool = False) -> Iterator[str]:
+def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterator[str]:
     """Every observation; lengths in m and angles in rad, as its `unit` says.
 
-    found         what is told of a solution
+    findings      what is told of a solution
     worst_first   by falling |standardised|; else in the order of the file. `number` counts from 0 in that of the file,
                   as the indices of `suspects` in JSON do.
     """
-    rows, places = found.table, found.network.places
+    rows, places = findings.table, findings.network.places
     order = rows.worst_first if worst_first else np.arange(len(rows))
-    kinds, groups = [cell(k) for k in rows.kinds], [cell(g.name) for g in found.network.groups]
-    points = [*(cell(n) for n in found.names), ""]
+    kinds, groups = [cell(k) for k in rows.kinds], [cell(g.name) for g in findings.network.groups]
+    points = [*(cell(n) for n in findings.names), ""]
     suspect = np.zeros(len(rows), dtype=bool)
-    suspect[found.suspects] = True
+    suspect[findings.suspects] = True
 
     def columns(part: slice) -> list[Column]:
         at = order[part]
@@ -104,8 +104,8 @@ def observations_csv(found: Findings, *, worst_first: bool = False) -> Iterator[
             [cell(c) for c in rows.component[at].tolist()],
             rows.unit[at].tolist(),
             *(getattr(rows, name)[at] for name in MEASURES),
-            found.statistic[at],
-            found.p[at],
+            findings.statistic[at],
+            findings.p[at],
             *(np.where(flag[at], "yes", "no").tolist() for flag in (suspect, rows.active, rows.checked)),
             [groups[g] for g, _ in where],
             [cell(places[g][r]) if places and places[g] else "" for g, r in where],
@@ -114,17 +114,17 @@ def observations_csv(found: Findings, *, worst_first: bool = False) -> Iterator[
     yield from table(OBSERVATIONS, len(rows), columns)
 
 
-def parameters_csv(found: Findings) -> Iterator[str]:
+def parameters_csv(findings: Findings) -> Iterator[str]:
     """Every parameter beside the points, in x east, y north, z up; an empty prior_u is a free one, 0 a held one."""
-    parameters = found.network.parameters
+    parameters = findings.network.parameters
     yield from table(
         PARAMETERS,
         len(parameters),
         lambda part: [
             [cell(p.name) for p in parameters[part]],
             [p.unit for p in parameters[part]],
-            found.solution.parameters[part],
-            found.u_parameters[part],
+            findings.solution.parameters[part],
+            findings.u_parameters[part],
             np.array([p.sigma for p in parameters[part]]),
         ],
     )

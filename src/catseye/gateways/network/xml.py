@@ -62,30 +62,30 @@ DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
   observations left out of the adjustment, and kinds that gama-local does not have, are missing:"""
 
 
-def network_xml(found: Findings) -> Iterator[str]:
+def network_xml(findings: Findings) -> Iterator[str]:
     """The text of the XML file in pieces; one with only the reason where there is no answer.
 
-    found   what is told of a solution; `scaled` becomes Gama's "aposteriori"
+    findings   what is told of a solution; `scaled` becomes Gama's "aposteriori"
 
     Source: [GAMA18] schema gama-local-adjustment.xsd, version 1.00.
     """
     yield f'<?xml version="1.0"?>\n<gama-local-adjustment xmlns="{NAMESPACE}">\n'
-    if not found.answered:
-        text = _text(found.solution.status)
+    if not findings.answered:
+        text = _text(findings.solution.status)
         yield f'<error category="gamaLocalAdjustment"><description>{text}</description></error>\n'
     else:
-        unknowns = _Unknowns(found)
-        yield _comment(found)
-        yield f"<description>{_text(found.network.description)}</description>\n"
+        unknowns = _Unknowns(findings)
+        yield _comment(findings)
+        yield f"<description>{_text(findings.network.description)}</description>\n"
         yield (
             f'<network-general-parameters gama-local-version="catseye {__version__}" '
             f'gama-local-algorithm="gauss-newton" gama-local-compiler="python" '
             f'axes-xy="{unknowns.axes_name}" angles="left-handed"/>\n'
         )
-        yield _summary(found, unknowns)
-        yield from _coordinates(found, unknowns)
+        yield _summary(findings, unknowns)
+        yield from _coordinates(findings, unknowns)
         yield "<observations>\n"
-        yield from _observations(found, unknowns.turn)
+        yield from _observations(findings, unknowns.turn)
         yield "</observations>\n"
     yield "</gama-local-adjustment>\n"
 
@@ -98,13 +98,13 @@ def _text(text: str) -> str:
 class _Unknowns:
     """Which coordinates are unknown, fixed and constrained, as Gama counts them: x with y, z alone; orientations."""
 
-    def __init__(self, found: Findings):
-        network = found.network
+    def __init__(self, findings: Findings):
+        network = findings.network
         self.turn, self.axes_name = _level_axes(network.axes)
         flags = [(f @ np.abs(self.turn)) > 0.0 for f in (network.points.fixed, network.points.datum)]
         self.fixed, self.datum = (np.stack([f[:, :2].all(axis=1), f[:, 2]], axis=1) for f in flags)
         self.datum &= ~self.fixed
-        self.x, self.given = found.solution.x @ self.turn, network.points.xyz @ self.turn
+        self.x, self.given = findings.solution.x @ self.turn, network.points.xyz @ self.turn
         columns: dict[int, int] = {}
         for group in network.groups:
             column = getattr(group, "orientation", None)
@@ -116,19 +116,19 @@ class _Unknowns:
         self.clockwise = -np.sign(np.linalg.det(self.turn[:2, :2]))  # from x to y
         self.zero = np.arctan2(self.turn[0, 0], self.turn[1, 0])  # azimuth of the x axis
 
-    def covariance(self, found: Findings) -> tuple[np.ndarray, int]:
+    def covariance(self, findings: Findings) -> tuple[np.ndarray, int]:
         """Upper band of the unknowns' covariance row by row, and its width less the diagonal, without a factor."""
         size = len(self.coordinates) + len(self.orientations)
         turns = np.array(list(self.orientations), dtype=int)
         angular = np.full(len(turns), self.clockwise / CC)
         if size > FULL:
-            own = np.einsum("ki,nkl,li->ni", self.turn, found.solution.covariance, self.turn).ravel()
+            own = np.einsum("ki,nkl,li->ni", self.turn, findings.solution.covariance, self.turn).ravel()
             return np.concatenate(
-                [own[self.coordinates] / MILLIMETRE**2, found.solution.q.diagonal()[turns] / CC**2]
+                [own[self.coordinates] / MILLIMETRE**2, findings.solution.q.diagonal()[turns] / CC**2]
             ), 0
         points, place = np.divmod(self.coordinates, 3)
         named = np.unique(points)
-        q = found.solution.q.within(np.concatenate([(3 * named[:, None] + np.arange(3)).ravel(), turns]))
+        q = findings.solution.q.within(np.concatenate([(3 * named[:, None] + np.arange(3)).ravel(), turns]))
         to = np.zeros((size, len(q)))
         row = np.arange(len(points))
         for axis in range(3):
@@ -145,31 +145,31 @@ def _level_axes(axes: np.ndarray) -> tuple[np.ndarray, str]:
     return axes, "".join(letters[int(axes[0, k]), int(axes[1, k])] for k in (0, 1))
 
 
-def _comment(found: Findings) -> str:
-    table = found.table
-    counts = [f"{n} of kind {kind.replace('_', ' ')}" for kind, n in _by_kind(found) if n and kind not in TAGS]
+def _comment(findings: Findings) -> str:
+    table = findings.table
+    counts = [f"{n} of kind {kind.replace('_', ' ')}" for kind, n in _by_kind(findings) if n and kind not in TAGS]
     counts += [f"{int(np.sum(~table.active))} left out"] if not table.active.all() else []
     text = f"{DIFFERENCES} {', '.join(counts) or 'none here'}"
     return f"<!-- {_text(text).replace('--', '- -')} -->\n"
 
 
-def _by_kind(found: Findings) -> list[tuple[str, int]]:
+def _by_kind(findings: Findings) -> list[tuple[str, int]]:
     """How many active rows of each kind; of vectors and coordinates those of the first axis, as gama-local counts."""
-    table = found.table
+    table = findings.table
     split = np.array([TAGS.get(kind, "") in ("d", "coordinate-") for kind in table.kinds], dtype=bool)[table.kind]
-    counted = table.active & (~split | (table.component == found.network.axis_names[0]))
+    counted = table.active & (~split | (table.component == findings.network.axis_names[0]))
     return list(zip(table.kinds, np.bincount(table.kind[counted], minlength=len(table.kinds)).tolist(), strict=True))
 
 
-def _summary(found: Findings, unknowns: _Unknowns) -> str:
-    network, table, whole = found.network, found.table, found.whole
+def _summary(findings: Findings, unknowns: _Unknowns) -> str:
+    network, table, whole = findings.network, findings.table, findings.whole
     kinds: Counter[str] = Counter()
-    for kind, count in _by_kind(found):
+    for kind, count in _by_kind(findings):
         kinds[TAGS.get(kind, "")] += count
     priors = sum(0.0 < p.sigma < np.inf for p in network.parameters)
     equations = int(table.active.sum()) + priors
     free = int(np.sum(~network.points.fixed)) + sum(p.sigma > 0.0 for p in network.parameters)
-    degrees = round(found.solution.degrees_of_freedom)
+    degrees = round(findings.solution.degrees_of_freedom)
     tested = np.isfinite(whole.p)
     ratio, lower, upper = (np.sqrt(v) if tested else 0.0 for v in (whole.factor, whole.lower, whole.upper))
     states = (("adjusted", ~unknowns.fixed), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
@@ -188,21 +188,21 @@ def _summary(found: Findings, unknowns: _Unknowns) -> str:
             f"<sum-of-squares>{ratio**2 * degrees:.7e}</sum-of-squares>",
             "<connected-network/>" if unconnected(network) is None else "<disconnected-network/>",
             f"</project-equations>\n<standard-deviation><apriori>1</apriori><aposteriori>{ratio:.7e}</aposteriori>"
-            f"<used>{'aposteriori' if found.scaled else 'apriori'}</used><probability>{1.0 - found.level:.3f}"
+            f"<used>{'aposteriori' if findings.scaled else 'apriori'}</used><probability>{1.0 - findings.level:.3f}"
             f"</probability><ratio>{ratio:.6f}</ratio><lower>{lower:.6f}</lower><upper>{upper:.6f}</upper>",
             "<passed/>" if tested and lower < ratio < upper else "<failed/>",
-            f"<confidence-scale>{_confidence_scale(found):.7e}</confidence-scale></standard-deviation>\n</network-processing-summary>\n",
+            f"<confidence-scale>{_confidence_scale(findings):.7e}</confidence-scale></standard-deviation>\n</network-processing-summary>\n",
         ]
     )
 
 
-def _confidence_scale(found: Findings) -> float:
+def _confidence_scale(findings: Findings) -> float:
     """Half a confidence interval in standard deviations: normal, or Student's where the variance factor is applied."""
-    both = 0.5 * found.level
-    return -float(stdtrit(found.solution.degrees_of_freedom, both) if found.scaled else ndtri(both))
+    both = 0.5 * findings.level
+    return -float(stdtrit(findings.solution.degrees_of_freedom, both) if findings.scaled else ndtri(both))
 
 
-def _coordinates(found: Findings, unknowns: _Unknowns) -> Iterator[str]:
+def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
     given = np.where(np.isfinite(unknowns.given), unknowns.given, unknowns.x)
     yield "<coordinates>\n"
     for tag, xyz, shown in (
@@ -212,18 +212,18 @@ def _coordinates(found: Findings, unknowns: _Unknowns) -> Iterator[str]:
     ):
         yield f"<{tag}>\n"
         capital = unknowns.datum if tag != "fixed" else np.zeros_like(unknowns.datum)
-        rows = zip(found.names, xyz.tolist(), shown.tolist(), capital.tolist(), strict=True)
+        rows = zip(findings.names, xyz.tolist(), shown.tolist(), capital.tolist(), strict=True)
         yield "".join([_point(*row) for row in rows if any(row[2])])
         yield f"</{tag}>\n"
     yield "<orientation-shifts>\n"
-    start = 3 * len(found.names)
+    start = 3 * len(findings.names)
     for column, point in unknowns.orientations.items():
-        values = (found.network.parameters[column - start].start, found.solution.parameters[column - start])
+        values = (findings.network.parameters[column - start].start, findings.solution.parameters[column - start])
         approx, adjusted = ((unknowns.clockwise * (v - unknowns.zero)) % TWO_PI / GON for v in values)
-        name = _text(found.names[point])
+        name = _text(findings.names[point])
         yield f"  <orientation><id>{name}</id><approx>{approx:.6f}</approx><adj>{adjusted:.8f}</adj></orientation>\n"
-    entries, band = unknowns.covariance(found)
-    entries = (entries * found.factor).tolist()
+    entries, band = unknowns.covariance(findings)
+    entries = (entries * findings.factor).tolist()
     size = len(unknowns.coordinates) + len(unknowns.orientations)
     yield f"</orientation-shifts>\n<cov-mat><dim>{size}</dim><band>{band}</band>\n"
     for low in range(0, len(entries), PIECE):
@@ -241,14 +241,14 @@ def _point(name: str, xyz: list[float], shown: list[bool], capital: list[bool]) 
     return f"  <point><id>{_text(name)}</id>{level}{f'<{z}>{xyz[2]:.10f}</{z}>' if shown[1] else ''}</point>\n"
 
 
-def _observations(found: Findings, turn: np.ndarray) -> Iterator[str]:
-    table = found.table
-    written = np.abs(turn.T @ found.network.axes).argmax(axis=0)  # where the file's axes stand in those written
-    letter = {name: "xyz"[int(k)] for name, k in zip(found.network.axis_names, written, strict=True)}
+def _observations(findings: Findings, turn: np.ndarray) -> Iterator[str]:
+    table = findings.table
+    written = np.abs(turn.T @ findings.network.axes).argmax(axis=0)  # where the file's axes stand in those written
+    letter = {name: "xyz"[int(k)] for name, k in zip(findings.network.axis_names, written, strict=True)}
     known = np.array([kind in TAGS for kind in table.kinds], dtype=bool)
     shown = np.flatnonzero(table.active & known[table.kind])
-    names = [_text(name) for name in found.names]
-    numbers, length = _numbers(found, table.sign if turn is not found.network.axes else np.ones(len(table)))
+    names = [_text(name) for name in findings.names]
+    numbers, length = _numbers(findings, table.sign if turn is not findings.network.axes else np.ones(len(table)))
     for low in range(0, len(shown), PIECE):
         part = shown[low : low + PIECE]
         lines = []
@@ -261,14 +261,14 @@ def _observations(found: Findings, turn: np.ndarray) -> Iterator[str]:
         yield "".join(lines)
 
 
-def _numbers(found: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What gama-local writes of the observations, (m, 8), and how many of it (m,): those in the bodies' order.
 
     sign   (m,) turns components into the axes that are written
 
     The error is given of what is checked well, or stands out, and is not correlated with others.
     """
-    table, share, scale = found.table, _adjusted_share(found), np.sqrt(found.factor)
+    table, share, scale = findings.table, _adjusted_share(findings), np.sqrt(findings.factor)
     angular = table.unit == "rad"
     value, fine = np.where(angular, GON, 1.0), np.where(angular, CC, MILLIMETRE)
     observed, adjusted = sign * table.observed / value, sign * (table.observed - table.residual) / value
@@ -277,9 +277,9 @@ def _numbers(found: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     qrr, control = (1.0 - share) * sigma**2, 100.0 * np.abs(1.0 - np.sqrt(share))
     with np.errstate(invalid="ignore", divide="ignore"):  # without a check it is not shown
         studentised, error = np.abs(v) / (scale * np.sqrt(qrr)), v / (1.0 - share)
-    alone = np.array([g.covariance.ndim == 1 for g in found.network.groups], dtype=bool)[table.group]
-    full = alone & ((control >= 5.0) | (studentised > _confidence_scale(found)))
-    told = np.stack(
+    alone = np.array([g.covariance.ndim == 1 for g in findings.network.groups], dtype=bool)[table.group]
+    full = alone & ((control >= 5.0) | (studentised > _confidence_scale(findings)))
+    numbers = np.stack(
         [
             observed,
             np.where(turning, adjusted % 400.0, adjusted),
@@ -292,19 +292,19 @@ def _numbers(found: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         ],
         axis=1,
     )
-    return told, np.where(control < 0.1, 5, np.where(full, 8, 6))
+    return numbers, np.where(control < 0.1, 5, np.where(full, 8, 6))
 
 
-def _adjusted_share(found: Findings) -> np.ndarray:
+def _adjusted_share(findings: Findings) -> np.ndarray:
     """(m,) variance of each adjusted observation over that of the observed one, variance factor 1."""
-    solution, table = found.solution, found.table
+    solution, table = findings.solution, findings.table
     share = 1.0 - table.redundancy
     x = np.concatenate([solution.x.ravel(), solution.parameters])
-    for g, group in enumerate(found.network.groups):
+    for g, group in enumerate(findings.network.groups):
         if group.covariance.ndim > 1:  # redundancy numbers of correlated observations are no such share
             _, jacobian = group.predict(x)
             columns = np.broadcast_to(group.columns, jacobian.shape)
-            mine = table.group == g
-            forms = np.sum(solution.q.products(columns, jacobian) * jacobian, axis=1)[table.row[mine]]
-            share[mine] = forms / solution.fits[g].sigma[table.row[mine]] ** 2
+            of_group = table.group == g
+            forms = np.sum(solution.q.products(columns, jacobian) * jacobian, axis=1)[table.row[of_group]]
+            share[of_group] = forms / solution.fits[g].sigma[table.row[of_group]] ** 2
     return np.clip(share, 0.0, 1.0)  # rounding

@@ -27,10 +27,10 @@ WIDTHS = (10, 17, 19, 9, 9, 9)
 POLARIZATIONS: tuple[coating.Polarization, ...] = ("s", "p")
 
 
-def beam_figure(found: BeamPath) -> str:
+def beam_figure(beam_path: BeamPath) -> str:
     """SVG text: the beam's radii along its path, and the power that returns by distance.
 
-    found   a reduced beam train
+    beam_path   a reduced beam train
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -38,26 +38,26 @@ def beam_figure(found: BeamPath) -> str:
         figure = Figure(figsize=(12.0, 6.6))  # margins by hand: the automatic ones differ in the last digit
         edges = {"left": 0.06, "right": 0.985, "bottom": 0.08, "top": 0.95, "hspace": 0.38, "wspace": 0.2}
         grid = figure.add_gridspec(2, 3, width_ratios=[1.0, 1.5, 1.0], **edges)
-        profile = beam_profile(found.train)
+        profile = beam_profile(beam_path.train)
         way, radii = profile["outward"]
         outward = figure.add_subplot(grid[0, 0])
-        _leg(outward, found, "outward", (way / MILLIMETRE, radii))
+        _leg(outward, beam_path, "outward", (way / MILLIMETRE, radii))
         outward.set(title="Laser to mirror", xlabel="from the laser (mm)", ylabel="radius at 1/e² (mm)")
-        _range(figure.add_subplot(grid[0, 1]), found, profile)
+        _range(figure.add_subplot(grid[0, 1]), beam_path, profile)
         way, radii = profile["inward"]
         inward = figure.add_subplot(grid[0, 2])
-        _leg(inward, found, "inward", ((way - way[0]) / MILLIMETRE, radii), way[0])
+        _leg(inward, beam_path, "inward", ((way - way[0]) / MILLIMETRE, radii), way[0])
         inward.set(title="Mirror to detector", xlabel="from the first inward element (mm)")
-        _power(figure.add_subplot(grid[1, :]), found)
+        _power(figure.add_subplot(grid[1, :]), beam_path)
         return svg(figure)
 
 
-def _leg(ax, found: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> None:
+def _leg(ax, beam_path: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> None:
     """Radii in both planes and the apertures that stand there, within a head."""
     way, radii = profile
     for k, axis in enumerate("xy"):
         ax.plot(way, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, label=axis)
-    stops = [place for place in found.places if place.leg == leg and np.isfinite(place.aperture)]
+    stops = [place for place in beam_path.places if place.leg == leg and np.isfinite(place.aperture)]
     top = 1.15 * max([float(np.max(radii)), *(place.aperture for place in stops)]) / MILLIMETRE
     for place in stops:
         at, edge = (place.way - start) / MILLIMETRE, place.aperture / MILLIMETRE
@@ -66,15 +66,15 @@ def _leg(ax, found: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> N
     ax.legend(loc="best")
 
 
-def _range(ax, found: BeamPath, profile: dict) -> None:
-    clipped = next(place for place in found.places if place.leg == "reflector")
+def _range(ax, beam_path: BeamPath, profile: dict) -> None:
+    clipped = next(place for place in beam_path.places if place.leg == "reflector")
     for leg, style in (("range", "-"), ("back", (0, (4, 2)))):
         way, radii = profile[leg]
         along = way - profile["range"][0][0]
         for k, axis in enumerate("xy"):
             label = f"{axis}, {'out' if leg == 'range' else 'back, unclipped'}"
             ax.plot(along, radii[:, k] / MILLIMETRE, color=SERIES[k], ls=style, lw=1.6, label=label)
-    at, edge = found.train.distance_m, clipped.aperture / MILLIMETRE
+    at, edge = beam_path.train.distance_m, clipped.aperture / MILLIMETRE
     ax.axvline(at, color=FAINT, lw=0.7)
     ax.plot([at, at], [edge, 10.0 * edge], color=INK, lw=2.2, solid_capstyle="butt")
     colour = BAD if clipped.clipped > 0.01 else INK
@@ -85,12 +85,12 @@ def _range(ax, found: BeamPath, profile: dict) -> None:
     ax.legend(loc="upper right", ncols=1)
 
 
-def _power(ax, found: BeamPath) -> None:
-    known = [row for row in found.returned if row.status == "ok"]
+def _power(ax, beam_path: BeamPath) -> None:
+    known = [row for row in beam_path.returned if row.status == "ok"]
     ax.plot([r.distance for r in known], [100.0 * r.hit for r in known], "o-", ms=4, color=SERIES[2], label="hits it")
     both = [100.0 * r.hit * r.collected for r in known]
     ax.plot([r.distance for r in known], both, "s-", ms=4, color=SERIES[0], label="and comes back to the detector")
-    for row in found.returned:
+    for row in beam_path.returned:
         if row.status != "ok":
             ax.axvline(row.distance, color=BAD, lw=1.0, ls=":")
     ax.set(title="Share of the beam", xlabel="distance to the reflector (m)", ylabel="share (%)")
@@ -113,15 +113,15 @@ def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, i
         by_angle, by_wavelength, path = figure.subplots(1, 3, gridspec_kw=edges)
         light = np.linspace(*BAND_UM, 601)
         for colour, name in zip(SERIES, names, strict=False):
-            made = coating.named(name, wavelength_um, incidence)
+            layers = coating.named(name, wavelength_um, incidence)
             for polarization, style in zip(POLARIZATIONS, ("-", (0, (3, 1.5))), strict=True):
                 drawn = {"color": colour, "ls": style, "lw": 1.4}
                 labelled = {**drawn, "label": name} if polarization == "s" else drawn
-                across = coating.response(made, wavelength_um, ANGLES * DEGREE, polarization=polarization)
+                across = coating.response(layers, wavelength_um, ANGLES * DEGREE, polarization=polarization)
                 by_angle.plot(ANGLES, 100.0 * across.reflectance, **labelled)
-                along = coating.response(made, light, incidence, polarization=polarization)
+                along = coating.response(layers, light, incidence, polarization=polarization)
                 by_wavelength.plot(light * 1e3, 100.0 * along.reflectance, **drawn)
-                added = coating.group_path(made, wavelength_um, ANGLES * DEGREE, polarization=polarization)
+                added = coating.group_path(layers, wavelength_um, ANGLES * DEGREE, polarization=polarization)
                 path.plot(ANGLES, np.where(across.reflectance > 0.5, 1e6 * added, np.nan), **drawn)
         by_angle.set(title=f"At {wavelength_um * 1e3:g} nm", xlabel="incidence (°)", ylabel="reflectance (%)")
         at = f"At {incidence / DEGREE:g}°, by wavelength"
@@ -139,8 +139,8 @@ def beam_plot(file: Path) -> tuple[str, dict[str, Any]]:
 
     file   the record
     """
-    found = read_beam(file)[0]
-    return beam_figure(found), {"name": found.train.name, "power_on_detector": found.places[-1].power}
+    beam_path = read_beam(file)[0]
+    return beam_figure(beam_path), {"name": beam_path.train.name, "power_on_detector": beam_path.places[-1].power}
 
 
 def coating_plot(
@@ -154,15 +154,15 @@ def coating_plot(
     """
     if len(names) > len(SERIES):
         raise ValidityError(f"{len(names)} coatings for one figure (expected at most {len(SERIES)})")
-    told: dict[str, Any] = {"wavelength_um": wavelength_um, "incidence": incidence}
+    summary: dict[str, Any] = {"wavelength_um": wavelength_um, "incidence": incidence}
     for name in names:
-        made = coating.named(name, wavelength_um, incidence)
+        layers = coating.named(name, wavelength_um, incidence)
         for polarization in POLARIZATIONS:
             how = f"{name}_{polarization}".replace("-", "_")
-            shown = coating.response(made, wavelength_um, incidence, polarization=polarization)
-            added = coating.group_path(made, wavelength_um, incidence, polarization=polarization)
-            told[f"{how}_reflectance"], told[f"{how}_range"] = float(shown.reflectance), float(added)
-    return coating_figure(names, wavelength_um, incidence), told
+            shown = coating.response(layers, wavelength_um, incidence, polarization=polarization)
+            added = coating.group_path(layers, wavelength_um, incidence, polarization=polarization)
+            summary[f"{how}_reflectance"], summary[f"{how}_range"] = float(shown.reflectance), float(added)
+    return coating_figure(names, wavelength_um, incidence), summary
 
 
 def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
@@ -178,90 +178,90 @@ def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict
     return reduce_beam(train), folder.hashes
 
 
-def beam_object(found: BeamPath) -> dict[str, Any]:
+def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """Everything as a plain object, SI units.
 
-    found   a reduced beam train
+    beam_path   a reduced beam train
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
     return {
-        "name": found.train.name,
-        "distance": found.train.distance_m,
-        "status": found.status,
-        "places": [{key: getattr(place, key) for key in keys} for place in found.places],
-        "returned": [{key: getattr(row, key) for key in rows} for row in found.returned],
-        "smallest": {"waist": found.smallest_waist[0], "radius": found.smallest_waist[1]},
-        "range_effects": found.range_effects,
-        "u_image": found.u_image,
-        "laser": found.laser,
+        "name": beam_path.train.name,
+        "distance": beam_path.train.distance_m,
+        "status": beam_path.status,
+        "places": [{key: getattr(place, key) for key in keys} for place in beam_path.places],
+        "returned": [{key: getattr(row, key) for key in rows} for row in beam_path.returned],
+        "smallest": {"waist": beam_path.smallest_waist[0], "radius": beam_path.smallest_waist[1]},
+        "range_effects": beam_path.range_effects,
+        "u_image": beam_path.u_image,
+        "laser": beam_path.laser,
     }
 
 
-def lines(found: BeamPath) -> Iterator[str]:
+def lines(beam_path: BeamPath) -> Iterator[str]:
     """The tables as lines of text.
 
-    found   a reduced beam train
+    beam_path   a reduced beam train
     """
-    yield f"{found.train.name}, reflector at {found.train.distance_m:g} m"
+    yield f"{beam_path.train.name}, reflector at {beam_path.train.distance_m:g} m"
     columns = (
         ("way", "radius x, y", "front R x, y", "aperture", "clipped", "power"),
         ("m", "mm", "m", "mm", "%", "mW"),
     )
     for words in columns:
         yield " " * 34 + " ".join(f"{word:>{width}}" for word, width in zip(words, WIDTHS, strict=True))
-    for place in found.places:
+    for place in beam_path.places:
         size = " ".join(f"{_cell(r / MILLIMETRE, '8.4f'):>8}" for r in place.radius)
         front = " ".join(f"{_front(c):>9}" for c in place.curvature)
         edge, lost = _cell(place.aperture / MILLIMETRE, ".2f"), _cell(100.0 * place.clipped, ".3g")
         power = _cell(place.power * 1e3, ".4f")
         yield f"{place.leg:<9} {place.name:<24.24} {place.way:9.3f} {size} {front} {edge:>9} {lost:>9} {power:>9}"
-    if found.status != "ok":
-        yield f"not known behind the reflector: {found.status}"
+    if beam_path.status != "ok":
+        yield f"not known behind the reflector: {beam_path.status}"
     yield f"{'distance, m':<12} {'radius x, y, mm':>17} {'hits, %':>10} {'collected, %':>13} {'detector, mW':>13}"
-    for row in found.returned:
+    for row in beam_path.returned:
         size = " ".join(f"{r / MILLIMETRE:8.3f}" for r in row.radius)
         got = f"{100 * row.collected:13.4f} {row.power * 1e3:13.5f}" if row.status == "ok" else f"  {row.status}"
         yield f"{row.distance:<12g} {size:>17} {100 * row.hit:10.4f} {got}"
-    waist, spot = (1e3 * v for v in found.smallest_waist)
+    waist, spot = (1e3 * v for v in beam_path.smallest_waist)
     yield f"smallest possible spot there: {spot:.3f} mm, from a waist of {waist:.3f} mm at the head"
-    for name, effect in found.range_effects.items():
+    for name, effect in beam_path.range_effects.items():
         yield f"range too long by {_cell(effect * 1e6, '.3f') or 'what is not known'} µm: {name}"
-    if np.isfinite(found.u_image):
-        yield f"u of the range from the image's place: {found.u_image * 1e6:.3f} µm"
-    for name, value in found.laser.items():
+    if np.isfinite(beam_path.u_image):
+        yield f"u of the range from the image's place: {beam_path.u_image * 1e6:.3f} µm"
+    for name, value in beam_path.laser.items():
         yield f"{name.replace('_', ' ')}: {f'{value * 1e6:.3f} µm' if name.startswith('range') else f'{value:.4g}'}"
 
 
-def write_beam(found: BeamPath, directory: Path, inputs: dict[str, str]) -> None:
+def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str]) -> None:
     """Tables, figure, object, and last the provenance with the hashes of the others.
 
-    found       a reduced beam train
+    beam_path   a reduced beam train
     directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      hashes of what was read
     """
     files: Files = {
-        "beam.csv": lambda: _places_csv(found),
-        "returned.csv": lambda: _returned_csv(found),
-        "beam.json": lambda: json_page(beam_object(found)),
-        "beam.svg": lambda: beam_figure(found),
+        "beam.csv": lambda: _places_csv(beam_path),
+        "returned.csv": lambda: _returned_csv(beam_path),
+        "beam.json": lambda: json_page(beam_object(beam_path)),
+        "beam.svg": lambda: beam_figure(beam_path),
     }
-    made = {"format": FORMAT, "made_by": "catseye beam", "settings": {"distance_m": found.train.distance_m}}
-    write_files(files, directory, {**made, **origin(datetime.now(UTC), inputs)})
+    provenance = {"format": FORMAT, "made_by": "catseye beam", "settings": {"distance_m": beam_path.train.distance_m}}
+    write_files(files, directory, {**provenance, **origin(datetime.now(UTC), inputs)})
 
 
-def _places_csv(found: BeamPath) -> str:
+def _places_csv(beam_path: BeamPath) -> str:
     header = "leg,name,way_m,radius_x_m,radius_y_m,curvature_x_per_m,curvature_y_per_m,aperture_m,clipped,power_w"
     rows = (
         (p.leg, p.name, *map(_exact, (p.way, *p.radius, *p.curvature, p.aperture, p.clipped, p.power)))
-        for p in found.places
+        for p in beam_path.places
     )
     return _table(header, rows)
 
 
-def _returned_csv(found: BeamPath) -> str:
+def _returned_csv(beam_path: BeamPath) -> str:
     header = "distance_m,radius_x_m,radius_y_m,hit,collected,power_w,status"
-    rows = ((*map(_exact, (r.distance, *r.radius, r.hit, r.collected, r.power)), r.status) for r in found.returned)
+    rows = ((*map(_exact, (r.distance, *r.radius, r.hit, r.collected, r.power)), r.status) for r in beam_path.returned)
     return _table(header, rows)
 
 

@@ -116,20 +116,21 @@ def _other(other: str, name: str, wavelength_um: float, height: float, air_group
     }
 
 
-def glass_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
     """The object's lines for a terminal, each (title, text)."""
-    own = found["prism"]
+    own = answer["prism"]
     rows = [
-        (found["name"], f"{found['what']}; {found['source']}, {_limits(found)}"),
-        ("air", f"phase index {found['phase_index']:.8f}, group index {found['group_index']:.8f} at "
-                f"{found['wavelength_um']:g} µm, relative to air as the notes take them"),
-        ("slopes", f"{found['phase_index_per_um']:+.5f} and {found['group_index_per_um']:+.5f} per µm"),
-        ("modulation", f"{found['group_wavelength'] * 1e3:.6f} mm at 1500 MHz, half of it "
-                       f"{found['group_wavelength'] * 5e2:.6f} mm"),
-        ("vacuum", f"phase index {found['absolute_phase_index']:.6f}, group index {found['absolute_group_index']:.6f} "
-                   f"at {found['temperature_c']:g} °C; {found['absolute_phase_index_per_c'] * 1e6:+.2f} and "
-                   f"{found['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
-        ("expansion", f"{found['expansion_per_c'] * 1e6:.1f} ppm per °C"),
+        (answer["name"], f"{answer['what']}; {answer['source']}, {_limits(answer)}"),
+        ("air", f"phase index {answer['phase_index']:.8f}, group index {answer['group_index']:.8f} at "
+                f"{answer['wavelength_um']:g} µm, relative to air as the notes take them"),
+        ("slopes", f"{answer['phase_index_per_um']:+.5f} and {answer['group_index_per_um']:+.5f} per µm"),
+        ("modulation", f"{answer['group_wavelength'] * 1e3:.6f} mm at 1500 MHz, half of it "
+                       f"{answer['group_wavelength'] * 5e2:.6f} mm"),
+        ("vacuum", f"phase index {answer['absolute_phase_index']:.6f}, group index "
+                   f"{answer['absolute_group_index']:.6f} at {answer['temperature_c']:g} °C; "
+                   f"{answer['absolute_phase_index_per_c'] * 1e6:+.2f} and "
+                   f"{answer['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
+        ("expansion", f"{answer['expansion_per_c'] * 1e6:.1f} ppm per °C"),
         ("prism", f"{own['height'] * 1e3:g} mm high in air of {own['air']}: range constant "
                   f"{own['range_constant'] * 1e3:.4f} mm ({own['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
                   f"{own['reference_depth'] * 1e3:.4f} mm below the face, "
@@ -138,15 +139,15 @@ def glass_rows(found: dict[str, Any]) -> list[tuple[str, str]]:
                       f"{own['group_index_over_air']:.6f}, range constant {own['notes_range_constant'] * 1e3:.4f} mm, "
                       f"{(own['notes_range_constant'] - own['range_constant']) * 1e6:+.1f} µm"),
     ]  # fmt: skip
-    for other, cost in found["others"].items():
-        said = "its formula does not reach this wavelength"
+    for other, cost in answer["others"].items():
+        text = "its formula does not reach this wavelength"
         if cost is not None:
-            said = (
-                f"group index {cost['group_index']:+.2e}; taken for {found['name']} a range is "
+            text = (
+                f"group index {cost['group_index']:+.2e}; taken for {answer['name']} a range is "
                 f"{cost['range_too_long_about_point'] * 1e6:.2f} µm too long "
                 f"({cost['range_too_long_about_face'] * 1e6:.2f} µm about the face)"
             )
-        rows.append((other, said))
+        rows.append((other, text))
     return rows
 
 
@@ -168,8 +169,8 @@ def table_object() -> dict[str, Any]:
     }
 
 
-def _limits(found: dict[str, Any]) -> str:
-    shortest, longest = found["limits_um"]
+def _limits(answer: dict[str, Any]) -> str:
+    shortest, longest = answer["limits_um"]
     return f"{shortest:g} to {longest:g} µm"
 
 

@@ -31,12 +31,12 @@ def corners(wavelength_um: float, glass: str) -> dict[str, Corner]:
     """The kinds that are compared, by what people call them."""
     glass_index = float(phase_index(wavelength_um, glass))
     metals = {metal: np.conj(complex(index(metal, wavelength_um))) for metal in METALS}  # there time runs backwards
-    found = {
+    corners = {
         f"{glass}, bare": solid_corner(glass_index),
         f"{glass}, aluminium behind": solid_corner(glass_index, metals["aluminium"]),
     }
-    found |= {f"hollow, {metal}": hollow_corner(behind) for metal, behind in metals.items()}
-    return found
+    corners |= {f"hollow, {metal}": hollow_corner(behind) for metal, behind in metals.items()}
+    return corners
 
 
 def polarization_plot(wavelength_um: float = 0.780, glass: str = "BK7-old") -> tuple[str, dict[str, Any]]:
@@ -105,8 +105,8 @@ def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
         ax.plot(*path, color=SERIES[0], lw=1.4)
         ax.annotate("", path[:, 8], path[:, 0], arrowprops={"arrowstyle": "->", "color": SERIES[0], "lw": 1.4})
         tilt, turning = ellipse(field)
-        said = f"{np.degrees(tilt):+.0f}°, {np.degrees(turning):+.0f}°"
-        ax.text(*(-1.22 * entry), said, ha="center", va="center", fontsize=7.5, color=INK)
+        angles = f"{np.degrees(tilt):+.0f}°, {np.degrees(turning):+.0f}°"
+        ax.text(*(-1.22 * entry), angles, ha="center", va="center", fontsize=7.5, color=INK)
     ax.annotate("", (0.16, 0.0), (-0.16, 0.0), arrowprops={"arrowstyle": "<->", "color": SERIES[1], "lw": 1.6})
     ax.set_xlim(-1.6, 1.6)
     ax.set_ylim(-1.4, 1.4)

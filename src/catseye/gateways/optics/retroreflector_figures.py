@@ -87,16 +87,16 @@ def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, An
         left.set(xlim=(0, FARTHEST_DEG), ylim=(0, 1), xlabel="incidence (°)", ylabel="share of the light on the face")
         left.set_title("What returns")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=3)
-        seen = incidence <= 45.0 * DEGREE
-        _draw_change(right, angles[seen], incidence[seen], solid, given)
+        drawn = incidence <= 45.0 * DEGREE
+        _draw_change(right, angles[drawn], incidence[drawn], solid, given)
         text = svg(figure)
-    told = {
+    summary = {
         "half_of_normal_at_deg": half,
         "total_reflection_to_deg": solid.acceptance / DEGREE,
         "ball_whole_to_deg": ball.acceptance / DEGREE,
         "appendix_b_less_two_indices_at_30_deg": float(_appendix_b(given, solid, np.array(30.0 * DEGREE))),
     }
-    return text, told
+    return text, summary
 
 
 def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float = 0.010) -> tuple[str, dict[str, Any]]:
@@ -138,7 +138,7 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
         figure.legend(*path.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         collected = _draw_light(light, ball, beam_radius)
         text = svg(figure)
-    told = {
+    summary = {
         "range_constant": ball.range_constant,
         "mean_path_change": ball.mean_path_change(beam_radius),
         "blur": ball.blur(beam_radius),
@@ -148,7 +148,7 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
         "mean_path_change_at_best_r2": best.mean_path_change(beam_radius),
         "collected_share": collected,
     }
-    return text, told
+    return text, summary
 
 
 def _falls_to_half(angles: Any, share: Any) -> float | None:

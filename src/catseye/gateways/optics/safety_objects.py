@@ -130,7 +130,7 @@ def _returned(asked: Question) -> dict[str, Any] | None:
         return returned_power(asked.beam, distance, aperture=aperture, **size)
 
     limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, asked.edition)
-    times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda found: found[0])
+    times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda row: row[0])
     return {
         "distance": distance,
         "diameter": asked.reflector_diameter,
@@ -142,34 +142,34 @@ def _returned(asked: Question) -> dict[str, Any] | None:
     }
 
 
-def safety_passages(told: dict[str, Any]) -> list[tuple[str, str]]:
+def safety_passages(answer: dict[str, Any]) -> list[tuple[str, str]]:
     """The same in words: title and text."""
     passages = [
-        ("Class", f"{told['class']} by {told['edition']}" + _disagreement(told)),
-        *(("", reason) for reason in told["reasons"]),
-        ("Eye", f"{told['mpe_eye']:.4g} W/m² for {told['duration']:g} s ({told['mpe_eye_protects_from']})"),
-        ("Skin", f"{told['mpe_skin']:.4g} W/m²; exceeded {_as_far(told['skin_hazard_distance'])}"),
-        ("Hazard", f"naked eye {_as_far(told['nohd'])}; through 7x50 binoculars {_as_far(told['nohd_aided'])}"),
+        ("Class", f"{answer['class']} by {answer['edition']}" + _disagreement(answer)),
+        *(("", reason) for reason in answer["reasons"]),
+        ("Eye", f"{answer['mpe_eye']:.4g} W/m² for {answer['duration']:g} s ({answer['mpe_eye_protects_from']})"),
+        ("Skin", f"{answer['mpe_skin']:.4g} W/m²; exceeded {_as_far(answer['skin_hazard_distance'])}"),
+        ("Hazard", f"naked eye {_as_far(answer['nohd'])}; through 7x50 binoculars {_as_far(answer['nohd_aided'])}"),
     ]
-    if told["class"] in ("1", "2") and told["nohd"] > 0.0:
+    if answer["class"] in ("1", "2") and answer["nohd"] > 0.0:
         passages.append(
-            ("", f"class {told['class']}, and yet within that distance more than the limit for this exposure")
+            ("", f"class {answer['class']}, and yet within that distance more than the limit for this exposure")
         )
-    if told["subtense"] > ALPHA_MIN:
-        seen = f"distances are for a source that looks {told['subtense'] * 1e3:g} mrad wide from everywhere"
+    if answer["subtense"] > ALPHA_MIN:
+        width = f"distances are for a source that looks {answer['subtense'] * 1e3:g} mrad wide from everywhere"
         passages.append(
-            ("", f"{seen}; one of a fixed size looks smaller farther away, and is a hazard farther than that")
+            ("", f"{width}; one of a fixed size looks smaller farther away, and is a hazard farther than that")
         )
-    if told["hazard_from"] > 0.0:
-        passages.append(("", f"{told['viewer']}: only from {told['hazard_from']:.3g} m on, about the waist"))
-    if scan := told["scan"]:
+    if answer["hazard_from"] > 0.0:
+        passages.append(("", f"{answer['viewer']}: only from {answer['hazard_from']:.3g} m on, about the waist"))
+    if scan := answer["scan"]:
         often = "one pass" if scan["period"] is None else f"a pass every {scan['period']:g} s"
-        far = f"{told['viewer']} {_as_far(scan['hazard_distance'])}"
+        far = f"{answer['viewer']} {_as_far(scan['hazard_distance'])}"
         text = f"at {scan['rate']:g} rad/s, {often}: {far}; counts only where nothing can stop the sweep"
         passages.append(("Sweeping", text))
-    if back := told["returned"]:
+    if back := answer["returned"]:
         where = f"by {back['diameter'] * 1e3:g} mm at {back['distance']:g} m"
-        power = f"{back['power_into_eye'] * 1e3:.3g} mW through the pupil ({told['viewer']})"
+        power = f"{back['power_into_eye'] * 1e3:.3g} mW through the pupil ({answer['viewer']})"
         passages.append(
             (
                 "Sent back",
@@ -179,19 +179,19 @@ def safety_passages(told: dict[str, Any]) -> list[tuple[str, str]]:
     return passages
 
 
-def safety_table(told: dict[str, Any]) -> str:
+def safety_table(answer: dict[str, Any]) -> str:
     """The table of durations as text."""
     head = f"{'exposure':>10} {'eye W/m²':>10} {'skin W/m²':>10} {'naked eye':>12} {'binoculars':>12} {'skin':>9}"
     rows = [
         f"{row['duration']:>8g} s {row['mpe_eye']:>10.4g} {row['mpe_skin']:>10.4g} {row['nohd']:>10.4g} m "
         f"{row['nohd_aided']:>10.4g} m {row['skin_hazard_distance']:>7.3g} m"
-        for row in told["what_if"]
+        for row in answer["what_if"]
     ]
     return "\n".join((head, *rows))
 
 
-def _disagreement(told: dict[str, Any]) -> str:
-    differs = [f"{name}: {found}" for name, found in told["class_by_edition"].items() if found != told["class"]]
+def _disagreement(answer: dict[str, Any]) -> str:
+    differs = [f"{name}: {class_}" for name, class_ in answer["class_by_edition"].items() if class_ != answer["class"]]
     return f" ({', '.join(differs)})" if differs else ""
 
 

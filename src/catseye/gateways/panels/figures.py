@@ -31,9 +31,9 @@ def _views(work: "PanelWork") -> list[tuple[str, "PanelHeights"]]:
     return [("as found", work.found)] + ([] if work.left is None else [("as left", work.left)])
 
 
-def _quads(found: "PanelHeights", shrink: float = 0.0) -> np.ndarray:
+def _quads(heights: "PanelHeights", shrink: float = 0.0) -> np.ndarray:
     """(p, 4, 4, 2) m, the quarter of each panel that belongs to each of its corners."""
-    four = found.layout.xy[found.layout.quad]
+    four = heights.layout.xy[heights.layout.quad]
     middle = four.mean(axis=1, keepdims=True)
     before, after = 0.5 * (four + np.roll(four, 1, axis=1)), 0.5 * (four + np.roll(four, -1, axis=1))
     quarter = np.stack([before, four, after, np.broadcast_to(middle, four.shape)], axis=2)
@@ -46,10 +46,10 @@ def _patches(ax: Any, outlines: np.ndarray, values: np.ndarray, limit: float) ->
     known = np.isfinite(values)
     if not known.all():
         ax.add_collection(PolyCollection(list(outlines[~known]), facecolor="#e9edf0", edgecolor="none"))
-    seen = PolyCollection(list(outlines[known]), array=values[known], cmap="RdBu_r", edgecolor="face", linewidth=0.1)
-    seen.set_clim(-limit, limit)
-    seen.set_rasterized(True)  # thousands of pieces: as a picture a tenth of the size
-    ax.add_collection(seen)
+    patches = PolyCollection(list(outlines[known]), array=values[known], cmap="RdBu_r", edgecolor="face", linewidth=0.1)
+    patches.set_clim(-limit, limit)
+    patches.set_rasterized(True)  # thousands of pieces: as a picture a tenth of the size
+    ax.add_collection(patches)
     low, high = outlines.reshape(-1, 2).min(axis=0), outlines.reshape(-1, 2).max(axis=0)
     pad = 0.02 * float(np.max(high - low))
     ax.set_xlim(low[0] - pad, high[0] + pad)
@@ -58,7 +58,7 @@ def _patches(ax: Any, outlines: np.ndarray, values: np.ndarray, limit: float) ->
     ax.grid(False)
     ax.set_xlabel("x (m)")
     ax.set_ylabel("y from the vertex (m)")
-    return seen
+    return patches
 
 
 def _limit(values: np.ndarray) -> float:
@@ -70,36 +70,36 @@ def _corners(work: "PanelWork") -> Figure:
     views = _views(work)
     wide = _shape(work.found)
     figure = Figure(figsize=(9.4, (9.0 if len(views) == 1 else 4.6) / max(wide, 0.7) + 0.7), layout="constrained")
-    for ax, (name, found) in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        values = found.relative * 1e6
+    for ax, (name, heights) in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        values = heights.relative * 1e6
         limit = _limit(values)
-        quarters = _quads(found).reshape(-1, 4, 2)
-        seen = _patches(ax, quarters, values.ravel(), limit)
+        quarters = _quads(heights).reshape(-1, 4, 2)
+        patches = _patches(ax, quarters, values.ravel(), limit)
         ax.set_title(name)
-        bar = figure.colorbar(seen, ax=ax, orientation="horizontal", shrink=0.8, extend="both", pad=0.02)
+        bar = figure.colorbar(patches, ax=ax, orientation="horizontal", shrink=0.8, extend="both", pad=0.02)
         bar.set_label("corner over its neighbours' mean (µm)")
     return figure
 
 
-def _shape(found: "PanelHeights") -> float:
+def _shape(heights: "PanelHeights") -> float:
     """Width over height of what is drawn."""
-    size = np.ptp(found.layout.xy, axis=0)
+    size = np.ptp(heights.layout.xy, axis=0)
     return float(np.clip(size[0] / max(size[1], 1e-9), 0.5, 3.0))
 
 
-def _surface(found: "PanelHeights") -> Figure:
-    wide = _shape(found)
+def _surface(heights: "PanelHeights") -> Figure:
+    wide = _shape(heights)
     figure = Figure(figsize=(9.4, 4.6 / max(wide, 0.7) + 0.7), layout="constrained")
     left, right = figure.subplots(1, 2)
-    rms, rest = surface_rms(found, found.departure)
+    rms, rest = surface_rms(heights, heights.departure)
     values = rest.mean(axis=1) * 1e6
-    outline = found.layout.xy[found.layout.quad]
-    seen = _patches(left, outline, values, _limit(values))
+    outline = heights.layout.xy[heights.layout.quad]
+    patches = _patches(left, outline, values, _limit(values))
     left.set_title(f"Panels' mean departure, {rms * 1e6:.0f} µm rms of corners")
-    figure.colorbar(seen, ax=left, orientation="horizontal", shrink=0.8, extend="both", pad=0.02).set_label(
+    figure.colorbar(patches, ax=left, orientation="horizontal", shrink=0.8, extend="both", pad=0.02).set_label(
         "from the best fit, towards the focus (µm)"
     )
-    u = found.u_fit[:, 0] * 1e6
+    u = heights.u_fit[:, 0] * 1e6
     from matplotlib.collections import PolyCollection
 
     spread = PolyCollection(list(outline), array=u, cmap="viridis", edgecolor="face", linewidth=0.1, rasterized=True)
@@ -121,12 +121,12 @@ def _lie(work: "PanelWork") -> Figure:
     figure = Figure(figsize=(9.4, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     goal = work.sheet.goal_um
-    for (name, found), colour in zip(_views(work), SERIES, strict=False):
-        size = np.sort(np.abs(found.relative[found.known])) * 1e6
+    for (name, heights), colour in zip(_views(work), SERIES, strict=False):
+        size = np.sort(np.abs(heights.relative[heights.known])) * 1e6
         if len(size):
             left.step(np.maximum(size, 0.1), np.arange(1, len(size) + 1) / len(size), color=colour, label=name)
         right.hist(
-            np.clip(found.u_relative[found.known] * 1e6, 0.0, 2.0 * goal), np.linspace(0.0, 2.0 * goal, 51),
+            np.clip(heights.u_relative[heights.known] * 1e6, 0.0, 2.0 * goal), np.linspace(0.0, 2.0 * goal, 51),
             color=colour, histtype="step", lw=1.3, label=name,
         )  # fmt: skip
     left.axvline(goal, color=BAD, lw=1.0, label=f"goal {goal:g} µm")
@@ -148,10 +148,10 @@ def _control(work: "PanelWork") -> Figure:
     views = _views(work)
     figure = Figure(figsize=(9.4, 2.9 * len(views) + 0.3), layout="constrained")
     panels = figure.subplots(len(views), 2, squeeze=False, gridspec_kw={"width_ratios": (2.4, 1.0)})
-    for (days, people), (name, found) in zip(panels, views, strict=True):
+    for (days, people), (name, heights) in zip(panels, views, strict=True):
         for ax, readers, title in (
-            (days, sessions(found), f"Sessions {name}"),
-            (people, members(found), f"Members {name}"),
+            (days, sessions(heights), f"Sessions {name}"),
+            (people, members(heights), f"Members {name}"),
         ):
             at = np.arange(len(readers))
             value = np.array([r.variance_factor for r in readers])

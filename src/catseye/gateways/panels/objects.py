@@ -37,9 +37,9 @@ class Screw(NamedTuple):
     verdict: str
 
 
-def screws(found: "PanelHeights") -> Iterable[Screw]:
+def screws(heights: "PanelHeights") -> Iterable[Screw]:
     """Every panel corner of the panels read, in the layout's order."""
-    layout, verdict = found.layout, verdicts(found)
+    layout, verdict = heights.layout, verdicts(heights)
     for i, panel in enumerate(layout.panels):
         for k in range(4):
             c = layout.quad[i, k]
@@ -48,14 +48,14 @@ def screws(found: "PanelHeights") -> Iterable[Screw]:
                 layout.corners[c],
                 float(layout.xy[c, 0]),
                 float(layout.xy[c, 1]),
-                int(found.times[i, k]),
-                float(found.departure[i, k]),
-                float(found.u_departure[i, k]),
-                float(found.relative[i, k]),
-                float(found.u_relative[i, k]),
-                float(found.conforms[i, k]),
-                float(found.turns[i, k]),
-                float(found.u_turns[i, k]),
+                int(heights.times[i, k]),
+                float(heights.departure[i, k]),
+                float(heights.u_departure[i, k]),
+                float(heights.relative[i, k]),
+                float(heights.u_relative[i, k]),
+                float(heights.conforms[i, k]),
+                float(heights.turns[i, k]),
+                float(heights.u_turns[i, k]),
                 str(verdict[i, k]),
             )
 
@@ -68,8 +68,8 @@ def panels_object(work: "PanelWork") -> dict[str, Any]:
         "instrument": {"name": work.sheet.name, "serial": work.sheet.serial},
         "layout": {"panels": len(work.layout.panels), "corners": len(work.layout.corners)},
         "goal": work.sheet.goal_um * 1e-6,
-        "as_found": _told(work.found),
-        "as_left": None if work.left is None else _told(work.left),
+        "as_found": _heights_object(work.found),
+        "as_left": None if work.left is None else _heights_object(work.left),
         "setting": None if work.setting is None else _setting_object(work.setting),
         "screws_from": "as_found" if work.left is None else "as_left",
         "screws": [screw._asdict() for screw in screws(last)],
@@ -88,20 +88,20 @@ def panels_object(work: "PanelWork") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _told(found: "PanelHeights") -> dict[str, Any]:
+def _heights_object(heights: "PanelHeights") -> dict[str, Any]:
     return {
-        "panels": len(found.layout.panels),
-        "placements": int(np.sum(found.readings.corner >= 0)),
-        "readings": int(sum(f.active.sum() for f in found.solution.fits[: len(found.model.blocks)])),
-        "standing": asdict(standing(found)),
-        "surface_rms": surface_rms(found, found.departure)[0],
-        "surveyed": found.surveyed,
-        "variance_factor": found.variance_factor,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "members": [_reader_object(r) for r in members(found)],
-        "sessions": [_reader_object(r) for r in sessions(found)],
-        "zeros": {name: {"zero": value, "u": u} for name, value, u in zeros(found)},
-        "doubts": [asdict(d) for d in found.doubts],
+        "panels": len(heights.layout.panels),
+        "placements": int(np.sum(heights.readings.corner >= 0)),
+        "readings": int(sum(f.active.sum() for f in heights.solution.fits[: len(heights.model.blocks)])),
+        "standing": asdict(standing(heights)),
+        "surface_rms": surface_rms(heights, heights.departure)[0],
+        "surveyed": heights.surveyed,
+        "variance_factor": heights.variance_factor,
+        "degrees_of_freedom": heights.degrees_of_freedom,
+        "members": [_reader_object(r) for r in members(heights)],
+        "sessions": [_reader_object(r) for r in sessions(heights)],
+        "zeros": {name: {"zero": value, "u": u} for name, value, u in zeros(heights)},
+        "doubts": [asdict(d) for d in heights.doubts],
     }
 
 
@@ -149,22 +149,22 @@ def doubt_text(one: "Doubt") -> str:
 
 def passages(work: "PanelWork") -> list[Passage]:
     """What the command tells people."""
-    found, last = work.found, work.latest
+    heights, last = work.found, work.latest
     goal = work.sheet.goal_um
-    told = [
+    passages = [
         Passage(
             "The tool",
-            f"{work.sheet.name}, serial {work.sheet.serial}: {int(np.sum(found.readings.corner >= 0))} placements in "
-            f"{len(found.readings.sessions)} sessions on {len(found.layout.panels)} panels; variance factor "
-            f"{found.variance_factor:.3f} with {found.degrees_of_freedom:.0f} degrees of freedom",
+            f"{work.sheet.name}, serial {work.sheet.serial}: {int(np.sum(heights.readings.corner >= 0))} placements in "
+            f"{len(heights.readings.sessions)} sessions on {len(heights.layout.panels)} panels; variance factor "
+            f"{heights.variance_factor:.3f} with {heights.degrees_of_freedom:.0f} degrees of freedom",
         ),
-        Passage("As found", standing_text(standing(found), goal)),
+        Passage("As found", standing_text(standing(heights), goal)),
     ]
     if work.left is not None:
-        told.append(Passage("As left", standing_text(standing(work.left), goal)))
+        passages.append(Passage("As left", standing_text(standing(work.left), goal)))
     if work.setting is not None:
         done = work.setting
-        told.append(
+        passages.append(
             Passage(
                 "The turning",
                 f"{len(done.names)} corners moved {done.gain:.3f} (u {done.u_gain:.3f}) of what was asked; scatter "
@@ -174,7 +174,7 @@ def passages(work: "PanelWork") -> list[Passage]:
     verdict = verdicts(last)
     turn = verdict == "turn"
     largest = float(np.nanmax(np.abs(last.turns), initial=0.0)) if last.known.any() else 0.0
-    told.append(
+    passages.append(
         Passage(
             "The screws",
             f"turn {int(turn.sum())}, leave {int((verdict == 'leave').sum())}, read first "
@@ -183,14 +183,14 @@ def passages(work: "PanelWork") -> list[Passage]:
         )
     )
     rms = surface_rms(last, last.departure)[0]
-    told.append(
+    passages.append(
         Passage(
             "The surface",
             f"panel corners depart {rms * 1e6:.0f} µm rms from the best fit of the design, shift and tilt free"
             + ("" if last.surveyed else "; without a survey this says little"),
         )
     )
-    for when, one in (("found", found), ("left", work.left)):
-        told += [Passage(f"Doubt, {when}", doubt_text(d)) for d in (() if one is None else one.doubts[:5])]
-    told += [Passage("Note", note) for note in work.notes]
-    return told
+    for when, one in (("found", heights), ("left", work.left)):
+        passages += [Passage(f"Doubt, {when}", doubt_text(d)) for d in (() if one is None else one.doubts[:5])]
+    passages += [Passage("Note", note) for note in work.notes]
+    return passages

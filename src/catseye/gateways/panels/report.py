@@ -53,8 +53,8 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
         "panels.json": lambda: json_page(panels_object(work)),
         "report.html": lambda: panels_report(work, when),
     }
-    made = {"format": FORMAT, "made_by": "catseye panels"}
-    write_files(files, directory, {**made, **origin(when, work.inputs)}, progress)
+    provenance = {"format": FORMAT, "made_by": "catseye panels"}
+    write_files(files, directory, {**provenance, **origin(when, work.inputs)}, progress)
     join_tables(directory, frame="of each corner or panel: z the normal towards the focus")
 
 
@@ -74,12 +74,12 @@ def panels_report(work: "PanelWork", when: datetime) -> str:
         f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div><nav>{links}</nav></header>"
     )
     drawn = panel_figures(work)
-    told = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(work))
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(work))
     figures = {name: picture(drawn[name], text) for name, text in CAPTIONS.items() if name in drawn}
     body = [
         header,
         _cards(work),
-        section("result", "Result", f"<dl>{told}</dl>", *(figures[n] for n in ("corners", "lie", "surface"))),
+        section("result", "Result", f"<dl>{words}</dl>", *(figures[n] for n in ("corners", "lie", "surface"))),
         section("screws", "Screws", _screws(work)),
         section("crew", "Crew", *(figures[n] for n in ("turning", "control") if n in figures), _crew(work)),
         section("doubts", "Readings in doubt", _doubts(work)),
@@ -96,10 +96,10 @@ def panels_report(work: "PanelWork", when: datetime) -> str:
 def _cards(work: "PanelWork") -> str:
     goal = work.sheet.goal_um
     cards = []
-    for name, found in (("As found", work.found), ("As left", work.left)):
-        if found is None:
+    for name, heights in (("As found", work.found), ("As left", work.left)):
+        if heights is None:
             continue
-        one = standing(found)
+        one = standing(heights)
         cards.append(
             card(name, f"{micrometres(one.rms)} µm rms", f"{one.corners} corners about their neighbours' mean")
         )
@@ -118,17 +118,17 @@ def _screws(work: "PanelWork") -> str:
     if not cells:
         return paragraph("No screw needs a turn.")
     columns = ("corner", "panel", "height (µm)", "u (µm)", "turns", "degrees", "within the goal (probability)")
-    told = f"The {len(cells)} largest of {len(rows)} turns; clockwise above zero. All are in screws.csv."
-    return paragraph(told) + table(columns, cells, "ttnnnnn")
+    note = f"The {len(cells)} largest of {len(rows)} turns; clockwise above zero. All are in screws.csv."
+    return paragraph(note) + table(columns, cells, "ttnnnnn")
 
 
 def _crew(work: "PanelWork") -> str:
     parts = []
-    for name, found in (("as found", work.found), ("as left", work.left)):
-        if found is None:
+    for name, heights in (("as found", work.found), ("as left", work.left)):
+        if heights is None:
             continue
-        parts.append(f"<h3>{escape(name.capitalize())}</h3>{_readers(members(found), 'member')}")
-        parts.append(folded(f"Sessions {name}", _readers(sessions(found), "session")))
+        parts.append(f"<h3>{escape(name.capitalize())}</h3>{_readers(members(heights), 'member')}")
+        parts.append(folded(f"Sessions {name}", _readers(sessions(heights), "session")))
     return "".join(parts)
 
 
@@ -156,8 +156,8 @@ def _readers(readers: list["Reader"], kind: str) -> str:
 
 def _doubts(work: "PanelWork") -> str:
     parts = []
-    for name, found in (("as found", work.found), ("as left", work.left)):
-        if found is not None and found.doubts:
-            rows = [(d.where, d.corner, doubt_text(d)) for d in found.doubts]
+    for name, heights in (("as found", work.found), ("as left", work.left)):
+        if heights is not None and heights.doubts:
+            rows = [(d.where, d.corner, doubt_text(d)) for d in heights.doubts]
             parts.append(f"<h3>{escape(name.capitalize())}</h3>" + table(("place", "corner", "what"), rows, "ttw"))
     return "".join(parts) or paragraph("No reading is contradicted by the others beyond what chance does.")

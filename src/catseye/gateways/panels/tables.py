@@ -23,25 +23,25 @@ READINGS = (
 )  # fmt: skip
 
 
-def screws_csv(found: "PanelHeights") -> str:
+def screws_csv(heights: "PanelHeights") -> str:
     """Every screw of the panels read: where its corner is, and how to turn it."""
     rows = [
         (s.panel, s.corner, f"{s.x:.4f}", f"{s.y:.4f}", s.readings, _um(s.departure), _um(s.u_departure),
          _um(s.relative), _um(s.u_relative), cell(s.probability_within, ".4f"), cell(s.turns, "+.3f"),
          cell(s.u_turns, ".3f"), s.verdict)
-        for s in screws(found)
+        for s in screws(heights)
     ]  # fmt: skip
     return csv_text(SCREWS, rows)
 
 
-def actuators_csv(found: "PanelHeights") -> str:
+def actuators_csv(heights: "PanelHeights") -> str:
     """Every corner read: mean departure of its panels, which the actuator takes away, and the shaft's height."""
-    at = found.model.columns
-    shaft, u_shaft = found.value(at.shaft(np.arange(len(found.layout.corners))))
+    at = heights.model.columns
+    shaft, u_shaft = heights.value(at.shaft(np.arange(len(heights.layout.corners))))
     rows = [
-        (name, f"{found.layout.xy[c, 0]:.4f}", f"{found.layout.xy[c, 1]:.4f}", _um(found.actuator[c]),
-         _um(found.u_actuator[c]), _um(shaft[c]), _um(u_shaft[c]))
-        for c, name in enumerate(found.layout.corners) if np.isfinite(found.actuator[c])
+        (name, f"{heights.layout.xy[c, 0]:.4f}", f"{heights.layout.xy[c, 1]:.4f}", _um(heights.actuator[c]),
+         _um(heights.u_actuator[c]), _um(shaft[c]), _um(u_shaft[c]))
+        for c, name in enumerate(heights.layout.corners) if np.isfinite(heights.actuator[c])
     ]  # fmt: skip
     columns = ("corner", "x_m", "y_m", "mean_height_um", "u_mean_height_um", "shaft_height_um", "u_shaft_height_um")
     return csv_text(columns, rows)
@@ -49,13 +49,13 @@ def actuators_csv(found: "PanelHeights") -> str:
 
 def panels_csv(work: "PanelWork") -> str:
     """Every panel read: the best fit's piston and slopes, and what its map says."""
-    found = work.latest
+    heights = work.latest
     rows = []
-    for p, name in enumerate(found.layout.panels):
+    for p, name in enumerate(heights.layout.panels):
         fitted = work.maps.get(name)
         rows.append(
-            (name, _um(found.fit[p, 0]), _um(found.u_fit[p, 0]), *(_um(v) for v in found.fit[p, 1:]),
-             *(_um(v) for v in found.u_fit[p, 1:]), "" if fitted is None else _um(fitted.rms),
+            (name, _um(heights.fit[p, 0]), _um(heights.u_fit[p, 0]), *(_um(v) for v in heights.fit[p, 1:]),
+             *(_um(v) for v in heights.u_fit[p, 1:]), "" if fitted is None else _um(fitted.rms),
              "" if fitted is None else int(fitted.outlying.sum()))
         )  # fmt: skip
     columns = (
@@ -65,18 +65,18 @@ def panels_csv(work: "PanelWork") -> str:
     return csv_text(columns, rows)
 
 
-def readings_csv(found: "PanelHeights") -> str:
+def readings_csv(heights: "PanelHeights") -> str:
     """Every reading with its residual and test."""
-    told, readings = found.model.tips, found.readings
+    tips, readings = heights.model.tips, heights.readings
     rows: list[Sequence[Any]] = []
-    for fit, block in zip(found.solution.fits, found.model.blocks, strict=False):
+    for fit, block in zip(heights.solution.fits, heights.model.blocks, strict=False):
         for k, tip in enumerate(block):
-            row, gauge = told.row[tip], told.gauge[tip]
+            row, gauge = tips.row[tip], tips.gauge[tip]
             rows.append(
-                (readings.where[row], found.layout.corners[told.corner[tip]], found.layout.panels[told.panel[tip]],
+                (readings.where[row], heights.layout.corners[tips.corner[tip]], heights.layout.panels[tips.panel[tip]],
                  readings.sessions[readings.session[row]], readings.member[row], readings.turn[row],
-                 found.sheet.gauge[gauge].name, f"{readings.reading[row, gauge] / MILLIMETRE:.3f}",
-                 _um(told.rise[tip]), _um(fit.residual[k]), cell(fit.standardised[k], "+.2f"),
+                 heights.sheet.gauge[gauge].name, f"{readings.reading[row, gauge] / MILLIMETRE:.3f}",
+                 _um(tips.rise[tip]), _um(fit.residual[k]), cell(fit.standardised[k], "+.2f"),
                  cell(fit.redundancy[k], ".3f"), "used" if fit.active[k] else "left out")
             )  # fmt: skip
     rows.sort(key=lambda r: (int(r[0].split()[1]), r[6]))
@@ -88,10 +88,10 @@ def crew_csv(work: "PanelWork") -> str:
     from catseye.reduction.panels.crew import members, sessions
 
     rows = []
-    for when, found in (("as found", work.found), ("as left", work.left)):
-        if found is None:
+    for when, heights in (("as found", work.found), ("as left", work.left)):
+        if heights is None:
             continue
-        for kind, readers in (("member", members(found)), ("session", sessions(found))):
+        for kind, readers in (("member", members(heights)), ("session", sessions(heights))):
             rows += [
                 (when, kind, r.name, r.readings, cell(r.degrees_of_freedom, ".1f"), cell(r.variance_factor, ".4f"),
                  cell(r.low, ".4f"), cell(r.high, ".4f"), _um(r.u_gauge), r.doubts, *(_um(v) for v in r.closure))

@@ -13,20 +13,20 @@ NAMED = 14  # points up to which each is named
 LENGTH = 0.12  # of the group's size, drawn for the largest residual
 
 
-def pose_figures(found: PoseResult) -> dict[str, str]:
+def pose_figures(result: PoseResult) -> dict[str, str]:
     """Every figure of the report by its name."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        drawn = {"residuals": svg(_residuals(found))}
-        if found.beam is not None:
-            drawn["terms"] = svg(_terms(found.beam))
+        drawn = {"residuals": svg(_residuals(result))}
+        if result.beam is not None:
+            drawn["terms"] = svg(_terms(result.beam))
         return drawn
 
 
-def _residuals(found: PoseResult) -> Figure:
+def _residuals(result: PoseResult) -> Figure:
     """Arrows in the two longer extents of the group, colour across them."""
-    pose, places = found.pose.pose, found.pose.places
+    pose, places = result.pose.pose, result.pose.places
     residual = pose.motion.residual / MILLIMETRE
     extent = np.ptp(places, axis=0)
     i, j = sorted(np.argsort(-extent, kind="stable")[:2].tolist())

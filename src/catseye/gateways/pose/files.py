@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import FORMAT, PoseResult, beam_rows, pose_result_object, pose_rows, pose_words
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.reduction.pose.pointing_offsets import PointingOffset
 
 HEADER = (
     "point",
@@ -32,23 +34,23 @@ HEADER = (
 )
 
 
-def write_pose(found: PoseResult, directory: Path, inputs: Mapping[str, str], settings: Mapping[str, Any]) -> None:
+def write_pose(result: PoseResult, directory: Path, inputs: Mapping[str, str], settings: Mapping[str, Any]) -> None:
     """Every file, and last the provenance.
 
-    found       a pose
+    result      a pose
     directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name
     settings    what was asked for
     """
     when = datetime.now(UTC)
     files: Files = {
-        "points.csv": lambda: points_csv(found),
-        "pose.json": lambda: json_page(pose_result_object(found)),
-        "report.html": lambda: pose_report(found, when, inputs),
+        "points.csv": lambda: points_csv(result),
+        "pose.json": lambda: json_page(pose_result_object(result)),
+        "report.html": lambda: pose_report(result, when, inputs),
     }
-    made = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
-    write_files(files, directory, {**made, **origin(when, inputs)})
-    pose = found.pose.pose
+    provenance = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
+    write_files(files, directory, {**provenance, **origin(when, inputs)})
+    pose = result.pose.pose
     pivot = f"{', '.join(f'{v:.6f}' for v in pose.pivot)} m"
     six = SamplerTable(
         "POSE",
@@ -64,47 +66,39 @@ def write_pose(found: PoseResult, directory: Path, inputs: Mapping[str, str], se
     join_tables(directory, frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
-def points_csv(found: PoseResult) -> str:
+def points_csv(result: PoseResult) -> str:
     """Each point: first place, what the pose moves it by, what is left, its largest |w|."""
-    pose, places = found.pose.pose, found.pose.places
+    pose, places = result.pose.pose, result.pose.places
     moved, _ = pose.displacement(places)
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(HEADER)
     for name, x, d, r, w in zip(pose.names, places, moved, pose.motion.residual, pose.w, strict=True):
-        told = [*(f"{v:.6f}" for v in x), *(f"{v / MILLIMETRE:.4f}" for v in (*d, *r))]
-        writer.writerow([name, *told, f"{w:.2f}" if np.isfinite(w) else ""])
+        lengths = [*(f"{v:.6f}" for v in x), *(f"{v / MILLIMETRE:.4f}" for v in (*d, *r))]
+        writer.writerow([name, *lengths, f"{w:.2f}" if np.isfinite(w) else ""])
     return stream.getvalue()
 
 
-def pose_report(found: PoseResult, when: datetime, inputs: Mapping[str, str]) -> str:
+def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page of a pose, HTML."""
     from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
 
-    drawn = pose_figures(found)
-    group, pose = found.pose, found.pose.pose
+    drawn = pose_figures(result)
+    group = result.pose
     title = f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}"
     header = (
         f"<header><h1>{escape(title)}</h1>"
         f'<div class="faint">fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; second = '
         f"pivot + translation + rotation (first − pivot), turns right-handed</div></header>"
     )
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(found))
-    cards = [
-        card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
-        for k in range(3)
-    ] + [
-        card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
-        for k in range(3)
-    ]
-    kinds = "tnnt"
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
     body = [
         header,
-        section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
+        section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
         section(
             "pose",
             "Six degrees of freedom",
-            table(("component", "value", "u", "unit"), pose_rows(found), kinds),
+            table(("component", "value", "u", "unit"), pose_rows(result), "tnnt"),
             paragraph("The full covariance is in pose.json; about another pivot, in another frame it follows exactly."),
         ),
         section(
@@ -117,20 +111,8 @@ def pose_report(found: PoseResult, when: datetime, inputs: Mapping[str, str]) ->
             ),
         ),
     ]
-    if found.beam is not None:
-        terms = [
-            (name, *(f"{part[k] / (ARCSECOND if k < 2 else MILLIMETRE):+.3f}" for k in range(3)))
-            for name, part in found.beam.terms.items()
-        ]
-        body.append(
-            section(
-                "pointing",
-                "Beam and focus",
-                table(("component", "value", "u", "unit"), beam_rows(found.beam), kinds),
-                picture(drawn["terms"], "What the pointing offset is made of; a correction is its opposite."),
-                table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
-            )
-        )
+    if result.beam is not None:
+        body.append(_beam_section(result.beam, drawn["terms"]))
     facts = [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()]
     body.append(
         section(
@@ -141,3 +123,27 @@ def pose_report(found: PoseResult, when: datetime, inputs: Mapping[str, str]) ->
         )
     )
     return page(f"catseye: {title}", "\n".join(body))
+
+
+def _cards(pose: Pose) -> list[str]:
+    return [
+        card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
+        for k in range(3)
+    ] + [
+        card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
+        for k in range(3)
+    ]
+
+
+def _beam_section(beam: PointingOffset, figure: str) -> str:
+    terms = [
+        (name, *(f"{part[k] / (ARCSECOND if k < 2 else MILLIMETRE):+.3f}" for k in range(3)))
+        for name, part in beam.terms.items()
+    ]
+    return section(
+        "pointing",
+        "Beam and focus",
+        table(("component", "value", "u", "unit"), beam_rows(beam), "tnnt"),
+        picture(figure, "What the pointing offset is made of; a correction is its opposite."),
+        table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
+    )

@@ -23,9 +23,9 @@ class PoseResult(NamedTuple):
     beam: PointingOffset | None
 
 
-def pose_result_object(found: PoseResult) -> dict[str, Any]:
+def pose_result_object(result: PoseResult) -> dict[str, Any]:
     """A pose as `catseye pose --json` gives it: m and rad."""
-    group, pose = found.pose, found.pose.pose
+    group, pose = result.pose, result.pose.pose
     posture = group.epoch.posture
     moved, _ = pose.displacement(group.places)
     return {
@@ -55,7 +55,7 @@ def pose_result_object(found: PoseResult) -> dict[str, Any]:
         },
         "left_out": pose.left_out,
         "missing": list(group.missing),
-        "pointing": None if found.beam is None else beam_object(found.beam),
+        "pointing": None if result.beam is None else beam_object(result.beam),
     }
 
 
@@ -77,9 +77,9 @@ def beam_object(beam: PointingOffset) -> dict[str, Any]:
     }
 
 
-def pose_rows(found: PoseResult) -> list[tuple[str, str, str, str]]:
+def pose_rows(result: PoseResult) -> list[tuple[str, str, str, str]]:
     """Component, value, standard uncertainty, unit, as people read them."""
-    pose = found.pose.pose
+    pose = result.pose.pose
     values = [*(pose.translation / MILLIMETRE), *(pose.rotation / ARCSECOND)]
     us = [*(pose.u[:3] / MILLIMETRE), *(pose.u[3:] / ARCSECOND)]
     units = ["mm"] * 3 + ["arcsec"] * 3
@@ -97,17 +97,17 @@ def beam_rows(beam: PointingOffset) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def pose_words(found: PoseResult) -> list[tuple[str, str]]:
+def pose_words(result: PoseResult) -> list[tuple[str, str]]:
     """Titles and sentences for people, in order."""
-    group, pose = found.pose, found.pose.pose
+    group, pose = result.pose, result.pose.pose
     pivot = ", ".join(f"{v:.3f}" for v in pose.pivot)
-    made = [
+    passages = [
         ("Group", f"{group.group}: {len(pose.names)} points, against {group.against}"),
         ("Frame", f"{pose.frame}, turned about the pivot ({pivot}) m"),
     ]
     if pose.motion.degrees_of_freedom:
         fits = "moves as one" if pose.p >= WEAK_LEVEL else "does not move as one: look at the residuals"
-        made.append(
+        passages.append(
             (
                 "Rigid",
                 f"chi-square {pose.motion.pvv:.1f} with {pose.motion.degrees_of_freedom} degrees of freedom, "
@@ -115,22 +115,22 @@ def pose_words(found: PoseResult) -> list[tuple[str, str]]:
             )
         )
     if pose.motion.status != "converged":
-        made.append(("Status", pose.motion.status))
+        passages.append(("Status", pose.motion.status))
     for name, w in pose.left_out.items():
-        made.append(("Left out", f"{name}: |w| {w:.1f}, it moved on its own"))
+        passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved on its own"))
     if group.missing:
         some = ", ".join(group.missing[:6]) + (" ..." if len(group.missing) > 6 else "")
-        made.append(("Missing", f"{len(group.missing)} points of the group are not in both: {some}"))
-    if found.beam is not None:
-        across, along = found.beam.beam_deviation
-        made.append(
+        passages.append(("Missing", f"{len(group.missing)} points of the group are not in both: {some}"))
+    if result.beam is not None:
+        across, along = result.beam.beam_deviation
+        passages.append(
             (
                 "Optics",
-                f"{found.beam.optics}; plate scale {found.beam.plate_scale * MILLIMETRE / ARCSECOND:.3f} arcsec a mm, "
-                f"of which a shift across comes to {across:.3f}, one in the plane of symmetry to {along:.3f}",
+                f"{result.beam.optics}; plate scale {result.beam.plate_scale * MILLIMETRE / ARCSECOND:.3f} arcsec a "
+                f"mm, of which a shift across comes to {across:.3f}, one in the plane of symmetry to {along:.3f}",
             )
         )
-    return made
+    return passages
 
 
 class TiltOfPose(NamedTuple):
@@ -147,17 +147,17 @@ def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
     import json
 
     try:
-        found = json.loads(folder.text(name))
+        stored = json.loads(folder.text(name))
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{name}: is not JSON: {problem}") from problem
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+    if not isinstance(stored, dict) or stored.get("format") != FORMAT:
         raise InputError(f"{name}: is no pose (expected format '{FORMAT}', as catseye pose --out writes it)")
-    if found.get("frame") != "alidade" or not found.get("posture"):
-        raise InputError(f"{name}: is in the frame {found.get('frame')!r} (expected 'alidade', with its posture)")
+    if stored.get("frame") != "alidade" or not stored.get("posture"):
+        raise InputError(f"{name}: is in the frame {stored.get('frame')!r} (expected 'alidade', with its posture)")
     try:
-        turn = np.array(found["rotation"], dtype=float)[:2]
-        spread = np.array(found["covariance"], dtype=float)[3:5, 3:5]
-        azimuth = float(found["posture"]["azimuth_deg"]) * DEGREE
+        turn = np.array(stored["rotation"], dtype=float)[:2]
+        spread = np.array(stored["covariance"], dtype=float)[3:5, 3:5]
+        azimuth = float(stored["posture"]["azimuth_deg"]) * DEGREE
     except (KeyError, TypeError, ValueError, IndexError) as problem:
         raise InputError(f"{name}: rotation, covariance or posture cannot be read: {problem}") from problem
     if turn.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*turn, *spread.ravel(), azimuth]).all():

@@ -96,25 +96,25 @@ def _correlation(fit: PointingFit) -> Figure:
     return figure
 
 
-def track_figures(found: TrackProfile) -> dict[str, str]:
+def track_figures(profile: TrackProfile) -> dict[str, str]:
     """Tilt by azimuth with its uncertainty and the observations, and what is left."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        return {"tilt": svg(_tilt(found)), "left": svg(_left(found))}
+        return {"tilt": svg(_tilt(profile)), "left": svg(_left(profile))}
 
 
-def _tilt(found: TrackProfile) -> Figure:
+def _tilt(profile: TrackProfile) -> Figure:
     figure = Figure(figsize=(9.4, 4.2), layout="constrained")
     ax = figure.add_subplot()
     azimuth = np.linspace(0.0, 2 * np.pi, 361)
-    tilt, spread = found.series.at(azimuth)
+    tilt, spread = profile.series.at(azimuth)
     for axis, name in enumerate(("about east", "about north")):
         u = np.sqrt(np.maximum(spread[:, axis, axis], 0.0)) / ARCSECOND
         value = tilt[:, axis] / ARCSECOND
         ax.fill_between(azimuth / DEGREE, value - 2 * u, value + 2 * u, color=SERIES[axis], alpha=0.18, lw=0)
         ax.plot(azimuth / DEGREE, value, color=SERIES[axis], lw=1.4, label=f"{name}, band 2 u")
-        ax.axhline(found.series.values[axis] / ARCSECOND, color=SERIES[axis], lw=0.8, ls=":")
+        ax.axhline(profile.series.values[axis] / ARCSECOND, color=SERIES[axis], lw=0.8, ls=":")
     ax.set_xticks(range(0, 361, 45))
     ax.set_xlim(0, 360)
     ax.set_xlabel("azimuth (deg)")
@@ -123,17 +123,17 @@ def _tilt(found: TrackProfile) -> Figure:
     return figure
 
 
-def _left(found: TrackProfile) -> Figure:
+def _left(profile: TrackProfile) -> Figure:
     figure = Figure(figsize=(9.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    x = np.mod(found.azimuth, 2 * np.pi) / DEGREE
-    pose = np.arange(len(x)) < found.poses
+    x = np.mod(profile.azimuth, 2 * np.pi) / DEGREE
+    pose = np.arange(len(x)) < profile.poses
     for axis, (ax, name) in enumerate(zip(panels, ("about x", "about y"), strict=True)):
         ax.axhline(0.0, color=FAINT, lw=0.8)
-        for mine, label, colour, marker in ((~pose, "inclinometer", SERIES[2], "."), (pose, "poses", SERIES[1], "o")):
-            if mine.any():
-                y = found.residual[mine, axis] / ARCSECOND
-                ax.scatter(x[mine], y, s=18, marker=marker, color=colour, label=label, lw=0)
+        for rows, label, colour, marker in ((~pose, "inclinometer", SERIES[2], "."), (pose, "poses", SERIES[1], "o")):
+            if rows.any():
+                y = profile.residual[rows, axis] / ARCSECOND
+                ax.scatter(x[rows], y, s=18, marker=marker, color=colour, label=label, lw=0)
         ax.set_title(f"residual {name} of the alidade")
         ax.set_xticks(range(0, 361, 90))
         ax.set_xlabel("azimuth (deg)")

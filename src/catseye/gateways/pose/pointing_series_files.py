@@ -50,8 +50,8 @@ def write_fit(
         "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {observed.where[0].split(' line ')[0]}")),
         "report.html": lambda: fit_report(fit, observed, compared, when),
     }
-    made = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
-    write_files(files, directory, {**made, **origin(when, observed.hashes)})
+    provenance = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
+    write_files(files, directory, {**provenance, **origin(when, observed.hashes)})
     series = SamplerTable(
         "SERIES",
         {
@@ -138,24 +138,24 @@ def _provenance(hashes: Mapping[str, str], when: datetime) -> str:
     )
 
 
-def write_track(found: TrackProfile, directory: Path, hashes: Mapping[str, str]) -> None:
+def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str]) -> None:
     """Table, object, report, and last the provenance."""
     when = datetime.now(UTC)
     files: Files = {
-        "tilt.csv": lambda: tilt_csv(found),
-        "track.json": lambda: json_page(track_object(found)),
-        "report.html": lambda: track_report(found, hashes, when),
+        "tilt.csv": lambda: tilt_csv(profile),
+        "track.json": lambda: json_page(track_object(profile)),
+        "report.html": lambda: track_report(profile, hashes, when),
     }
-    settings = {"harmonics": found.series.harmonics}
-    made = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
-    write_files(files, directory, {**made, **origin(when, hashes)})
+    settings = {"harmonics": profile.series.harmonics}
+    provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
+    write_files(files, directory, {**provenance, **origin(when, hashes)})
     join_tables(directory, frame="alidade turned about east and north of the ground")
 
 
-def tilt_csv(found: TrackProfile) -> str:
+def tilt_csv(profile: TrackProfile) -> str:
     """The tilt every five degrees."""
     azimuth = np.arange(0.0, 360.0, 5.0)
-    tilt, spread = found.series.at(azimuth * DEGREE)
+    tilt, spread = profile.series.at(azimuth * DEGREE)
     rows = [
         [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
         for a, t, q in zip(azimuth, tilt, spread, strict=True)
@@ -163,45 +163,48 @@ def tilt_csv(found: TrackProfile) -> str:
     return csv_text(("azimuth_deg", "tilt_east_arcsec", "tilt_north_arcsec", "u_east_arcsec", "u_north_arcsec"), rows)
 
 
-def track_rows(found: TrackProfile) -> list[tuple[str, str, str]]:
+def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
     """Coefficient, value, u in arcsec."""
-    u = np.sqrt(np.diag(found.series.covariance)) / ARCSECOND
+    u = np.sqrt(np.diag(profile.series.covariance)) / ARCSECOND
     return [
         (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}")
-        for name, v, w in zip(found.series.names, found.series.values, u, strict=True)
+        for name, v, w in zip(profile.series.names, profile.series.values, u, strict=True)
     ]
 
 
-def track_words(found: TrackProfile) -> list[tuple[str, str]]:
+def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
     """Titles and sentences for people, in order."""
-    (an, aw), spread = found.series.axis
-    readings = len(found.azimuth) - found.poses
-    made = [
-        ("Observed", f"{found.poses} poses, {readings} inclinometer readings"),
+    (an, aw), spread = profile.series.axis
+    readings = len(profile.azimuth) - profile.poses
+    passages = [
+        ("Observed", f"{profile.poses} poses, {readings} inclinometer readings"),
         (
             "Axis",
             f"AN {an / ARCSECOND:+.2f} ± {spread[0, 0] ** 0.5 / ARCSECOND:.2f}, "
             f"AW {aw / ARCSECOND:+.2f} ± {spread[1, 1] ** 0.5 / ARCSECOND:.2f} arcsec: leans north, west above zero",
         ),
     ]
-    if found.zero is not None:
-        zero, u = found.zero[0] / ARCSECOND, np.sqrt(np.diag(found.zero[1])) / ARCSECOND
-        made.append(
+    if profile.zero is not None:
+        zero, u = profile.zero[0] / ARCSECOND, np.sqrt(np.diag(profile.zero[1])) / ARCSECOND
+        passages.append(
             ("Zero", f"of the inclinometer {zero[0]:+.2f} ± {u[0]:.2f}, {zero[1]:+.2f} ± {u[1]:.2f} arcsec about x, y")
         )
-    if found.degrees_of_freedom:
-        made.append(
-            ("Fit", f"chi-square {found.pvv:.1f} with {found.degrees_of_freedom} degrees of freedom, p {found.p:.2g}")
+    if profile.degrees_of_freedom:
+        passages.append(
+            (
+                "Fit",
+                f"chi-square {profile.pvv:.1f} with {profile.degrees_of_freedom} degrees of freedom, p {profile.p:.2g}",
+            )
         )
-    return made
+    return passages
 
 
-def track_report(found: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
+def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
     """The whole page of a series along a track, HTML."""
     from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
 
-    drawn = track_figures(found)
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(found))
+    drawn = track_figures(profile)
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(profile))
     body = [
         _header("Track and azimuth bearing", when),
         section("summary", "Summary", f"<dl>{words}</dl>"),
@@ -209,7 +212,7 @@ def track_report(found: TrackProfile, hashes: Mapping[str, str], when: datetime)
             "tilt",
             "Tilt by azimuth",
             picture(drawn["tilt"], "Turn of the alidade about east and north; dotted: the mean, the axis's lean."),
-            table(("coefficient", "arcsec", "u"), track_rows(found), "tnn"),
+            table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
             picture(drawn["left"], "What the series leaves of poses and inclinometer."),
         ),
         _provenance(hashes, when),

@@ -73,18 +73,18 @@ def read_observed(files: Sequence[Path]) -> Observed:
 def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, np.ndarray]:
     """Azimuth and elevation (rad), correction (2,) and covariance (2, 2) of a pose.json with pointing."""
     try:
-        found = json.loads(folder.text(path.name))
+        stored = json.loads(folder.text(path.name))
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON: {problem}") from problem
-    if not isinstance(found, dict) or found.get("format") != POSE:
+    if not isinstance(stored, dict) or stored.get("format") != POSE:
         raise InputError(f"{path}: is no pose (expected format '{POSE}', as catseye pose --out writes it)")
-    if not found.get("pointing") or not found.get("posture"):
+    if not stored.get("pointing") or not stored.get("posture"):
         raise InputError(f"{path}: has no pointing or no posture (expected both: catseye pose --pointing prime --out)")
     try:
-        told, posture = found["pointing"], found["posture"]
+        offset, posture = stored["pointing"], stored["posture"]
         angles = float(posture["azimuth_deg"]) * DEGREE, float(posture["elevation_deg"]) * DEGREE
-        value = np.array(told["correction"], dtype=float)[:2]
-        spread = np.array(told["covariance"], dtype=float)[:2, :2]
+        value = np.array(offset["correction"], dtype=float)[:2]
+        spread = np.array(offset["covariance"], dtype=float)[:2, :2]
     except (KeyError, TypeError, ValueError, IndexError) as problem:
         raise InputError(f"{path}: pointing cannot be read: {problem}") from problem
     if value.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*angles, *value, *spread.ravel()]).all():
@@ -139,40 +139,40 @@ def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison 
     }
 
 
-def comparison_object(found: SeriesComparison) -> dict[str, Any]:
+def comparison_object(comparison: SeriesComparison) -> dict[str, Any]:
     """This fit less the other."""
-    u = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)) / ARCSECOND
+    u = np.sqrt(np.maximum(np.diag(comparison.covariance), 0.0)) / ARCSECOND
     return {
-        "difference_arcsec": dict(zip(found.terms, found.difference / ARCSECOND, strict=True)),
-        "u_difference_arcsec": dict(zip(found.terms, u, strict=True)),
-        "chi2": found.chi2,
-        "degrees_of_freedom": len(found.terms),
-        "p": found.p,
-        "rms_on_the_sky_arcsec": found.rms_on_the_sky / ARCSECOND,
-        "u_rms_on_the_sky_arcsec": float(np.sqrt(np.mean(np.sum(found.u_on_the_sky**2, axis=1)))) / ARCSECOND,
+        "difference_arcsec": dict(zip(comparison.terms, comparison.difference / ARCSECOND, strict=True)),
+        "u_difference_arcsec": dict(zip(comparison.terms, u, strict=True)),
+        "chi2": comparison.chi2,
+        "degrees_of_freedom": len(comparison.terms),
+        "p": comparison.p,
+        "rms_on_the_sky_arcsec": comparison.rms_on_the_sky / ARCSECOND,
+        "u_rms_on_the_sky_arcsec": float(np.sqrt(np.mean(np.sum(comparison.u_on_the_sky**2, axis=1)))) / ARCSECOND,
     }
 
 
 def fit_words(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> list[tuple[str, str]]:
     """Titles and sentences for people, in order."""
-    told = f"{int(fit.used.sum())} of {len(fit.used)} observations used, from {observed.source}"
-    made = [("Observed", told)]
-    made += [("Left out", where) for where, used in zip(observed.where, fit.used, strict=True) if not used]
+    used_text = f"{int(fit.used.sum())} of {len(fit.used)} observations used, from {observed.source}"
+    passages = [("Observed", used_text)]
+    passages += [("Left out", where) for where, used in zip(observed.where, fit.used, strict=True) if not used]
     scatter = "uncertainties are from the scatter" if fit.scaled else f"variance factor {fit.variance_factor:.2f}"
-    made.append(
+    passages.append(
         ("Sky rms", f"{fit.sky_rms / ARCSECOND:.2f} arcsec, {fit.degrees_of_freedom} degrees of freedom; {scatter}")
     )
-    made += [("Weak", w.text) for w in fit.weak]
+    passages += [("Weak", w.text) for w in fit.weak]
     if compared is not None:
         agree = f"; chi-square {compared.chi2:.1f} of {len(compared.terms)} terms, p {compared.p:.2g}"
-        made.append(
+        passages.append(
             (
                 "Compared",
                 f"{compared.rms_on_the_sky / ARCSECOND:.2f} arcsec rms apart on the sky between 10 and 80 degrees of "
                 f"elevation{agree if np.isfinite(compared.chi2) else ''}",
             )
         )
-    return made
+    return passages
 
 
 def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[str, ...]]:
@@ -202,9 +202,9 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
     )
 
 
-def track_object(found: TrackProfile) -> dict[str, Any]:
+def track_object(profile: TrackProfile) -> dict[str, Any]:
     """A track profile as `catseye pointing track --json` gives it: rad."""
-    series = found.series
+    series = profile.series
     axis, spread = series.axis
     return {
         "format": TRACK,
@@ -216,11 +216,11 @@ def track_object(found: TrackProfile) -> dict[str, Any]:
         "AN": axis[0],
         "AW": axis[1],
         "covariance_AN_AW": spread,
-        "inclinometer_zero": None if found.zero is None else found.zero[0],
-        "u_inclinometer_zero": None if found.zero is None else np.sqrt(np.diag(found.zero[1])),
-        "poses": found.poses,
-        "readings": len(found.azimuth) - found.poses,
-        "chi2": found.pvv,
-        "degrees_of_freedom": found.degrees_of_freedom,
-        "p": found.p,
+        "inclinometer_zero": None if profile.zero is None else profile.zero[0],
+        "u_inclinometer_zero": None if profile.zero is None else np.sqrt(np.diag(profile.zero[1])),
+        "poses": profile.poses,
+        "readings": len(profile.azimuth) - profile.poses,
+        "chi2": profile.pvv,
+        "degrees_of_freedom": profile.degrees_of_freedom,
+        "p": profile.p,
     }

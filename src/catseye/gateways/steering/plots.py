@@ -44,7 +44,7 @@ def sky_plot(
     """
     stands, head = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
     zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
-    said = all(getattr(head, key) for key in ("abv_0", "aba_0", "abv_1", "aba_1"))
+    recorded = all(getattr(head, key) for key in ("abv_0", "aba_0", "abv_1", "aba_1"))
     usual = Pace((USUAL_COUNTS_PER_S,) * 2, (USUAL_COUNTS_PER_S2,) * 2)
     guard = guard_of(
         stands.monument,
@@ -52,20 +52,20 @@ def sky_plot(
         head,
         keep_out=zones,
         place=place_of_monument(stands, longitude_deg, latitude_deg),
-        pace=pace_of(head) if said else usual,
+        pace=pace_of(head) if recorded else usual,
     )
     if way is None:
-        return sky_figure(guard, mjd), {"pace": "of the record" if said else "assumed"}
-    asked, found = guard.slew(mjd, *way), route(guard, mjd, *way)
-    return sky_figure(guard, mjd, slew=way, route=found if found.found else None), {
-        "pace": "of the record" if said else f"assumed, {USUAL_COUNTS_PER_S:g} counts/s",
+        return sky_figure(guard, mjd), {"pace": "of the record" if recorded else "assumed"}
+    asked, way_round = guard.slew(mjd, *way), route(guard, mjd, *way)
+    return sky_figure(guard, mjd, slew=way, route=way_round if way_round.found else None), {
+        "pace": "of the record" if recorded else f"assumed, {USUAL_COUNTS_PER_S:g} counts/s",
         "slew_allowed": asked.allowed,
         "slew_refused": asked.reason or None,
         "free_at_mjd": asked.free_at_mjd,
-        "route": str(found.status),
-        "waypoints": found.waypoints.tolist(),
-        "duration": found.duration,
-        "prime": found.prime if found.found else None,
+        "route": str(way_round.status),
+        "waypoints": way_round.waypoints.tolist(),
+        "duration": way_round.duration,
+        "prime": way_round.prime if way_round.found else None,
     }
 
 
@@ -90,9 +90,9 @@ def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[str, dict[s
         chosen, velocity, acceleration = Filter(*values[:5]), values[5], values[6]
         if not velocity or not acceleration:
             raise InputError(f"{mirror}: {names[5]} = {velocity}, {names[6]} = {acceleration} (expected above 0)")
-    made = ready_axis(chosen, velocity=velocity, acceleration=acceleration)
-    made.abp(counts)
-    made.stt()
+    servo = ready_axis(chosen, velocity=velocity, acceleration=acceleration)
+    servo.abp(counts)
+    servo.stt()
     rate = velocity / 65_536
     samples = round(counts / rate + 2.0 * rate * 65_536 / acceleration + 0.5 / SAMPLE_TIME)
     if samples * SAMPLE_TIME > LONGEST_MOVE:
@@ -100,8 +100,8 @@ def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[str, dict[s
             f"a move of {counts} counts with abv {velocity}, aba {acceleration} takes up to "
             f"{samples * SAMPLE_TIME:.0f} s (expected up to {LONGEST_MOVE:g} s)"
         )
-    trace = made.run(samples)
-    found, came = margins(plant, chosen), step_metrics(trace.time, trace.actual, target=counts)
+    trace = servo.run(samples)
+    stability, came = margins(plant, chosen), step_metrics(trace.time, trace.actual, target=counts)
     return move_figure(trace, target=counts, plant=plant), {
         "axis": "assumed: nothing public says inertia, torque and friction of the ZY's",
         "kp": chosen.kp,
@@ -109,8 +109,8 @@ def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[str, dict[s
         "kd": chosen.kd,
         "il": chosen.il,
         "interval": chosen.interval,
-        "phase_margin_deg": found.phase / DEGREE,
+        "phase_margin_deg": stability.phase / DEGREE,
         "following_error_counts": float(abs(trace.error).max()),
         "settled_after_s": came.settling,
-        "motor_off": made.chip.motor_off,
+        "motor_off": servo.chip.motor_off,
     }

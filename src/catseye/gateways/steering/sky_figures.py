@@ -154,9 +154,9 @@ def _ways(
     if slew is not None:
         move = trapezoid(slew[0], slew[1], guard.pace)
         yield _along(move), {"color": BAD, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 4, "label": "the slew asked for"}
-        found = guard.entries(mjd, move)
-        if found.status:
-            entry = move.position(found.time)[None]
+        entered = guard.entries(mjd, move)
+        if entered.status:
+            entry = move.position(entered.time)[None]
             style = {"marker": "X", "ms": 8, "color": BAD, "mec": "white", "ls": "", "zorder": 8}
             yield entry, {**style, "label": "enters here"}
     if route is not None and route.found:

@@ -74,7 +74,7 @@ def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> st
         ax.set_ylabel("elevation counts")
         ax.ticklabel_format(useOffset=False)
         shown = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
-        ax.set_title(f"{shown}: {_said(spot)}" if spot.found else shown, fontsize=8.5)
+        ax.set_title(f"{shown}: {_centre_text(spot)}" if spot.found else shown, fontsize=8.5)
         return svg(figure)
 
 
@@ -87,24 +87,24 @@ def _mark(ax, spot: Spot) -> None:
     ax.plot(*(spot.counts[:, None] + ring), color=BAD, lw=1.0, zorder=4, label=f"centre, {ELLIPSE:g} u")
 
 
-def _said(spot: Spot) -> str:
+def _centre_text(spot: Spot) -> str:
     (na, ne), (u_na, u_ne) = spot.counts, spot.u_counts
     return f"{na:.2f} ± {u_na:.2f}, {ne:.2f} ± {u_ne:.2f} counts; {spot.amplitude:.2f} V, flatness {spot.flatness:.1f}"
 
 
-def visibility_figure(found: Visibility) -> str:
+def visibility_figure(visibility: Visibility) -> str:
     """SVG: rangers by retroreflectors, each cell coloured by whether it is seen, or why not."""
-    rangers, targets = found.code.shape
+    rangers, targets = visibility.code.shape
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         figure = Figure(figsize=(min(12.0, 3.2 + 0.16 * targets), 1.6 + 0.22 * rangers), layout="constrained")
         ax = figure.subplots()
         colours = mpl.colors.ListedColormap([SIGHTS[Sight(k)][0] for k in range(len(Sight))])
-        ax.imshow(found.code, cmap=colours, vmin=-0.5, vmax=len(Sight) - 0.5, aspect="auto", interpolation="none")
-        ax.set_yticks(range(rangers), found.rangers, fontsize=7.5)
+        ax.imshow(visibility.code, cmap=colours, vmin=-0.5, vmax=len(Sight) - 0.5, aspect="auto", interpolation="none")
+        ax.set_yticks(range(rangers), visibility.rangers, fontsize=7.5)
         if targets <= MOST_LABELS:
-            ax.set_xticks(range(targets), found.targets, rotation=90, fontsize=6.5)
+            ax.set_xticks(range(targets), visibility.targets, rotation=90, fontsize=6.5)
         else:
             ax.set_xlabel(f"{targets} retroreflectors")
         ax.set_xticks(np.arange(0.5, targets), minor=True)
@@ -113,8 +113,8 @@ def visibility_figure(found: Visibility) -> str:
         if targets <= MOST_LABELS:
             ax.grid(which="minor", color="white", lw=0.8)
         ax.tick_params(which="both", length=0)
-        there = [sight for sight in SIGHTS if np.any(found.code == sight)]
-        counts = {sight: int(np.sum(found.code == sight)) for sight in there}
+        there = [sight for sight in SIGHTS if np.any(visibility.code == sight)]
+        counts = {sight: int(np.sum(visibility.code == sight)) for sight in there}
         handles = [mpl.patches.Patch(color=SIGHTS[s][0], label=f"{SIGHTS[s][1]}: {counts[s]}") for s in there]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
         return svg(figure)

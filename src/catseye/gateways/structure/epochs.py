@@ -62,13 +62,13 @@ def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpoc
         except UnicodeDecodeError as problem:
             raise InputError(f"{listed}: is no UTF-8 text (expected a CSV table)") from problem
         inputs[listed.name] = hashlib.sha256(raw).hexdigest()
-        told = {name: table.numbers(name) for name in REQUIRED[1:]}
+        columns = {name: table.numbers(name) for name in REQUIRED[1:]}
         for name, (low, high) in (("azimuth_deg", (-540.0, 540.0)), ("elevation_deg", (-5.0, 95.0))):
-            table.check(name, (told[name] >= low) & (told[name] <= high), f"{low:g} to {high:g}")
-        told |= {name: table.numbers(name, float("nan")) for name in OPTIONAL if name in table.cells}
+            table.check(name, (columns[name] >= low) & (columns[name] <= high), f"{low:g} to {high:g}")
+        columns |= {name: table.numbers(name, float("nan")) for name in OPTIONAL if name in table.cells}
         for row, name in enumerate(table.cells["reduction"]):
             (place,) = _results(listed.parent / name)[:1] or [listed.parent / name]
-            epochs.append(_epoch(place, {key: float(v[row]) for key, v in told.items()}, inputs, name))
+            epochs.append(_epoch(place, {key: float(v[row]) for key, v in columns.items()}, inputs, name))
     if not epochs:
         raise InputError("there is no epoch (expected directories of `catseye reduce`, or --epochs LIST.csv)")
     return ReadEpochs(tuple(epochs), inputs)
@@ -80,17 +80,17 @@ def _results(source: Path) -> list[Path]:
         return [source]
     if (source / RESULT).is_file():
         return [source / RESULT]
-    found = sorted(source.glob(f"*/{RESULT}")) if source.is_dir() else []
-    if not found:
+    places = sorted(source.glob(f"*/{RESULT}")) if source.is_dir() else []
+    if not places:
         what = "holds no coordinates.json, nor do its directories" if source.is_dir() else "missing"
         raise InputError(f"{source}: {what} (expected what `catseye reduce` wrote)")
-    return found
+    return places
 
 
-def _epoch(place: Path, told: Mapping[str, float], inputs: dict[str, str], label: str = "") -> PlacesEpoch:
+def _epoch(place: Path, numbers: Mapping[str, float], inputs: dict[str, str], label: str = "") -> PlacesEpoch:
     """One reduction, with its posture."""
     document = _object(place, inputs)
-    posture = dict(told)
+    posture = dict(numbers)
     pose = place.parent / POSE
     if "azimuth_deg" not in posture:
         if not pose.is_file():
@@ -120,15 +120,15 @@ def _epoch(place: Path, told: Mapping[str, float], inputs: dict[str, str], label
 def _object(place: Path, inputs: dict[str, str]) -> dict[str, Any]:
     try:
         raw = place.read_bytes()
-        found = json.loads(raw)
+        stored = json.loads(raw)
     except OSError as problem:
         raise InputError(f"{place}: {problem.strerror or problem}") from problem
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{place}: is no JSON: {problem}") from problem
-    if not isinstance(found, dict):
+    if not isinstance(stored, dict):
         raise InputError(f"{place}: holds no JSON object (expected one)")
     inputs[f"{place.parent.name}/{place.name}"] = hashlib.sha256(raw).hexdigest()
-    return found
+    return stored
 
 
 def _places(document: Mapping[str, Any], place: Path) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
@@ -169,9 +169,9 @@ def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: 
                 mjd = entry.ticks / TICKS_PER_DAY
                 if epochs and (mjd - epochs[-1].mjd) * SECONDS_PER_DAY < every_s:
                     continue
-                made = _solved(entry, mjd)
-                without += made is None
-                epochs += [made] if made is not None else []
+                solved = _solved(entry, mjd)
+                without += solved is None
+                epochs += [solved] if solved is not None else []
         hashes = {f"run {number}: {path}": digest for path, digest in reader.run(number).hashes.items()}
     if not epochs:
         raise InputError(f"journal {journal}: run {number} has no solution with points and their covariance")
@@ -219,27 +219,27 @@ def read_range_series(
         number = reader.run(run).run
         hashes = {f"run {number}: {path}": digest for path, digest in reader.run(number).hashes.items()}
         rows: dict[tuple[str, str], list[tuple[int, float, float, float]]] = {}
-        seen: set[str] = set()
+        targets: set[str] = set()
         for _, entry in reader.shots(number, buffers=False):
             shot = entry.shot
-            seen.add(shot.target)
+            targets.add(shot.target)
             if entry.status == "used" and any(fnmatchcase(shot.target, p) for p in points):
                 rows.setdefault((shot.ranger, shot.target), []).append(
                     (shot.ticks, 0.5 * shot.duration, entry.range_, entry.u_range)
                 )
-    kept = {key: np.array(sorted(found)) for key, found in rows.items() if len(found) >= least}
+    kept = {key: np.array(sorted(ranges)) for key, ranges in rows.items() if len(ranges) >= least}
     if not kept:
-        some = ", ".join(sorted(seen)[:8])
-        most = max((len(found) for found in rows.values()), default=0)
+        some = ", ".join(sorted(targets)[:8])
+        most = max((len(ranges) for ranges in rows.values()), default=0)
         raise InputError(
             f"journal {journal}: run {number} has no target {', '.join(points)} with {least} used ranges of one ranger "
             f"(the most is {most}; its targets are {some})"
         )
-    zero = min(int(found[0, 0]) for found in kept.values())
-    made = []
-    for (ranger, target), found in sorted(kept.items()):
-        seconds = (found[:, 0] - zero) * (SECONDS_PER_DAY / TICKS_PER_DAY) + found[:, 1]
-        good = np.isfinite(found[:, 2:]).all(axis=1) & np.concatenate([[True], np.diff(seconds) > 0.0])
-        window = 2.0 * float(np.median(found[:, 1]))
-        made.append(RangeSeries(ranger, target, seconds[good], found[good, 2], found[good, 3], window))
-    return tuple(made), hashes, zero / TICKS_PER_DAY
+    zero = min(int(ranges[0, 0]) for ranges in kept.values())
+    series = []
+    for (ranger, target), ranges in sorted(kept.items()):
+        seconds = (ranges[:, 0] - zero) * (SECONDS_PER_DAY / TICKS_PER_DAY) + ranges[:, 1]
+        good = np.isfinite(ranges[:, 2:]).all(axis=1) & np.concatenate([[True], np.diff(seconds) > 0.0])
+        window = 2.0 * float(np.median(ranges[:, 1]))
+        series.append(RangeSeries(ranger, target, seconds[good], ranges[good, 2], ranges[good, 3], window))
+    return tuple(series), hashes, zero / TICKS_PER_DAY

@@ -19,15 +19,15 @@ def motion_figure(fit: StructureFit) -> str:
     series = fit.series
     e = np.asarray(series.posture.elevation, dtype=float)
     grid = np.linspace(e.min(), e.max(), 121)
-    told = fit.predict(grid)
+    predicted = fit.predict(grid)
     at = fit.predict(e)  # with temperature and way taken off
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 3, sharex=True)
         for c in range(6):
             scale, unit = (MILLIMETRE, "mm") if c < 3 else (ARCSECOND, "arc seconds")
-            panel, value = axes[c // 3, c % 3], told.six[:, c] / scale
-            u = BAND * np.sqrt(np.maximum(told.six_covariance[:, c, c], 0.0)) / scale
+            panel, value = axes[c // 3, c % 3], predicted.six[:, c] / scale
+            u = BAND * np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0)) / scale
             panel.fill_between(grid / DEGREE, value - u, value + u, color=SERIES[0], alpha=0.18, linewidth=0)
             panel.plot(grid / DEGREE, value, color=SERIES[0])
             left = np.full(len(e), np.nan)
@@ -84,28 +84,28 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
         return svg(figure)
 
 
-def spectrum_figure(found: Vibration) -> str:
+def spectrum_figure(vibration: Vibration) -> str:
     """Densities of all series with the first one's band, peaks named."""
-    f, density = found.spectrum.frequency_hz, found.spectrum.density / MILLIMETRE**2
+    f, density = vibration.spectrum.frequency_hz, vibration.spectrum.density / MILLIMETRE**2
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 4.2), layout="constrained")
         panel = figure.subplots()
-        band = found.spectrum.interval(0.95)[:, 0] / MILLIMETRE**2
+        band = vibration.spectrum.interval(0.95)[:, 0] / MILLIMETRE**2
         panel.fill_between(f, band[:, 0], band[:, 1], color=SERIES[0], alpha=0.15, linewidth=0)
-        for a, one in enumerate(found.series):
+        for a, one in enumerate(vibration.series):
             panel.plot(f, density[:, a], color=SERIES[a % len(SERIES)], linewidth=1.0, label=one.name)
         panel.set_yscale("log")
         top = float(density.max())
-        for peak in found.peaks[:6]:
+        for peak in vibration.peaks[:6]:
             x = peak.peak.frequency_hz
             panel.axvline(x, color=FAINT, linewidth=0.7, linestyle=":")
             label = f"{peak.likely_hz:.3g} Hz" + ("" if peak.decided else "?")
             panel.text(x, top * 30.0, label, rotation=90, ha="right", va="top", fontsize=8, color=INK)
         panel.set_ylim(top=top * 50.0)
-        panel.axvline(float(found.spectrum.nyquist_hz.min()), color=BAD, linewidth=0.9)
+        panel.axvline(float(vibration.spectrum.nyquist_hz.min()), color=BAD, linewidth=0.9)
         panel.set_xlim(0.0, 1.02 * f[-1])
         panel.set_xlabel("frequency, Hz")
         panel.set_ylabel("density of the range, mm²/Hz")
-        if len(found.series) <= 12:
+        if len(vibration.series) <= 12:
             panel.legend(loc="upper right", ncols=2)
         return svg(figure)

@@ -23,7 +23,7 @@ def write_structure(
     fit: StructureFit,
     directory: Path,
     *,
-    told: Mapping[str, Any],
+    answer: Mapping[str, Any],
     check: LeaveOut | None,
     predicted: Prediction | None,
     inputs: Mapping[str, str],
@@ -33,38 +33,47 @@ def write_structure(
 
     fit, check, predicted   as for `structure_object`
     directory               ours to fill: see `writers.output.whole_directory`
-    told                    what `structure_object` gave
+    answer                  what `structure_object` gave
     inputs                  SHA-256 of each file read, by its name
     progress                told of each file
     """
     when = datetime.now(UTC)
-    asked = told.get("prediction") or {}
+    asked = answer.get("prediction") or {}
     files: Files = {
         "coefficients.csv": lambda: coefficients_csv(fit),
         "residuals.csv": lambda: residuals_csv(fit, check),
-        "structure.json": lambda: json_page({"format": FORMAT, **told}),
-        "report.html": lambda: _structure_page(fit, told, check, predicted),
+        "structure.json": lambda: json_page({"format": FORMAT, **answer}),
+        "report.html": lambda: _structure_page(fit, answer, check, predicted),
     }
     if predicted is not None:
         files = {"prediction.csv": lambda: prediction_csv(predicted, asked), **files}
-    made = {"format": FORMAT, "made_by": "catseye structure", "model": vars(fit.model) | {"group": fit.series.group}}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    provenance = {
+        "format": FORMAT,
+        "made_by": "catseye structure",
+        "model": vars(fit.model) | {"group": fit.series.group},
+    }
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
     join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, asked))
 
 
 def write_vibration(
-    found: Vibration, directory: Path, *, zero_mjd: float, inputs: Mapping[str, str], progress: Progress | None = None
+    vibration: Vibration,
+    directory: Path,
+    *,
+    zero_mjd: float,
+    inputs: Mapping[str, str],
+    progress: Progress | None = None,
 ) -> None:
     """The files of a vibration; arguments as for `write_structure`; zero_mjd is the MJD of 0 s."""
     when = datetime.now(UTC)
     files: Files = {
-        "spectra.csv": lambda: spectra_csv(found),
-        "vibration.json": lambda: json_page({"format": FORMAT, **vibration_object(found)}),
-        "report.html": lambda: _vibration_page(found),
+        "spectra.csv": lambda: spectra_csv(vibration),
+        "vibration.json": lambda: json_page({"format": FORMAT, **vibration_object(vibration)}),
+        "report.html": lambda: _vibration_page(vibration),
     }
-    made = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
-    join_samplers(directory, SAMPLERS, vibration_samplers(found, zero_mjd))
+    provenance = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    join_samplers(directory, SAMPLERS, vibration_samplers(vibration, zero_mjd))
 
 
 def coefficients_csv(fit: StructureFit) -> str:
@@ -116,19 +125,19 @@ def prediction_csv(predicted: Prediction, asked: Mapping[str, Any]) -> str:
     return csv_text(head, rows)
 
 
-def spectra_csv(found: Vibration) -> str:
+def spectra_csv(vibration: Vibration) -> str:
     """Densities with their bands."""
-    f, density, band = found.spectrum.frequency_hz, found.spectrum.density, found.spectrum.interval(0.95)
+    f, density, band = vibration.spectrum.frequency_hz, vibration.spectrum.density, vibration.spectrum.interval(0.95)
     rows = [
         (s.name, f"{x:.6f}", f"{density[k, a]:.6e}", f"{band[k, a, 0]:.6e}", f"{band[k, a, 1]:.6e}")
-        for a, s in enumerate(found.series)
+        for a, s in enumerate(vibration.series)
         for k, x in enumerate(f)
     ]
     return csv_text(("series", "frequency_hz", "density_m2_per_hz", "low_95_m2_per_hz", "high_95_m2_per_hz"), rows)
 
 
 def _structure_page(
-    fit: StructureFit, told: Mapping[str, Any], check: LeaveOut | None, predicted: Prediction | None
+    fit: StructureFit, answer: Mapping[str, Any], check: LeaveOut | None, predicted: Prediction | None
 ) -> str:
     s = fit.series
     cards = [
@@ -153,7 +162,7 @@ def _structure_page(
     parts = [
         f"<header><h1>Structure: {s.group}</h1></header>",
         '<div class="cards">' + "".join(cards) + "</div>",
-        *(paragraph(note) for note in told["notes"]),
+        *(paragraph(note) for note in answer["notes"]),
         section(
             "motion",
             "How the group moves",
@@ -171,7 +180,7 @@ def _structure_page(
         ),
     ]
     if predicted is not None:
-        asked = told["prediction"]
+        asked = answer["prediction"]
         lines = [
             [f"{e:g}", name, *(f"{v:.5f}" for v in predicted.place[k, i]),
              *(f"{v * 1e3:.3f}" for v in np.sqrt(np.diag(predicted.covariance[k, i])))]
@@ -184,8 +193,8 @@ def _structure_page(
     return page(f"Structure: {s.group}", "\n".join(parts))
 
 
-def _vibration_page(found: Vibration) -> str:
-    names = [s.name for s in found.series]
+def _vibration_page(vibration: Vibration) -> str:
+    names = [s.name for s in vibration.series]
     rows = [
         [
             f"{p.peak.frequency_hz:.3f}",
@@ -194,22 +203,22 @@ def _vibration_page(found: Vibration) -> str:
             f"{p.peak.over:.1f}",
             "" if p.shape is None else f"{p.shape.rms.max() * 1e6:.1f} ({names[int(np.argmax(p.shape.rms))]})",
         ]
-        for p in found.peaks
+        for p in vibration.peaks
     ]
     modes = [
         [f"{m.frequency_hz:.4f} ± {m.u_frequency_hz:.4f}", f"{m.damping_ratio:.4f} (× or ÷ {np.exp(m.u_damping):.2f})",
          f"{np.sqrt(m.covariance[0, 0]) * 1e6:.1f}"]
-        for m in found.modes
+        for m in vibration.modes
     ]  # fmt: skip
     head = ["shown at, Hz", "is at, Hz", "may be, Hz", "times the background", "largest rms in the band, µm"]
     parts = [
         "<header><h1>Vibration</h1></header>",
-        *(paragraph(note) for note in found.notes),
+        *(paragraph(note) for note in vibration.notes),
         section(
             "spectra",
             "Spectra",
             picture(
-                spectrum_figure(found),
+                spectrum_figure(vibration),
                 "One-sided density of each range; the band holds the first one's true density with 95 %. Red: half the "
                 "rate. A question mark: it may be an alias.",
             ),

@@ -32,8 +32,8 @@ def structure_object(
     """
     six, covariance = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 6).T
-    series, found = fit.series, fit.fit
-    rms = np.sqrt(np.nanmean(found.residual**2, axis=(0, 2)))
+    series, motion = fit.series, fit.fit
+    rms = np.sqrt(np.nanmean(motion.residual**2, axis=(0, 2)))
     return {
         "group": series.group,
         "frame": series.frame,
@@ -51,11 +51,11 @@ def structure_object(
         "covariance_order": [f"{name} {c}" for name in fit.model.functions for c in COMPONENTS],
         "covariance": covariance,
         "points": {
-            name: {"rest": fit.rest[i], "own": found.own[i].T, "residual_rms": float(rms[i])}
+            name: {"rest": fit.rest[i], "own": motion.own[i].T, "residual_rms": float(rms[i])}
             for i, name in enumerate(series.names)
         },
-        "variance_factor": found.variance_factor,
-        "degrees_of_freedom": found.degrees_of_freedom,
+        "variance_factor": motion.variance_factor,
+        "degrees_of_freedom": motion.degrees_of_freedom,
         "scatter": {"u_shift": fit.scatter.u_six[:3], "u_turn": fit.scatter.u_six[3:], "u_point": fit.scatter.u_point},
         "left_out": None if check is None else _check(check),
         "prediction": None if predicted is None else _prediction(predicted, asked),
@@ -146,9 +146,9 @@ def _pivot(fit: StructureFit) -> str:
     return "({:.6f}, {:.6f}, {:.6f}) m".format(*fit.series.pivot)
 
 
-def vibration_object(found: Vibration) -> dict[str, Any]:
+def vibration_object(vibration: Vibration) -> dict[str, Any]:
     """Vibration as `catseye structure --vibration --json` gives it."""
-    names = [s.name for s in found.series]
+    names = [s.name for s in vibration.series]
     return {
         "series": {
             s.name: {
@@ -158,12 +158,12 @@ def vibration_object(found: Vibration) -> dict[str, Any]:
                 "seconds": float(s.seconds[-1] - s.seconds[0]),
                 "window": s.window,
                 "u": float(np.median(s.u)),
-                "floor_m2_per_hz": float(found.floor[a]),
+                "floor_m2_per_hz": float(vibration.floor[a]),
             }
-            for a, s in enumerate(found.series)
+            for a, s in enumerate(vibration.series)
         },
-        "degrees_of_freedom": found.spectrum.degrees,
-        "bandwidth_hz": found.spectrum.bandwidth_hz,
+        "degrees_of_freedom": vibration.spectrum.degrees,
+        "bandwidth_hz": vibration.spectrum.bandwidth_hz,
         "peaks": [
             {
                 "frequency_hz": p.peak.frequency_hz,
@@ -179,7 +179,7 @@ def vibration_object(found: Vibration) -> dict[str, Any]:
                     for name, z, u, rms in zip(names, p.shape.shape, p.shape.u_shape, p.shape.rms, strict=True)
                 },
             }
-            for p in found.peaks
+            for p in vibration.peaks
         ],
         "modes": [
             {
@@ -189,41 +189,43 @@ def vibration_object(found: Vibration) -> dict[str, Any]:
                 "u_log_damping": m.u_damping,
                 "rms": float(np.sqrt(m.covariance[0, 0])),
             }
-            for m in found.modes
+            for m in vibration.modes
         ],
-        "notes": list(found.notes),
+        "notes": list(vibration.notes),
     }
 
 
-def vibration_samplers(found: Vibration, zero_mjd: float) -> dict[str, SamplerTable]:
+def vibration_samplers(vibration: Vibration, zero_mjd: float) -> dict[str, SamplerTable]:
     """Densities with their bands, and the ranges themselves.
 
-    found      vibration
-    zero_mjd   MJD of 0 s of the series
+    vibration   vibration
+    zero_mjd    MJD of 0 s of the series
     """
-    names = np.array([s.name for s in found.series])
-    count, width = len(found.spectrum.frequency_hz), len(names)
-    band = found.spectrum.interval(0.95)
+    names = np.array([s.name for s in vibration.series])
+    count, width = len(vibration.spectrum.frequency_hz), len(names)
+    band = vibration.spectrum.interval(0.95)
     spectra = SamplerTable(
         "SPECTRA",
         {
             "SERIES": SamplerColumn("", np.repeat(names, count), "ranger and target"),
-            "FREQUENCY": SamplerColumn("Hz", np.tile(found.spectrum.frequency_hz, width)),
-            "DENSITY": SamplerColumn(PSD, found.spectrum.density.T.ravel(), "one-sided; its integral is the variance"),
+            "FREQUENCY": SamplerColumn("Hz", np.tile(vibration.spectrum.frequency_hz, width)),
+            "DENSITY": SamplerColumn(
+                PSD, vibration.spectrum.density.T.ravel(), "one-sided; its integral is the variance"
+            ),
             "LOW": SamplerColumn(PSD, band[..., 0].T.ravel(), "95 percent, chi-square"),
             "HIGH": SamplerColumn(PSD, band[..., 1].T.ravel(), "95 percent, chi-square"),
         },
         comment="Spectra of ranges, the mean over each buffer not undone.",
-        header={"FREEDOM": found.spectrum.degrees},
+        header={"FREEDOM": vibration.spectrum.degrees},
     )
     ranges = SamplerTable(
         "RANGES",
         {
-            "SERIES": SamplerColumn("", np.concatenate([[s.name] * len(s.seconds) for s in found.series])),
-            "RANGE": SamplerColumn("m", np.concatenate([s.ranges for s in found.series])),
-            "U_RANGE": SamplerColumn("m", np.concatenate([s.u for s in found.series]), "standard uncertainty"),
+            "SERIES": SamplerColumn("", np.concatenate([[s.name] * len(s.seconds) for s in vibration.series])),
+            "RANGE": SamplerColumn("m", np.concatenate([s.ranges for s in vibration.series])),
+            "U_RANGE": SamplerColumn("m", np.concatenate([s.u for s in vibration.series]), "standard uncertainty"),
         },
-        mjd=np.concatenate([zero_mjd + s.seconds / SECONDS_PER_DAY for s in found.series]),
+        mjd=np.concatenate([zero_mjd + s.seconds / SECONDS_PER_DAY for s in vibration.series]),
         comment="Ranges, at the middles of their buffers.",
     )
     return {"SPECTRA": spectra, "RANGES": ranges}

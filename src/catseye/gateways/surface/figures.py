@@ -35,7 +35,7 @@ def surface_map(
         scale: Any = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
         ax.tricontourf(x, y, shown, levels, extend="both", alpha=0.75, **scale)
         size = 60.0 if len(x) <= MOST_NAMED else 7.0
-        seen = ax.scatter(x, y, c=shown, s=size, edgecolors=FAINT, linewidths=0.4 if size > 10 else 0.0, **scale)
+        dots = ax.scatter(x, y, c=shown, s=size, edgecolors=FAINT, linewidths=0.4 if size > 10 else 0.0, **scale)
         if len(names) <= MOST_NAMED:
             for name, px, py in zip(names, x, y, strict=False):
                 ax.annotate(name, (px, py), xytext=(0, -6), textcoords="offset points", ha="center", va="top",
@@ -43,27 +43,27 @@ def surface_map(
         _edge(ax, aperture)
         ax.set_xlabel("x in the dish's frame (m)")
         ax.set_ylabel("y in the dish's frame, from the vertex (m)")
-        figure.colorbar(seen, ax=ax, label=label, shrink=0.85)
+        figure.colorbar(dots, ax=ax, label=label, shrink=0.85)
         return svg(figure)
 
 
-def actuator_map(found: Actuators, aperture: LitAperture) -> str:
+def actuator_map(actuators: Actuators, aperture: LitAperture) -> str:
     """Corrections of all actuators, and their standard uncertainty."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-        correction, u = found.correction / MILLIMETRE, found.u_correction / MILLIMETRE
+        correction, u = actuators.correction / MILLIMETRE, actuators.u_correction / MILLIMETRE
         limit = max(float(np.max(np.abs(correction))), 1e-6)
         centred: Any = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
         rising: Any = {"cmap": "viridis", "vmin": 0.0, "vmax": float(u.max())}
         panels = ((correction, "correction (mm)", centred), (u, "standard uncertainty (mm)", rising))
         for k, (values, title, scale) in enumerate(panels):
             ax = figure.add_subplot(1, 2, k + 1)
-            seen = ax.scatter(found.places[:, 0], found.places[:, 1], c=values, s=6, linewidths=0, **scale)
+            dots = ax.scatter(actuators.places[:, 0], actuators.places[:, 1], c=values, s=6, linewidths=0, **scale)
             _edge(ax, aperture)
             ax.set_title(title)
             ax.set_xlabel("x (m)")
             ax.set_ylabel("y (m)" if k == 0 else "")
-            figure.colorbar(seen, ax=ax, shrink=0.8)
+            figure.colorbar(dots, ax=ax, shrink=0.8)
         return svg(figure)
 
 

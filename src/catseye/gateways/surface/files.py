@@ -26,21 +26,21 @@ from catseye.gateways.writers.written import Files, Progress, origin, write_file
 from catseye.reduction.surface.actuators import rows_of
 
 
-def surface_object(found: SurfaceResult) -> dict[str, Any]:
+def surface_object(result: SurfaceResult) -> dict[str, Any]:
     """A surface as `catseye surface --json` gives it: the epoch's keys, or `epochs`, `change`, `lookup`."""
-    made: dict[str, Any] = {"format": FORMAT}
-    if len(found.shapes) == 1:
-        made |= shape_object(found.shapes[0])
+    answer: dict[str, Any] = {"format": FORMAT}
+    if len(result.shapes) == 1:
+        answer |= shape_object(result.shapes[0])
     else:
-        made["epochs"] = [shape_object(shape) for shape in found.shapes]
-    made["change"] = None if found.change is None else change_object(found.change)
-    made["lookup"] = None if found.lookup is None else lookup_object(found.lookup)
-    made["actuators"] = None if found.actuators is None else actuators_object(found.actuators)
-    return made
+        answer["epochs"] = [shape_object(shape) for shape in result.shapes]
+    answer["change"] = None if result.change is None else change_object(result.change)
+    answer["lookup"] = None if result.lookup is None else lookup_object(result.lookup)
+    answer["actuators"] = None if result.actuators is None else actuators_object(result.actuators)
+    return answer
 
 
 def write_surface(
-    found: SurfaceResult, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    result: SurfaceResult, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
@@ -50,11 +50,11 @@ def write_surface(
     """
     when = datetime.now(UTC)
     files: dict[str, Any] = {}
-    for k, shape in enumerate(found.shapes):
-        tail = f"-{k + 1}" if len(found.shapes) > 1 else ""
+    for k, shape in enumerate(result.shapes):
+        tail = f"-{k + 1}" if len(result.shapes) > 1 else ""
         files[f"prisms{tail}.csv"] = lambda shape=shape: prisms_csv(shape)
         files[f"zernike{tail}.csv"] = lambda shape=shape: zernike_csv(shape.expansion, shape.settings.numbering)
-    change, lookup, actuators = found.change, found.lookup, found.actuators
+    change, lookup, actuators = result.change, result.lookup, result.actuators
     if change is not None:
         files["change.csv"] = lambda: change_csv(change)
         files["change-zernike.csv"] = lambda: zernike_csv(change.expansion, change.settings.numbering)
@@ -63,22 +63,22 @@ def write_surface(
         files["epochs.csv"] = lambda: epochs_csv(lookup)
     if actuators is not None:
         files["actuators.csv"] = lambda: actuators_csv(rows_of(actuators))
-    files["surface.json"] = lambda: json_page(surface_object(found))
-    files["report.html"] = lambda: surface_report(found, when, inputs)
+    files["surface.json"] = lambda: json_page(surface_object(result))
+    files["report.html"] = lambda: surface_report(result, when, inputs)
     made: Files = files
-    told = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(found.shapes[-1].settings)}
-    write_files(made, directory, {**told, **origin(when, inputs)}, progress)
+    provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
+    write_files(made, directory, {**provenance, **origin(when, inputs)}, progress)
     join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 
-def write_actuators(found: SurfaceResult, path: Path) -> None:
+def write_actuators(result: SurfaceResult, path: Path) -> None:
     """The actuators' table by the ending of its name, .csv or .fits; whole or not at all.
 
     Raises InputError for another ending and where another's file would be lost.
     """
-    if found.actuators is None:
+    if result.actuators is None:
         raise InputError(f"--actuators {path}: nothing was computed for them")
-    rows = rows_of(found.actuators)
+    rows = rows_of(result.actuators)
     ending = path.suffix.lower()
     if ending == ".csv":
         with whole_file(path, "--actuators", ACTUATOR_MARK) as pieces:

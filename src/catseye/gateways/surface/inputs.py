@@ -72,12 +72,12 @@ def _frame(site: SiteFolder, azimuth_deg: float, elevation_deg: float) -> Transf
 
 def _object(folder: Folder, file: str) -> dict[str, Any]:
     try:
-        found = json.loads(folder.text(file))
+        stored = json.loads(folder.text(file))
     except (ValueError, RecursionError) as problem:
         raise refusal(file, f"cannot be read as JSON: {problem}") from problem
-    if not isinstance(found, dict):
-        raise refusal(file, f"holds {type(found).__name__} (expected an object, as catseye reduce writes it)")
-    return found
+    if not isinstance(stored, dict):
+        raise refusal(file, f"holds {type(stored).__name__} (expected an object, as catseye reduce writes it)")
+    return stored
 
 
 def _reduced(
@@ -169,11 +169,11 @@ def _of_kind(columns: TextColumns) -> TextColumns:
 
 def _names(columns: TextColumns) -> tuple[str, ...]:
     names = columns.cells["point"]
-    seen: set[str] = set()
+    taken: set[str] = set()
     for row, name in enumerate(names):
-        if not name or name in seen:
+        if not name or name in taken:
             raise columns.refuse(row, f"point = {shown(name)} (expected a name, each once)")
-        seen.add(name)
+        taken.add(name)
     return tuple(names)
 
 
@@ -187,10 +187,10 @@ def _covariance(columns: TextColumns, single: bool) -> np.ndarray:
     """Covariance of each point, (k, 3, 3) m^2."""
     spreads: Sequence[str] = ("u_mm",) * 3 if single else SPREADS
     u = np.column_stack([_spread(columns, name) for name in spreads])
-    made = u[:, :, None] * np.eye(3) * u[:, None, :]
+    covariance = u[:, :, None] * np.eye(3) * u[:, None, :]
     for name, (i, j) in PAIRS.items():
         if name in columns.cells:
-            made[:, i, j] = made[:, j, i] = columns.numbers(name) * MILLIMETRE**2
-    least = np.linalg.eigvalsh(made)[:, 0]
+            covariance[:, i, j] = covariance[:, j, i] = columns.numbers(name) * MILLIMETRE**2
+    least = np.linalg.eigvalsh(covariance)[:, 0]
     columns.check("point", least > 0.0, "covariances smaller than the product of both u")
-    return made
+    return covariance

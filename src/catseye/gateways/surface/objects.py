@@ -159,19 +159,19 @@ def lookup_object(lookup: Lookup) -> dict[str, Any]:
     }
 
 
-def actuators_object(found: Actuators) -> dict[str, Any]:
+def actuators_object(actuators: Actuators) -> dict[str, Any]:
     """How many, how sure, how far."""
     return {
-        "actuators": len(found.names),
-        "measured": int(found.measured.sum()),
-        "beyond_limits": [name for name, ok in zip(found.names, found.within, strict=True) if not ok],
-        "largest_correction": float(np.abs(found.correction).max()),
-        "u_correction_median": float(np.median(found.u_correction)),
-        "u_correction_largest": float(found.u_correction.max()),
+        "actuators": len(actuators.names),
+        "measured": int(actuators.measured.sum()),
+        "beyond_limits": [name for name, ok in zip(actuators.names, actuators.within, strict=True) if not ok],
+        "largest_correction": float(np.abs(actuators.correction).max()),
+        "u_correction_median": float(np.median(actuators.u_correction)),
+        "u_correction_largest": float(actuators.u_correction.max()),
         "roughness": {
-            "smooth": found.roughness.smooth,
-            "length": found.roughness.length,
-            "own": found.roughness.own,
+            "smooth": actuators.roughness.smooth,
+            "length": actuators.roughness.length,
+            "own": actuators.roughness.own,
         },
     }
 
@@ -180,7 +180,7 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
     """What a person should know of one epoch, in order."""
     fit, square = shape.fit, shape.square
     u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
-    made = [
+    passages = [
         Passage(
             "The dish",
             f"{len(shape.prisms.names)} prisms of {shape.prisms.source}, normal deviations {shape.rms_normal * 1e3:.3f}"
@@ -189,21 +189,21 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
         Passage("Paraboloid", f"free: {', '.join(fit.free) or 'nothing'}. {_pose(shape)}"),
         Passage("Half path", _rms(square, shape.settings.taper_db)),
     ]
-    made += [_gain_passage(g) for g in shape.gains]
+    passages += [_gain_passage(g) for g in shape.gains]
     taken = [
         t.name
         for t, s in zip(shape.expansion.terms, shape.expansion.share, strict=True)
         if t.n >= 2 and s > TAKEN and not (t == (2, 0) and "focal-length" in fit.free)
     ]
     if taken:
-        made.append(
+        passages.append(
             Passage(
                 "Note",
                 f"the free paraboloid takes most of {', '.join(taken)} for a turn of the offset dish; hold the axis "
                 "(--free vertex,focal-length), ask for fewer terms and read `joint`, or compare two epochs",
             )
         )
-    return made
+    return passages
 
 
 def _pose(shape: SurfaceShape) -> str:
@@ -227,10 +227,10 @@ def _pose(shape: SurfaceShape) -> str:
 def _rms(square: MeanSquare, taper_db: float) -> str:
     own = root(square.own)
     lit = f"weighted for an edge taper of {taper_db:g} dB" if taper_db else "uniform weight over the aperture"
-    told = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
+    text = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
     if own is None:
-        return told + "not above the measurement's own noise"
-    return told + (
+        return text + "not above the measurement's own noise"
+    return text + (
         f"{own * 1e3:.4f} ± {square.u / (2.0 * own) * 1e3:.4f} mm without the measurement's noise"
         if own > 0.0
         else "nothing beyond the measurement's noise"
@@ -270,19 +270,19 @@ def lookup_passages(lookup: Lookup) -> list[Passage]:
         f"{len(lookup.shapes)} epochs from {low:g}° to {high:g}°, {rising} going up, {len(lookup.shapes) - rising} "
         f"down; each term by {', '.join(lookup.columns)}"
     )
-    made = [Passage("Elevation", text)]
-    made += [Passage("Left out", f"{name}: {why}") for name, why in lookup.left_out.items()]
-    return made
+    passages = [Passage("Elevation", text)]
+    passages += [Passage("Left out", f"{name}: {why}") for name, why in lookup.left_out.items()]
+    return passages
 
 
-def actuators_passage(found: Actuators) -> Passage:
+def actuators_passage(actuators: Actuators) -> Passage:
     """What a person should know of the actuators."""
-    beyond, rough = int((~found.within).sum()), found.roughness
-    u = found.u_correction * 1e3
+    beyond, rough = int((~actuators.within).sum()), actuators.roughness
+    u = actuators.u_correction * 1e3
     return Passage(
         "Actuators",
-        f"{len(found.names)}, {int(found.measured.sum())} with a measured prism of their own; corrections to "
-        f"{np.abs(found.correction).max() * 1e3:.3f} mm, u {np.median(u):.3f} mm (median) to {u.max():.3f} mm; "
+        f"{len(actuators.names)}, {int(actuators.measured.sum())} with a measured prism of their own; corrections to "
+        f"{np.abs(actuators.correction).max() * 1e3:.3f} mm, u {np.median(u):.3f} mm (median) to {u.max():.3f} mm; "
         f"{beyond or 'none'} beyond their limits. Beside the trend the surface has {rough.smooth * 1e3:.3f} mm over "
         f"{rough.length:.0f} m and {rough.own * 1e3:.3f} mm of each point's own",
     )
@@ -293,21 +293,21 @@ def term_lines(shapes: Sequence[SurfaceShape], change: Change | None, lookup: Lo
     shape = shapes[0]
     numbering = shape.settings.numbering
     if lookup is not None:
-        made = [f"{'term':>4}  {'':<26}" + "".join(f"{name:>22}" for name in lookup.columns) + "   mm"]
+        lines = [f"{'term':>4}  {'':<26}" + "".join(f"{name:>22}" for name in lookup.columns) + "   mm"]
         for model in lookup.models:
             cells = "".join(
                 f"{v * 1e3:+13.4f} ± {model.raised * np.sqrt(s) * 1e3:.4f}"
                 for v, s in zip(model.value, np.diag(model.covariance), strict=True)
             )
-            made.append(f"{number(model.term, numbering):>4}  {model.term.name:<26}{cells}")
-        return made
+            lines.append(f"{number(model.term, numbering):>4}  {model.term.name:<26}{cells}")
+        return lines
     expansion = shape.expansion if change is None else change.expansion
     u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
-    made = [f"{numbering:>4}  {'term':<26}{'left':>18}   taken{'itself':>20}   mm"]
+    lines = [f"{numbering:>4}  {'term':<26}{'left':>18}   taken{'itself':>20}   mm"]
     for k, term in enumerate(expansion.terms):
         line = f"{number(term, numbering):>4}  {term.name:<26}{expansion.value[k] * 1e3:+9.4f} ± {u[k] * 1e3:.4f}"
         line += f"  {round(100.0 * float(expansion.share[k])):4d} %"
         if np.isfinite(u_joint[k]):
             line += f"{expansion.joint[k] * 1e3:+12.4f} ± {u_joint[k] * 1e3:.4f}"
-        made.append(line)
-    return made
+        lines.append(line)
+    return lines

@@ -30,28 +30,28 @@ class SurfaceResult:
     actuators: Actuators | None = None
 
 
-def surface_report(found: SurfaceResult, when: datetime, inputs: Mapping[str, str]) -> str:
+def surface_report(result: SurfaceResult, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page.
 
     when     UTC
     inputs   SHA-256 of each file read, by its name
     """
-    body = [_header(found, when)]
-    if found.lookup is not None:
-        body.append(_lookup(found.lookup))
-    if found.change is not None:
-        body.append(_change(found.change))
-    body += [_shape(shape, k + 1, len(found.shapes)) for k, shape in enumerate(found.shapes)]
-    if found.actuators is not None:
-        body.append(_actuators(found.actuators, found.shapes[-1]))
+    body = [_header(result, when)]
+    if result.lookup is not None:
+        body.append(_lookup(result.lookup))
+    if result.change is not None:
+        body.append(_change(result.change))
+    body += [_shape(shape, k + 1, len(result.shapes)) for k, shape in enumerate(result.shapes)]
+    if result.actuators is not None:
+        body.append(_actuators(result.actuators, result.shapes[-1]))
     rows = [(name, digest) for name, digest in inputs.items()]
-    told = ", ".join(f"{k} {v}" for k, v in versions().items())
-    body.append(section("origin", "Origin", paragraph(told, "faint"), table(("file", "SHA-256"), rows, "th")))
+    versions_text = ", ".join(f"{k} {v}" for k, v in versions().items())
+    body.append(section("origin", "Origin", paragraph(versions_text, "faint"), table(("file", "SHA-256"), rows, "th")))
     return page("catseye: surface", "\n".join(body))
 
 
-def _header(found: SurfaceResult, when: datetime) -> str:
-    names = ", ".join(shape.prisms.source for shape in found.shapes)
+def _header(result: SurfaceResult, when: datetime) -> str:
+    names = ", ".join(shape.prisms.source for shape in result.shapes)
     return (
         f"<header><h1>The surface</h1><div class='faint'>{escape(names)}; by catseye on {when:%Y-%m-%d %H:%M} UTC; "
         "deviations along the normal, above zero towards the focus; half-path errors are half of what they shorten the "
@@ -59,7 +59,7 @@ def _header(found: SurfaceResult, when: datetime) -> str:
     )
 
 
-def _told(passages: list[Passage]) -> str:
+def _definitions(passages: list[Passage]) -> str:
     return "<dl>" + "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages) + "</dl>"
 
 
@@ -82,7 +82,7 @@ def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
         f"epoch-{epoch}",
         title,
         _cards(shape.square, gains),
-        _told(shape_passages(shape)),
+        _definitions(shape_passages(shape)),
         picture(
             surface_map(local, shape.fit.half_path, shape.aperture, "half-path error (mm)", shape.prisms.names),
             f"Half-path errors off the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
@@ -97,7 +97,7 @@ def _change(change: Change) -> str:
         "change",
         "The change",
         _cards(change.square, []),
-        _told(change_passages(change)),
+        _definitions(change_passages(change)),
         picture(
             surface_map(change.local, change.half_path, change.aperture, "change of half path (mm)", change.names),
             "Second epoch less first, after the dish's motion as its prisms show it in all three coordinates.",
@@ -154,7 +154,7 @@ def _lookup(lookup: Lookup) -> str:
     return section(
         "elevation",
         "Terms by elevation",
-        _told(lookup_passages(lookup)),
+        _definitions(lookup_passages(lookup)),
         picture(
             elevation_terms(lookup),
             "The terms that elevation moves most. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
@@ -168,10 +168,10 @@ def _lookup(lookup: Lookup) -> str:
     )
 
 
-def _actuators(found: Actuators, shape: SurfaceShape) -> str:
+def _actuators(actuators: Actuators, shape: SurfaceShape) -> str:
     return section(
         "actuators",
         "Actuators",
-        _told([actuators_passage(found)]),
-        picture(actuator_map(found, shape.aperture), "Corrections, and how well they are known."),
+        _definitions([actuators_passage(actuators)]),
+        picture(actuator_map(actuators, shape.aperture), "Corrections, and how well they are known."),
     )

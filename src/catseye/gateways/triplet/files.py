@@ -43,31 +43,31 @@ def write_triplets(
     refuse_namesakes(list(units))
     when = datetime.now(UTC)
     files: dict[str, Callable[[], str]] = {}
-    for path, found in units.items():
-        files[f"{path.stem}.txt"] = partial(text_sheet, found, path.name)
-        files[f"{path.stem}.html"] = partial(html_sheet, found, path.name, when, hashes[path])
-        files[f"{path.stem}.json"] = partial(_object_page, found, path.name)
-    files["triplets.csv"] = lambda: triplets_csv({path.name: found for path, found in units.items()})
-    made = {"format": FORMAT, "made_by": "catseye triplet"}
+    for path, reduction in units.items():
+        files[f"{path.stem}.txt"] = partial(text_sheet, reduction, path.name)
+        files[f"{path.stem}.html"] = partial(html_sheet, reduction, path.name, when, hashes[path])
+        files[f"{path.stem}.json"] = partial(_object_page, reduction, path.name)
+    files["triplets.csv"] = lambda: triplets_csv({path.name: reduction for path, reduction in units.items()})
+    provenance = {"format": FORMAT, "made_by": "catseye triplet"}
     inputs = {path.name: hashes[path] for path in units}
-    write_files(files, directory, {**made, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
 
 
-def _object_page(found: TripletReduction, name: str) -> str:
-    return json_page(triplet_object(found, name))
+def _object_page(reduction: TripletReduction, name: str) -> str:
+    return json_page(triplet_object(reduction, name))
 
 
 def refuse_namesakes(paths: list[Path]) -> None:
     """Two sheets of one name would write over each other, one sheet twice is a slip; PROVENANCE is ours."""
-    seen: dict[str, Path] = {}
+    by_stem: dict[str, Path] = {}
     for path in paths:
         if f"{path.stem}.json" == PROVENANCE:
             raise InputError(f"{path}: {PROVENANCE} of --out would be written twice (expected a sheet of another name)")
-        if path.stem in seen:
+        if path.stem in by_stem:
             raise InputError(
-                f"{path}: has the name of {seen[path.stem]} (expected sheets of different names for --out)"
+                f"{path}: has the name of {by_stem[path.stem]} (expected sheets of different names for --out)"
             )
-        seen[path.stem] = path
+        by_stem[path.stem] = path
 
 
 def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
@@ -78,15 +78,23 @@ def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows(_row(file, found) for file, found in units.items())
+    writer.writerows(_row(file, reduction) for file, reduction in units.items())
     return stream.getvalue()
 
 
 def _row(file: str, f: TripletReduction) -> tuple[Any, ...]:
     lengths = (f.h_corr, f.u_h_corr, f.l_mpbc, f.u_l_mpbc, f.difference, f.u_difference)
-    told = (_plain(1e3 * x) for x in lengths)
+    millimetres = (_plain(1e3 * x) for x in lengths)
     accepted = "yes" if f.accepted else "no"
-    return (file, f.measurement.triplet, *told, accepted, _plain(f.conformity_probability), len(f.h), _plain(f.p))
+    return (
+        file,
+        f.measurement.triplet,
+        *millimetres,
+        accepted,
+        _plain(f.conformity_probability),
+        len(f.h),
+        _plain(f.p),
+    )
 
 
 def _plain(value: float) -> str:

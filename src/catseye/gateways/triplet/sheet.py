@@ -21,34 +21,38 @@ FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "H
         "dPc_1": 7, "dPc_2": 7, "margin": 1}  # fmt: skip
 
 
-def verdict(found: TripletReduction) -> list[tuple[str, str]]:
+def verdict(reduction: TripletReduction) -> list[tuple[str, str]]:
     """(title, text) of each paragraph about a calibration, for a terminal or the head of a page."""
-    u_h = _plain(found.u_h_corr * 1e3, ".4f")
-    low, high = found.plate.paint or (math.nan, math.nan)
+    u_h = _plain(reduction.u_h_corr * 1e3, ".4f")
+    low, high = reduction.plate.paint or (math.nan, math.nan)
     lines = [
         (
             "H_corr",
-            f"{_signed(found.h_corr)}, u {u_h}: ball's centre above the prisms' mid-point, towards the prism side",
+            f"{_signed(reduction.h_corr)}, u {u_h}: ball's centre above the prisms' mid-point, towards the prism side",
         ),
-        ("L_MPBC", f"{found.l_mpbc * 1e3:+.4f} mm, u {found.u_l_mpbc * 1e3:.4f}: the same from the surface plate"),
+        (
+            "L_MPBC",
+            f"{reduction.l_mpbc * 1e3:+.4f} mm, u {reduction.u_l_mpbc * 1e3:.4f}: the same from the surface plate",
+        ),
         (
             "Difference",
-            f"{_signed(found.difference)}, u {_plain(found.u_difference * 1e3, '.4f')}; limit 0.15 mm: "
-            f"{'accepted' if found.accepted else 'NOT ACCEPTED'}, probability of conformity {_probability(found)}",
+            f"{_signed(reduction.difference)}, u {_plain(reduction.u_difference * 1e3, '.4f')}; limit 0.15 mm: "
+            f"{'accepted' if reduction.accepted else 'NOT ACCEPTED'}, probability of conformity "
+            f"{_probability(reduction)}",
         ),
-        ("Placements", _agreement(found)),
+        ("Placements", _agreement(reduction)),
         (
             "Paint",
             f"{low * 1e3:.3f} to {high * 1e3:.3f} mm puts all three points within 0.15 mm of the bare top plate"
-            if found.plate.paint
+            if reduction.plate.paint
             else "no thickness puts all three points within 0.15 mm of the bare top plate",
         ),
     ]
-    return lines + [("Notes" if k == 0 else "", note) for k, note in enumerate(found.notes)]
+    return lines + [("Notes" if k == 0 else "", note) for k, note in enumerate(reduction.notes)]
 
 
-def _probability(found: TripletReduction) -> str:
-    p = found.conformity_probability
+def _probability(reduction: TripletReduction) -> str:
+    p = reduction.conformity_probability
     return (
         "unknown"
         if math.isnan(p)
@@ -60,13 +64,13 @@ def _probability(found: TripletReduction) -> str:
     )
 
 
-def _agreement(found: TripletReduction) -> str:
-    count = len(found.h)
-    if not found.degrees_of_freedom:
+def _agreement(reduction: TripletReduction) -> str:
+    count = len(reduction.h)
+    if not reduction.degrees_of_freedom:
         return "1, nothing to compare it with" if count == 1 else f"{count}, not enough to compare"
-    agree = "agree" if found.p >= 0.05 else "DO NOT AGREE"
-    freedom = f"{found.degrees_of_freedom} degrees of freedom"
-    return f"{count} {agree}: chi-square {found.chi_square:.2f}, {freedom}, p {found.p:.3f}"
+    agree = "agree" if reduction.p >= 0.05 else "DO NOT AGREE"
+    freedom = f"{reduction.degrees_of_freedom} degrees of freedom"
+    return f"{count} {agree}: chi-square {reduction.chi_square:.2f}, {freedom}, p {reduction.p:.3f}"
 
 
 def cell(symbol: Symbol, value: Any) -> str:
@@ -84,81 +88,83 @@ def cell(symbol: Symbol, value: Any) -> str:
     return f"{scaled:.{FINE.get(symbol.name, PLACES.get(symbol.unit, 6))}f}"
 
 
-def text_sheet(found: TripletReduction, file: str) -> str:
+def text_sheet(reduction: TripletReduction, file: str) -> str:
     """The whole sheet as lines of text.
 
-    found   the calibration of a unit
-    file    its sheet's name
+    reduction   the calibration of a unit
+    file        its sheet's name
     """
-    m = found.measurement
+    m = reduction.measurement
     lines = [
         f"TRIPLET {m.triplet}   prisms {m.left_prism.serial} (left), {m.right_prism.serial} (right)   {file}",
         f"measured on {m.measured_on} by {m.by}; lengths mm, angles rad; air by {m.air_model}",
         "",
-        *(f"{title:<12}{text}" for title, text in verdict(found)),
+        *(f"{title:<12}{text}" for title, text in verdict(reduction)),
         "",
         "UNIT",
-        *_text_rows(UNIT, found, slice(0, 1)),
+        *_text_rows(UNIT, reduction, slice(0, 1)),
         "",
         "SURFACE PLATE",
-        *_text_rows(PLATE, found, slice(0, 1)),
+        *_text_rows(PLATE, reduction, slice(0, 1)),
     ]
-    for start in range(0, len(found.h), SIDE_BY_SIDE):
-        rows = slice(start, min(start + SIDE_BY_SIDE, len(found.h)))
+    for start in range(0, len(reduction.h), SIDE_BY_SIDE):
+        rows = slice(start, min(start + SIDE_BY_SIDE, len(reduction.h)))
         heads = "".join(f"{'no. ' + str(k + 1):>15}" for k in range(rows.start, rows.stop))
-        lines += ["", f"{'PLACEMENTS':<14}{'':<5}{heads}", *_text_rows(PLACEMENT, found, rows)]
+        lines += ["", f"{'PLACEMENTS':<14}{'':<5}{heads}", *_text_rows(PLACEMENT, reduction, rows)]
         spacers = "".join(f"{p.spacer_mm:>15.3f}" for p in m.placement[rows])
         lines += [f"{'spacer':<14}{'mm':<5}{spacers}  spacer in front of the stops"]
         lines += [
             f"{'u (H_corr)':<14}{'mm':<5}"
-            + "".join(f"{_plain(u * 1e3, '.4f'):>15}" for u in found.u[rows])
+            + "".join(f"{_plain(u * 1e3, '.4f'):>15}" for u in reduction.u[rows])
             + "  of one placement",
             f"{'w':<14}{'':<5}"
-            + "".join(f"{_plain(w, '.2f'):>15}" for w in found.statistics[rows])
+            + "".join(f"{_plain(w, '.2f'):>15}" for w in reduction.statistics[rows])
             + "  standardised residual",
-            f"{'status':<14}{'':<5}" + "".join(f"{SHORT.get(s, s):>15}" for s in found.status[rows]),
+            f"{'status':<14}{'':<5}" + "".join(f"{SHORT.get(s, s):>15}" for s in reduction.status[rows]),
         ]
     lines += ["", "POINTS (mm from S: along the prisms, up, towards the ranger)"]
-    for name, at in point_places(found).items():
+    for name, at in point_places(reduction).items():
         for k, place in enumerate(at, start=1):
             shown = "".join(f"{_plain(1e3 * x, '.4f'):>15}" for x in place)
             lines.append(f"{name if k == 1 else '':<13}no.{k:>3}{shown}  {POINTS[name] if k == 1 else ''}".rstrip())
     return "\n".join(lines) + "\n"
 
 
-def _text_rows(symbols: Sequence[Symbol], found: TripletReduction, rows: slice) -> Iterator[str]:
+def _text_rows(symbols: Sequence[Symbol], reduction: TripletReduction, rows: slice) -> Iterator[str]:
     for symbol in symbols:
-        values = symbol_values(symbol, found)
+        values = symbol_values(symbol, reduction)
         values = values * (rows.stop - rows.start) if len(values) == 1 else values[rows]
         cells = "".join(f"{cell(symbol, value):>15}" for value in values)
         yield f"{symbol.shown:<14}{symbol.unit:<5}{cells}  {symbol.meaning}"
 
 
-def html_sheet(found: TripletReduction, file: str, when: datetime, digest: str) -> str:
+def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: str) -> str:
     """The whole sheet as a page that stands alone, with the figure of the placements.
 
-    found    the calibration of a unit
-    file     its sheet's name; `digest` its SHA-256
-    when     UTC, of the computation
+    reduction   the calibration of a unit
+    file        its sheet's name; `digest` its SHA-256
+    when        UTC, of the computation
     """
     from catseye.gateways.triplet.figure import triplet_figure  # matplotlib is heavy
 
-    m = found.measurement
-    words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in verdict(found))
+    m = reduction.measurement
+    words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in verdict(reduction))
     body = [
         WHOLE,
         f"<header><h1>{TITLE}: {escape(m.triplet)}</h1>"
         f'<div class="faint">prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on '
         f"{m.measured_on} by {escape(m.by)}; air by {m.air_model}; u = standard uncertainty, 1σ</div></header>",
-        '<div class="cards">' + "".join(_cards(found)) + "</div>",
+        '<div class="cards">' + "".join(_cards(reduction)) + "</div>",
         f"<dl>{words}</dl>",
         section(
-            "figure", "Placements", picture(triplet_figure(found), "H_corr of each placement, its limits, the budget")
+            "figure",
+            "Placements",
+            picture(triplet_figure(reduction), "H_corr of each placement, its limits, the budget"),
         ),
-        section("unit", "Unit", _table(UNIT, found)),
-        section("plate", "Surface plate", _table(PLATE, found), _paint(found)),
-        section("ranges", "Ranges", *_placement_tables(found)),
-        section("points", "Points", _points(found)),
+        section("unit", "Unit", _table(UNIT, reduction)),
+        section("plate", "Surface plate", _table(PLATE, reduction), _paint(reduction)),
+        section("ranges", "Ranges", *_placement_tables(reduction)),
+        section("points", "Points", _points(reduction)),
         section(
             "provenance",
             "Provenance",
@@ -170,33 +176,35 @@ def html_sheet(found: TripletReduction, file: str, when: datetime, digest: str) 
     return page(f"{TITLE}: {m.triplet}", "\n".join(body))
 
 
-def _cards(found: TripletReduction) -> Iterator[str]:
-    yield card("H_corr", _signed(found.h_corr), f"u = {_plain(found.u_h_corr * 1e3, '.4f')} mm, by ranging")
-    yield card("L_MPBC", f"{found.l_mpbc * 1e3:+.4f} mm", f"u = {found.u_l_mpbc * 1e3:.4f} mm, surface plate")
+def _cards(reduction: TripletReduction) -> Iterator[str]:
+    yield card("H_corr", _signed(reduction.h_corr), f"u = {_plain(reduction.u_h_corr * 1e3, '.4f')} mm, by ranging")
+    yield card("L_MPBC", f"{reduction.l_mpbc * 1e3:+.4f} mm", f"u = {reduction.u_l_mpbc * 1e3:.4f} mm, surface plate")
     yield card(
-        "accepted" if found.accepted else "NOT ACCEPTED",
-        _signed(found.difference),
-        f"limit ± 0.15 mm; conformity {_probability(found)}",
+        "accepted" if reduction.accepted else "NOT ACCEPTED",
+        _signed(reduction.difference),
+        f"limit ± 0.15 mm; conformity {_probability(reduction)}",
     )
 
 
-def _table(symbols: Sequence[Symbol], found: TripletReduction) -> str:
-    rows = [(s.shown, s.meaning, s.design or "–", cell(s, symbol_values(s, found)[0]), s.unit or "–") for s in symbols]
+def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> str:
+    rows = [
+        (s.shown, s.meaning, s.design or "–", cell(s, symbol_values(s, reduction)[0]), s.unit or "–") for s in symbols
+    ]
     return table(("symbol", "description", "design value", "value", "unit"), rows, "twtnt")
 
 
-def _placement_tables(found: TripletReduction) -> Iterator[str]:
-    for start in range(0, len(found.h), SIDE_BY_SIDE):
-        here = range(start, min(start + SIDE_BY_SIDE, len(found.h)))
-        spacers = (f"{found.measurement.placement[k].spacer_mm:.3f}" for k in here)
+def _placement_tables(reduction: TripletReduction) -> Iterator[str]:
+    for start in range(0, len(reduction.h), SIDE_BY_SIDE):
+        here = range(start, min(start + SIDE_BY_SIDE, len(reduction.h)))
+        spacers = (f"{reduction.measurement.placement[k].spacer_mm:.3f}" for k in here)
         rows: list[tuple[str, ...]] = [("spacer", "in front of the rear stops", "–", *spacers, "mm")]
         for s in PLACEMENT:
-            values = symbol_values(s, found)
+            values = symbol_values(s, reduction)
             shown = [cell(s, values[k if len(values) > 1 else 0]) for k in here]
             rows.append((s.shown, s.meaning, s.design or "–", *shown, s.unit or "–"))
-        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(found.u[k] * 1e3, ".4f") for k in here), "mm"))
-        rows.append(("w", "standardised residual", "–", *(_plain(found.statistics[k], ".2f") for k in here), "–"))
-        rows.append(("status", "", "", *(found.status[k] for k in here), ""))
+        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(reduction.u[k] * 1e3, ".4f") for k in here), "mm"))
+        rows.append(("w", "standardised residual", "–", *(_plain(reduction.statistics[k], ".2f") for k in here), "–"))
+        rows.append(("status", "", "", *(reduction.status[k] for k in here), ""))
         heads = [f"no. {k + 1}" for k in here]
         yield table(("symbol", "description", "design value", *heads, "unit"), rows, "twt" + "n" * len(here) + "t")
 
@@ -209,24 +217,24 @@ def _signed(value: float) -> str:
     return f"{value * 1e3:+.4f} mm" if math.isfinite(value) else "unknown"
 
 
-def _paint(found: TripletReduction) -> str:
+def _paint(reduction: TripletReduction) -> str:
     rows = [
         (name, f"{low * 1e3:+.4f}", f"{high * 1e3:+.4f}")
-        for name, (low, high) in zip(("T₁", "T₂", "BC"), found.plate.departure, strict=True)
+        for name, (low, high) in zip(("T₁", "T₂", "BC"), reduction.plate.departure, strict=True)
     ]
-    design = found.plate.paint_from_design * 1e3
+    design = reduction.plate.paint_from_design * 1e3
     text = f"Paint that would put the mean of the three in the bare top plate: {design:.4f} mm."
-    if found.plate.sampled:
-        low, mean, high = (1e3 * each for each in found.plate.sampled)
+    if reduction.plate.sampled:
+        low, mean, high = (1e3 * each for each in reduction.plate.sampled)
         text += f" Painted surface above the synthetic plane: {low:+.4f} to {high:+.4f} mm, mean {mean:+.4f} mm."
     heads = ("point above the bare top plate", "paint 0.05 mm: mm", "paint 0.15 mm: mm")
     return table(heads, rows, "tnn") + paragraph(text)
 
 
-def _points(found: TripletReduction) -> str:
+def _points(reduction: TripletReduction) -> str:
     rows = [
         (name, POINTS[name], str(k), *(_plain(1e3 * x, ".4f") for x in place))
-        for name, at in point_places(found).items()
+        for name, at in point_places(reduction).items()
         for k, place in enumerate(at, start=1)
     ]
     return table(("point", "description", "no.", "along: mm", "up: mm", "towards the ranger: mm"), rows, "twnnnn")

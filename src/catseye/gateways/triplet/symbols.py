@@ -38,45 +38,45 @@ class Symbol:
 
 
 def _reading(name: str) -> Value:
-    return lambda found: getattr(found.readings, name)
+    return lambda reduction: getattr(reduction.readings, name)
 
 
 def _length(name: str) -> Value:
-    return lambda found: getattr(found.lengths, name)
+    return lambda reduction: getattr(reduction.lengths, name)
 
 
 def _memo(name: str) -> Value:
-    return lambda found: getattr(found.memo, name)
+    return lambda reduction: getattr(reduction.memo, name)
 
 
 def _cycles(name: str) -> Value:
-    return lambda found: getattr(found.cycles, name)
+    return lambda reduction: getattr(reduction.cycles, name)
 
 
 def _height(number: int) -> Value:
-    return lambda found: found.plate.height[number]
+    return lambda reduction: reduction.plate.height[number]
 
 
-def _middle(found: TripletReduction) -> float:
-    return 0.5 * (found.plate.height[0] + found.plate.height[1])
+def _middle(reduction: TripletReduction) -> float:
+    return 0.5 * (reduction.plate.height[0] + reduction.plate.height[1])
 
 
 def _half(after: bool) -> Value:
-    return lambda found: half_wavelengths(found.readings)[after]
+    return lambda reduction: half_wavelengths(reduction.readings)[after]
 
 
 def _whole(name: str, after: bool = False) -> Value:
-    return lambda found: getattr(found.cycles, name) * half_wavelengths(found.readings)[after]
+    return lambda reduction: getattr(reduction.cycles, name) * half_wavelengths(reduction.readings)[after]
 
 
 def _less_delta(name: str) -> Value:
-    return lambda found: getattr(found.lengths, name) - _whole("n_1")(found)
+    return lambda reduction: getattr(reduction.lengths, name) - _whole("n_1")(reduction)
 
 
 def _weather(quantity: str, unit: str, after: bool = False) -> Value:
     if after:
-        return lambda found: np.array([p.flipped(quantity, unit) for p in found.measurement.placement])
-    return lambda found: np.array([getattr(p, f"{quantity}_{unit}") for p in found.measurement.placement])
+        return lambda reduction: np.array([p.flipped(quantity, unit) for p in reduction.measurement.placement])
+    return lambda reduction: np.array([getattr(p, f"{quantity}_{unit}") for p in reduction.measurement.placement])
 
 
 UNIT = (
@@ -185,14 +185,14 @@ POINTS = {
 }
 
 
-def symbol_values(symbol: Symbol, found: TripletReduction) -> list[Any]:
+def symbol_values(symbol: Symbol, reduction: TripletReduction) -> list[Any]:
     """One value, or one for each placement, SI."""
-    return [each.item() if isinstance(each, np.generic) else each for each in np.ravel(symbol.value(found))]
+    return [each.item() if isinstance(each, np.generic) else each for each in np.ravel(symbol.value(reduction))]
 
 
-def point_places(found: TripletReduction) -> dict[str, np.ndarray]:
+def point_places(reduction: TripletReduction) -> dict[str, np.ndarray]:
     """Where the points are in each placement, (k, 3) m from S, (1, 3): along the prisms, up, towards the ranger."""
-    x, r = found.lengths, found.readings
+    x, r = reduction.lengths, reduction.readings
     rise = r.l_2 - r.hrp_2 - r.l_1 + r.hrp_1
     step = np.array([0.5 * np.sqrt(r.d_12**2 - rise**2), 0.0, 0.5 * rise])
     middle = -np.stack([x.along, x.up, x.depth_mp], axis=-1)

@@ -60,11 +60,11 @@ def refuse_output(out: Path, campaign: Path) -> Path:
 
 def _refuse_strangers(out: Path, where: Path) -> None:
     """Nothing is replaced but what catseye wrote itself."""
-    found = sorted(entry.name for entry in where.iterdir())
-    if not found:
+    names = sorted(entry.name for entry in where.iterdir())
+    if not names:
         return
     known = {PROVENANCE, *_written(where)}
-    strangers = [name for name in found if name not in known] if len(known) > 1 else found
+    strangers = [name for name in names if name not in known] if len(known) > 1 else names
     if strangers:
         more = f" and {len(strangers) - 1} more" if len(strangers) > 1 else ""
         raise InputError(

@@ -104,9 +104,9 @@ def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
             raise InputError(f"table {table.name!r} stands under the key {name!r} (expected the same)")
         pages.append(_page(table))
     whole = io.BytesIO()
-    made = fits.HDUList(pages)
-    made.verify("exception")
-    made.writeto(whole, checksum=True, output_verify="exception")
+    hdus = fits.HDUList(pages)
+    hdus.verify("exception")
+    hdus.writeto(whole, checksum=True, output_verify="exception")
     return whole.getvalue()
 
 
@@ -133,9 +133,9 @@ def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]
     content = sampler_tables(tables)
     (directory / name).write_bytes(content)
     place = directory / PROVENANCE
-    told = json.loads(place.read_text(encoding="utf-8"))
-    told["outputs"] = {**told["outputs"], name: hashlib.sha256(content).hexdigest()}
-    place.write_bytes(json_page(told).encode("utf-8"))
+    provenance = json.loads(place.read_text(encoding="utf-8"))
+    provenance["outputs"] = {**provenance["outputs"], name: hashlib.sha256(content).hexdigest()}
+    place.write_bytes(json_page(provenance).encode("utf-8"))
 
 
 def join_tables(
@@ -147,11 +147,11 @@ def join_tables(
     frame, pivot   of the tables, as in `SamplerTable`
     tables         more, which stand first
     """
-    told = dict(tables or {})
+    joined = dict(tables or {})
     for path in sorted(directory.glob("*.csv")):
         name = path.stem.upper().replace("-", "_")
-        told[name] = _of_csv(name, path.read_text(encoding="utf-8"), frame, pivot)
-    join_samplers(directory, SAMPLERS, told)
+        joined[name] = _of_csv(name, path.read_text(encoding="utf-8"), frame, pivot)
+    join_samplers(directory, SAMPLERS, joined)
 
 
 def _of_csv(name: str, text: str, frame: str, pivot: str) -> SamplerTable:
@@ -206,11 +206,11 @@ def _page(table: SamplerTable) -> Any:
         columns = {TIME: SamplerColumn("d", np.asarray(table.mjd, dtype=float), "UTC, as MJD"), **columns}
         _refuse_times(table)
     _refuse_names(table, columns)
-    made = [_column(table.name, name, column) for name, column in columns.items()]
+    fields = [_column(table.name, name, column) for name, column in columns.items()]
     lengths = {name: len(np.asarray(column.values)) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         raise InputError(f"table {table.name}: columns have unlike lengths {lengths} (expected one)")
-    page = fits.BinTableHDU.from_columns(made, name=table.name)
+    page = fits.BinTableHDU.from_columns(fields, name=table.name)
     header = page.header
     header["TIMESYS"] = ("UTC", "time scale of MJD")
     header["MJDREF"] = (0.0, "[d] zero of the column MJD")

@@ -34,11 +34,11 @@ def write_files(files: Files, directory: Path, provenance: Mapping[str, Any], pr
     progress     told of each file
     """
     outputs: dict[str, str] = {}
-    for done, (name, made) in enumerate(files.items()):
+    for done, (name, page) in enumerate(files.items()):
         if progress is not None:
             progress(f"writing {name}", done, len(files))
         digest = hashlib.sha256()
-        text = made()
+        text = page()
         with (directory / name).open("wb") as stream:
             for piece in (text,) if isinstance(text, str) else text:
                 raw = piece.encode("utf-8")

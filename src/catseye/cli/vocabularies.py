@@ -1,0 +1,62 @@
+"""The words that options take and `--help` prints, each list once for all commands.
+
+They are decided elsewhere, in modules whose import `--help` spares itself; `tests/cli/test_vocabularies.py` holds each
+list equal to its source.
+"""
+
+from collections.abc import Callable
+
+import typer
+
+# atmosphere
+AIR_MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
+SOUND_MODELS = "parker2004|cramer1993|real_gas"
+THERMOMETRY_MODELS = "real_gas|cramer1993|parker2004"  # the one of choice first
+
+# optics and mirrors
+EDITIONS = "iec2014|ansi2014"
+REFLECTORS = "prism|hollow|ball"
+
+# calibrations and their reports
+CALIBRATION_KINDS = (
+    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
+    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
+    "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
+    "monument-place|inclinometer|hydrostatic-level"
+)
+REPORT_KINDS = "monument|mirror"
+
+# networks
+DATUMS = "free|fixed"
+NETWORK_WEIGHTS = "huber|l1|biweight|igg3"
+COMPONENTS = "rangers|groups"
+
+# the telescope
+POSE_GROUPS = "dish|feed-arm|alidade|subreflector"
+POSE_FRAMES = "ground|alidade|reflector"
+POSE_WEIGHTS = "l1|huber|igg3|biweight"
+OPTICS = "prime|gregorian"
+POINTING_TERMS = "IA|IE|CA|NPAE|AW|AN|HZCZ|HZSZ"
+PARABOLOID_PARTS = "vertex|axis|focal-length"
+NUMBERINGS = "noll|ansi"
+PRISM_FRAMES = "reflector|ground"
+TRAVELS = "normal|axis"
+SERIES_FRAMES = "reflector|alidade|ground"
+OWN_FUNCTIONS = "place|each"
+
+# a living site
+CONDITIONS = "night|windy-day|dewy-night"
+MODES = "active|passive|hold"
+FILTERS = "random_walk|constant_velocity"
+EXPORT_FORMATS = "csv|fits|campaign"
+
+
+def one_of(words: str) -> Callable[[str | None], str | None]:
+    """A check of an option's value; one that was not given passes."""
+
+    def check(value: str | None) -> str | None:
+        if value is not None and value not in words.split("|"):
+            raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
+        return value
+
+    return check
