@@ -70,7 +70,7 @@ def adjustment() -> None:
     campaign, settings = read_campaign(EXAMPLE), ReductionSettings()
     phases = measure_phases(campaign, settings)
     electronics, _ = follow_electronics(campaign, phases)
-    network = build_network(campaign, phases, electronics, settings)
+    network = build_network(campaign, phases, electronics, settings=settings)
     x0 = np.array(network.layout.start)
     free = np.array(network.layout.free)
     groups = [shot_group(network, name, x0)[0] for name in network.rangers] + network.priors
@@ -102,7 +102,7 @@ def adjustment() -> None:
                 (ours, seconds(lambda: adjust(x0, groups, free=free))),
                 (
                     "the same with rejection, cycles and air renewed",
-                    seconds(lambda: adjust_coordinates(campaign, phases, electronics, settings)),
+                    seconds(lambda: adjust_coordinates(campaign, phases, electronics, settings=settings)),
                 ),
                 (
                     "scipy least_squares, analytic Jacobian: answer alone",

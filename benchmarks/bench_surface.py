@@ -91,9 +91,9 @@ def main() -> None:
     few = points[:SAMPLE]
     ours = "catseye, compiled, one thread"
     contenders: dict[str, tuple[Callable[[], object], int]] = {
-        ours: (lambda: fit_series(points, variance, OWN, F, free=FREE, compiled=True), epochs),
+        ours: (lambda: fit_series(points, variance, OWN, focal_length=F, free=FREE, compiled=True), epochs),
         "catseye, plain numpy": (
-            lambda: fit_series(few, variance, OWN, F, free=FREE, compiled=False),
+            lambda: fit_series(few, variance, OWN, focal_length=F, free=FREE, compiled=False),
             SAMPLE,
         ),
         "scipy least_squares (lm), analytic Jacobian": (lambda: by_scipy(few, True), SAMPLE),
@@ -101,7 +101,7 @@ def main() -> None:
     }
     with threadpool_limits(limits=1, user_api="blas"):
         cost = race(contenders)
-        found = fit_series(points, variance, OWN, F, free=FREE, compiled=True).require_converged()
+        found = fit_series(points, variance, OWN, focal_length=F, free=FREE, compiled=True).require_converged()
         peer = by_scipy(few, True)
     off = np.abs(found.parameters[:SAMPLE] - peer) / np.sqrt(np.einsum("tii->ti", found.covariance[:SAMPLE]))
     sys.stdout.write(f"{len(PLACES)} prisms, {epochs} epochs, six parameters, covariance, deviations\n")

@@ -93,7 +93,7 @@ def main(directory: str) -> None:
             say(f"5 m/s  {name:36} {values[at]:+8.4f} °C\n")
     e = float(sound(T, P, H, model="real_gas").vapour_pressure_hpa)
     for f in (500.0, 2000.0, 5000.0, 10000.0):
-        share = dispersion(T, P, e, f)
+        share = dispersion(T, P, e, frequency_hz=f)
         say(f"dispersion at {f:6.0f} Hz: {share.phase * C / 0.62:.3f} to {share.group * C / 0.62:.3f} °C\n")
     for gradient in (0.1, 0.3, 1.0):
         early = bent_ray_excess(LENGTH, C, 0.6 * gradient)

@@ -39,7 +39,7 @@ class Column:
 
     def _of(self, formula, z):
         warmth = np.clip(self.temperature(z), -40.0, 100.0)
-        pressure = hydrostatic_pressure_hpa(933.0, 0.5 * (warmth + 20.0), 1.0, z)
+        pressure = hydrostatic_pressure_hpa(933.0, 0.5 * (warmth + 20.0), 1.0, z_to=z)
         return formula(warmth, pressure, 0.0)
 
     def rays(self, a, b):

@@ -129,12 +129,12 @@ def _one(stations, path, targets, own, frame, begin, interval, shares) -> tuple[
     whole = misses(track, mounted(stations), later, shares=between, whole_counts=True)[0]
     place, speed, bend = path.motion(own, frame, begin)
     relative = place[None] - stations.scan_point[:, None]
-    seen = apparent_motion(stations.mirror_from_ground[:, None], relative, speed[None], bend[None])
+    seen = apparent_motion(stations.mirror_from_ground[:, None], relative, speed[None], acceleration=bend[None])
     distance = np.linalg.norm(relative, axis=-1)
     rate = np.sum(relative * speed[None], axis=-1) / distance
     across = np.sqrt(np.maximum(np.sum(speed[None] ** 2, axis=-1) - rate**2, 0.0))
     most = 1.05 * np.linalg.norm(bend, axis=-1)[None] + 1e-4
-    bound = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape), interval)[2]
+    bound = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape), interval=interval)[2]
     apparent = np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape)
     longest = longest_interval(seen[0], *apparent)
     mirror = in_mirror_axes(stations[:, None], place[None])

@@ -96,13 +96,13 @@ def use_table() -> str:
         whole = np.linalg.norm(scan - u.prisms.mean(axis=0), axis=1)
         for more in (0.0, 1.0):  # 3.13: INT of the length with the glass, or one more
             delta = (np.floor((d[:, 0] + 0.0335) / half) + more) * half
-            series.append(np.abs(median_series(d[:, 0], d[:, 1], u.d_12, delta) - whole).max())
+            series.append(np.abs(median_series(d[:, 0], d[:, 1], u.d_12, delta=delta) - whole).max())
         cosine = incidence_on_prisms(u, scan)[0]
         memo = np.cos(visibility.incidence(scan, u.prisms, aim - u.prisms))
         wrong = obliquity_correction(u.heights, u.ratio, memo) - obliquity_correction(u.heights, u.ratio, cosine)
         angles.append(np.abs(wrong).max())
         kept.append(np.abs(wrong.mean(axis=1)).max())
-        found = ball_ranges([u], scan, (d - obliquity_correction(u.heights, u.ratio, cosine))[None], np.zeros((12, 12)))
+        found = ball_ranges([u], scan, (d - obliquity_correction(u.heights, u.ratio, cosine))[None], covariance=np.zeros((12, 12)))
         sight = (scan - u.ball) / np.linalg.norm(scan - u.ball, axis=1, keepdims=True)
         square.append(np.abs(ball_distance_memo(found.d_mp[0], sight, u.h_corr * u.normal) - found.d_bc[0]).max())
     return "\n".join(
@@ -138,7 +138,7 @@ def air_table() -> str:
     lines = ["air's temperature: change of n_A exact, by D.5 (1e-6); range by tabulated P_c too long: prism, ball (um)"]
     for t in (-15.0, 0.0, 10.0, 30.0, 40.0):
         exact = float(group_refractivity(t, 933.0, 50.0, model="rueger1990")) - start
-        linear = float(refractivity_change(t - 20.0, 0.0, 0.0, SLOPES))
+        linear = float(refractivity_change(t - 20.0, 0.0, 0.0, slopes=SLOPES))
         prism, ball = glass_effect(np.array([0.0381, 0.14651]), exact) / UM
         lines.append(f"{t:6.0f}{exact * 1e6:10.3f}{linear * 1e6:10.3f}{prism:10.2f}{ball:10.2f}")
     return "\n".join(lines)

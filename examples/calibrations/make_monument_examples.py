@@ -62,7 +62,7 @@ def monument_azimuth(rng: np.random.Generator) -> None:
             look(name, "field", 0.1 * turn + 0.02 * k, float(azimuth(sight)) - to_z, float(zenith_angle(sight)))
         hour = 0.1 * turn + 0.06
         latitude, longitude = astronomic(FRAME, PLACE)
-        at, zenith = star_place(POLARIS, MJD + hour / 24, latitude, longitude, height=778.0, ut1_utc=0.12)
+        at, zenith = star_place(POLARIS, MJD + hour / 24, latitude, longitude=longitude, height=778.0, ut1_utc=0.12)
         look("Polaris", "field", hour, float(at) - to_z, float(zenith))
     for hour in (4.0, 4.05):
         look("M102", "after", hour, -v_block, np.pi / 2)

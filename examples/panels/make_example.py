@@ -38,7 +38,7 @@ def main() -> None:
     solid = solid_panels(part, rng, piston=2.5e-4, slope=8e-5, twist=2e-5, bump=4e-5)
     write_maps(solid, HERE / "maps", rng)
     crew = Crew(rng)
-    rows, stands = panel_readings(solid, sheet, crew, CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2)))
+    rows, stands = panel_readings(solid, sheet, crew, tour=CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2)))
     wrong = next(k for k, row in enumerate(rows) if row.startswith(WRONG[0]))
     cells = rows[wrong].split(",")
     cells[WRONG[1]] = f"{float(cells[WRONG[1]]) + WRONG[2]:.3f}"
@@ -58,7 +58,7 @@ def main() -> None:
     turn = np.where(found.known, found.turns, 0.0) * 0.98 + rng.normal(0.0, 0.004, found.turns.shape)
     moved = screwed(solid, np.where(found.known, turn, 0.0) * sheet.screw.pitch_mm * 1e-3)
     rows, _ = panel_readings(
-        moved, sheet, Crew(rng), CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2)), shafts=stands
+        moved, sheet, Crew(rng), tour=CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2)), shafts=stands
     )
     (HERE / "as-left.csv").write_text("\n".join(rows) + "\n", "utf-8")
     sys.stdout.write(f"wrong: line {wrong + 1}, a_mm\n")

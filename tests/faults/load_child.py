@@ -37,7 +37,7 @@ async def serve(site, offset, twin):
     stations = tuple(station.name for station in site.site.weather_station)
     feed = SiteFeed("load", stations, world, clock)
     await served.start()
-    await warm(site, served.rangers, warming, world.live_posture)
+    await warm(site, served.rangers, warming, posture=world.live_posture)
     for head in heads.values():
         head.fired.clear()
     await feed.start(LOOPBACK, 0)

@@ -73,13 +73,13 @@ def scene(seed, ranges=6):
 def test_a_search_moves_with_its_stations_in_any_order_and_knows_no_whole_periods(seed, shift, order, whole):
     stations, point, distance = scene(seed)
     half, c = 0.0999, np.full(6, 1e-8)
-    one = locate(np.zeros(3), 0.01 * np.eye(3), stations, np.mod(distance, half), period=half, covariance=c)
+    one = locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths=np.mod(distance, half), period=half, covariance=c)
     order = list(order)
     other = locate(
         np.full(3, shift),
         0.01 * np.eye(3),
         stations[order] + shift,
-        np.mod(distance, half)[order] + whole * half,
+        lengths=np.mod(distance, half)[order] + whole * half,
         period=half,
         covariance=c,
     )

@@ -32,7 +32,7 @@ def reduced_few(few):
 @pytest.fixture(scope="module")
 def network(few, reduced_few):
     r = reduced_few
-    return build_network(few, r.phases, r.electronics, r.settings)
+    return build_network(few, r.phases, r.electronics, settings=r.settings)
 
 
 @pytest.fixture(scope="module")

@@ -280,7 +280,7 @@ def test_no_beam_within_a_rectangle_of_counts_is_nearer_than_the_closed_form_say
     inside = low + np.array(shares) * size
     own = LivePosture(0, 0.0, 0.5)
     apart = angle(beams(name, inside, own, np.zeros(len(inside))), s)
-    assert apart.min() >= nearest(v.station, low, high, s[None])[0] - 1e-7
+    assert apart.min() >= nearest(v.station, low, high, directions=s[None])[0] - 1e-7
 
 
 covariances = st.lists(st.floats(-1, 1), min_size=9, max_size=9).map(lambda v: np.reshape(v, (3, 3)))

@@ -87,6 +87,6 @@ def test_a_bent_ray_is_never_late_and_knows_no_sign_of_the_gradient(length, c, g
 
 @given(temperatures, pressures, st.floats(0.0, 20.0), st.floats(0.0, 9e5), st.floats(1.0, 1e5))
 def test_higher_frequencies_are_never_slower_and_the_envelope_runs_ahead(t, p, e, frequency, more):
-    low, high = dispersion(t, p, e, frequency), dispersion(t, p, e, frequency + more)
+    low, high = dispersion(t, p, e, frequency_hz=frequency), dispersion(t, p, e, frequency_hz=frequency + more)
     assert low.phase <= high.phase < 1.5e-3
     assert low.group >= low.phase

@@ -183,7 +183,7 @@ def test_no_accepted_search_of_many_comes_into_the_cone():
         for _ in range(10):
             off = rng.choice([-1, 1]) * rng.uniform(5.2, 6.2) * DEGREE
             centre = np.add(seen_at(mjd), [0.0, off / (4 * np.pi) * 1e5])
-            looks = spiral(np.rint(centre), STATION.zeros, 0.4 * DEGREE, 2e-3, STOPS).counts
+            looks = spiral(np.rint(centre), STATION.zeros, 0.4 * DEGREE, reach=2e-3, limits=STOPS).counts
             verdict = own.route(mjd, looks, dwell=3.0)
             moves = trapezoid(looks[:-1], looks[1:], own.pace)
             time, way = profile(looks[:-1], looks[1:], 17)

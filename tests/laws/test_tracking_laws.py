@@ -53,7 +53,7 @@ def test_the_chosen_interval_never_exceeds_the_limit(seed, speed, acceleration, 
     else:
         way = miss(FLAT, line, points) / np.linalg.norm(points, axis=1)
         assert way.max() <= limit * 5e-5 * (1 + 1e-9) + 1e-14
-    bound, _, way = line_bound(p, speed, acceleration, h)
+    bound, _, way = line_bound(p, speed, acceleration, interval=h)
     assert np.all(off <= bound + ROUNDING)
     assert np.all(miss(FLAT, line, points) <= way + 1e-11)
 
@@ -68,7 +68,7 @@ def test_the_bound_is_not_idle(seed):
     up = np.cross([0.0, 0.0, 1.0], p)
     up /= np.linalg.norm(up)
     h = 0.5
-    bound = line_bound(p, 0.0, 0.1, h)[0]
+    bound = line_bound(p, 0.0, 0.1, interval=h)[0]
     t = np.array([[0.0], [h / 2], [h]])
     n = counts(FLAT, (p + 0.05 * up * t**2) @ FLAT.mirror_from_ground)
     off = abs(np.remainder((n[0] + n[2]) / 2 - n[1] + 25_000.0, 50_000.0)[0] - 25_000.0)
@@ -97,7 +97,7 @@ def test_no_place_of_a_disc_escapes_the_spiral(radius, seed):
 def test_no_place_of_a_rectangle_escapes_the_raster(elevation, prime, reach, half, seed):
     rng = np.random.default_rng(seed)
     centre = np.array([500.3, -elevation if prime else elevation])
-    pattern = raster(centre, [0.0, 0.0], half, reach, (-50_000.0, 50_000.0))
+    pattern = raster(centre, [0.0, 0.0], half, reach=reach, limits=(-50_000.0, 50_000.0))
     places = rng.uniform(-1, 1, (3000, 2)) * half
     places[:600, 0] = half[0] * np.sign(places[:600, 0])
     # sky is not flat: its rows bend by half^2/2 cot Phi, at most 3e-5 of these

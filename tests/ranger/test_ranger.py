@@ -353,7 +353,7 @@ def test_no_move_that_is_allowed_comes_near_the_sun():
         share = rng.uniform(size=(400, 2))
         looks = beam(station, start + share * (end - start)) @ station.mirror_from_ground
         least = np.arccos(np.clip(looks @ sun, -1, 1)).min()
-        if refusal(station, start, end, [sun]) is None:
+        if refusal(station, start, end, suns=[sun]) is None:
             allowed += 1
             assert least >= HALF_ANGLE
         else:
@@ -766,7 +766,7 @@ def test_the_way_out_is_a_free_move_of_one_axis_that_ends_20_degrees_off():
         begin = np.arccos(beam(station, here) @ station.mirror_from_ground @ sun)
         if begin >= HALF_ANGLE:
             continue
-        end = way_out(station, here, [sun], (-30_000, 80_000))
+        end = way_out(station, here, [sun], limits=(-30_000, 80_000))
         assert end is not None
         assert min(abs(np.array(end) - here)) <= 0.5
         assert -30_000 <= end[0] <= 80_000
@@ -791,7 +791,7 @@ def test_the_way_out_keeps_clear_of_other_suns():
         begin = np.arccos(suns @ (beam(station, here) @ station.mirror_from_ground))
         if begin[0] >= HALF_ANGLE or begin[1:].min() < 6.0 * DEGREE:
             continue
-        end = way_out(station, here, list(suns), (-30_000, 80_000))
+        end = way_out(station, here, list(suns), limits=(-30_000, 80_000))
         if end is None:
             continue
         found += 1

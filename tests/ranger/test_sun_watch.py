@@ -39,8 +39,8 @@ def test_a_rest_is_refused_from_where_the_servo_could_overshoot_into_the_cone(aw
     boundary = CONE + turn(corner)
     assert boundary - CONE == pytest.approx(580.0 / 3600 * DEGREE, rel=1e-3)  # 20 sqrt(12.96^2 + 25.92^2) arc seconds
     outside, inside = (beyond(LEVEL, corner, boundary + by) for by in (NEAR, -NEAR))
-    assert refusal(STATION, LEVEL, LEVEL, [outside]) is None
-    said = refusal(STATION, LEVEL, LEVEL, [inside])
+    assert refusal(STATION, LEVEL, LEVEL, suns=[outside]) is None
+    said = refusal(STATION, LEVEL, LEVEL, suns=[inside])
     assert said is not None
     assert "of the Sun (expected at least 5.2)" in said
     # what the margin is for: the axes twenty counts on
@@ -54,7 +54,7 @@ def test_no_rest_that_is_allowed_looks_into_the_cone_wherever_the_servo_stands_w
     for _ in range(150):
         at = np.add(ZEROS, rng.uniform([-20_000, -20_000], [20_000, 20_000]))
         sun = beyond(at, rng.normal(size=2), CONE + rng.uniform(0.0, 0.2) * DEGREE)
-        if refusal(STATION, at, at, [sun]) is None:
+        if refusal(STATION, at, at, suns=[sun]) is None:
             allowed += 1
             assert apart(beam(at + corners), sun).min() > CONE
     assert 10 < allowed < 60  # 0.04 of the 0.2 deg
@@ -79,11 +79,11 @@ def test_a_move_is_refused_from_where_the_beam_between_two_looks_could_come_into
     between, boundary = turn(half), CONE + turn(OVERSHOOT) + turn(half)
     for by in (NEAR, -NEAR):
         sun = beyond(end, half, boundary + by)
-        assert nearest_sun(STATION, LEVEL, end, [sun]) == pytest.approx(boundary + by - between, abs=0.5 * NEAR)
-        assert nearest_sun(STATION, LEVEL, end, [sun], exact=True) == pytest.approx(boundary + by, abs=1e-9)
-        assert (refusal(STATION, LEVEL, end, [sun]) is None) == (by > 0.0)
+        assert nearest_sun(STATION, LEVEL, end, suns=[sun]) == pytest.approx(boundary + by - between, abs=0.5 * NEAR)
+        assert nearest_sun(STATION, LEVEL, end, suns=[sun], exact=True) == pytest.approx(boundary + by, abs=1e-9)
+        assert (refusal(STATION, LEVEL, end, suns=[sun]) is None) == (by > 0.0)
     nearer = beyond(end, half, boundary - 0.5 * between)  # half a cell's margin less
-    assert refusal(STATION, LEVEL, end, [nearer]) is not None
+    assert refusal(STATION, LEVEL, end, suns=[nearer]) is not None
 
 
 def test_the_least_angle_of_a_move_is_never_more_than_that_of_any_counts_in_its_rectangle():
@@ -94,7 +94,7 @@ def test_the_least_angle_of_a_move_is_never_more_than_that_of_any_counts_in_its_
         sun = rng.normal(size=3)
         sun /= np.linalg.norm(sun)
         looks = beam(start + rng.uniform(size=(300, 2)) * (end - start))
-        assert nearest_sun(STATION, start, end, [sun]) <= apart(looks, sun).min()
+        assert nearest_sun(STATION, start, end, suns=[sun]) <= apart(looks, sun).min()
 
 
 def passing(aside, start=-2.5 * DEGREE, end=8.0 * DEGREE):
@@ -122,7 +122,7 @@ def test_a_move_out_of_the_cone_may_come_nearer_than_it_began_by_what_the_grid_c
     for by in (10.0 * NEAR, -10.0 * NEAR):  # 20": the way begins 2.5 deg aside, where slack grows slower than the angle
         start, end, sun = passing(high + by)
         assert apart(beam(start), sun) < CONE < apart(beam(end), sun) - turn(OVERSHOOT)
-        assert (refusal(STATION, start, end, [sun]) is None) == (by > 0.0)
+        assert (refusal(STATION, start, end, suns=[sun]) is None) == (by > 0.0)
 
 
 def test_a_ranger_that_is_told_to_move_refuses_from_the_same_boundary():

@@ -36,7 +36,7 @@ def references_01(targets_01):
 @pytest.fixture(scope="session")
 def network_01(night_01, reduced_night_01):
     r = reduced_night_01
-    return build_network(night_01, r.phases, r.electronics, r.settings)
+    return build_network(night_01, r.phases, r.electronics, settings=r.settings)
 
 
 @pytest.fixture(scope="session")

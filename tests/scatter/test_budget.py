@@ -70,7 +70,9 @@ def scene_in(reduced, campaign, row, *, phases=None, settings=None, keep=None, a
         wrong |= {k: "left out here" for k in rows if k not in keep(rows)}
     ends = tuple(coordinates.x[coordinates.index(name)] for name in names)
     place = coordinates.places[names[1]]
-    return scene_of(campaign, phases, wrong, row, ends=ends, place=place, settings=settings, assumptions=assumptions)
+    return scene_of(
+        campaign, phases, wrong, row=row, ends=ends, place=place, settings=settings, assumptions=assumptions
+    )
 
 
 def weakened(reduced, row, share):
@@ -245,7 +247,7 @@ def squares_of_night(seed, directory, count=12):
         ends = tuple(night.truth.points[name] for name in names)
         place, row = places[names[1]], int(row)
         scene = scene_of(
-            campaign, phases, wrong, row, ends=ends, place=place, settings=ReductionSettings(), assumptions=PERFECT
+            campaign, phases, wrong, row=row, ends=ends, place=place, settings=ReductionSettings(), assumptions=PERFECT
         )
         # the twin's air follows the notes' formula to the digit: its own uncertainty is none here
         items = tuple(i for i in items_of(scene) if i.key != "formula")

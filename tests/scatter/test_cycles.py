@@ -37,7 +37,7 @@ def searched(runs, seed, *, ranges, u, sigma, common=0.0, wrong=0.0):
             np.zeros(3),
             u**2 * np.eye(3),
             stations,
-            lengths,
+            lengths=lengths,
             period=HALF,
             covariance=c,
             limits=AmbiguityLimits(wrong=wrong),

@@ -29,9 +29,9 @@ def distances(rng, reference, time, trials, *, true_walk=WALK, variance=None):
     drift = walked(rng, np.concatenate([reference, time]), trials, true_walk)
     r = len(reference)
     seen = drift[:, :r] + np.sqrt(variance) * rng.standard_normal((trials, r))
-    covariance = drift_at(reference, seen[0], variance, time, random_walk=WALK)[1]
+    covariance = drift_at(reference, seen[0], variance, time=time, random_walk=WALK)[1]
     # the mean is linear in the references' phases: its matrix from unit phases, then all trials at once
-    gain = np.stack([drift_at(reference, row, variance, time, random_walk=WALK)[0] for row in np.eye(r)], axis=1)
+    gain = np.stack([drift_at(reference, row, variance, time=time, random_walk=WALK)[0] for row in np.eye(r)], axis=1)
     error = seen @ gain.T - drift[:, r:]
     squares = np.einsum("ti,ij,tj->t", error, np.linalg.inv(covariance), error)
     return squares, error / np.sqrt(np.diag(covariance))
@@ -75,7 +75,7 @@ def test_the_short_way_claims_the_same_scatter(kind):
     seen = drift[:, : len(reference)] + np.sqrt(variance) * rng.standard_normal((trials, len(reference)))
     errors = []
     for row, truth in zip(seen, drift[:, len(reference) :], strict=True):
-        mean, u = drift_along(reference, row, variance, time, random_walk=WALK)
+        mean, u = drift_along(reference, row, variance, time=time, random_walk=WALK)
         errors.append((mean - truth) / u)
     # neighbours are correlated: 25 shots count as some 10; four standard deviations
     assert np.mean(np.square(errors)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / (10 * trials)))
@@ -93,7 +93,7 @@ def test_a_gap_left_by_a_missing_reference_shows_in_the_claim():
     whole, _ = schedule(rng, "regular")
     holed, _ = schedule(rng, "one missing")
     middle = np.array([300.0])
-    u = [np.sqrt(drift_at(t, np.zeros(len(t)), np.full(len(t), NOISE**2), middle, random_walk=WALK)[1][0, 0])
+    u = [np.sqrt(drift_at(t, np.zeros(len(t)), np.full(len(t), NOISE**2), time=middle, random_walk=WALK)[1][0, 0])
          for t in (whole, holed)]  # fmt: skip
     assert u[1] > 2 * u[0]  # from a reference's own noise to the middle of 120 s
 

@@ -34,7 +34,7 @@ def test_corner_heights_scatter_as_their_whole_covariance_says(tmp_path, runs):
         rng = np.random.default_rng([206, run])
         solid = standing_by_chance(layout, sheet, rng)
         shafts = rng.normal(0.0, 3e-4, len(layout.corners))
-        rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(a_day=8), shafts=shafts)
+        rows, stands = panel_readings(solid, sheet, Crew(rng), tour=CornerTour(a_day=8), shafts=shafts)
         found = reduce_panels(
             read(rows, tmp_path / "r.csv", layout, sheet),
             layout,
@@ -71,7 +71,7 @@ def test_bumps_of_panels_without_maps_are_covered_by_shape_and_slope(tmp_path, r
         solid = solid_panels(layout, rng, piston=2.5e-4, slope=8e-5, twist=2e-5, bump=4e-5)
         slope = float(np.sqrt(np.mean(np.sum(solid.bumps**2 * np.sum(solid.bump_k**2, axis=1), axis=1)) / 4.0))
         sheet = tool(u_slope_urad=slope * 1e6, u_shape_um=40.0, u_set_um=300.0, u_twist_um=20.0)
-        rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(a_day=8))
+        rows, stands = panel_readings(solid, sheet, Crew(rng), tour=CornerTour(a_day=8))
         readings = read(rows, tmp_path / "r.csv", layout, sheet)
         found = reduce_panels(readings, layout, sheet, survey=survey(stands, U_SURVEY, rng))
         z.append((found.relative[found.known] - relative(found, solid.heights())) / found.u_relative[found.known])
@@ -105,7 +105,9 @@ def test_false_alarms_are_as_rare_as_the_level_says(tmp_path, runs):
     alarms = 0
     for run in range(runs):
         rng = np.random.default_rng([208, run])
-        rows, _ = panel_readings(standing_by_chance(layout, sheet, rng), sheet, Crew(rng), CornerTour(turns=(0, 1, 2)))
+        rows, _ = panel_readings(
+            standing_by_chance(layout, sheet, rng), sheet, Crew(rng), tour=CornerTour(turns=(0, 1, 2))
+        )
         found = reduce_panels(read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet)
         alarms += bool(found.doubts)
     assert alarms <= 0.05 * runs + 4.0 * np.sqrt(0.05 * runs)

@@ -83,7 +83,7 @@ def test_track_profiles_scatter_as_their_covariance_says():
     for _ in range(count):
         turn = rng.multivariate_normal(np.zeros(2), q[0], len(azimuth))
         tilts = TiltReadings(np.zeros(50), at, zero + rng.normal(size=(50, 2)) * 0.2 * ARCSECOND, u, "")
-        found = track_profile(azimuth, turn, q, tilts, harmonics=2)
+        found = track_profile(azimuth, turn, q, tilts=tilts, harmonics=2)
         sample.append(np.concatenate([found.series.values, found.zero[0] - zero]))
     sample = np.array(sample)
     own = found.series.covariance
@@ -97,7 +97,7 @@ def test_a_joined_inclinometer_scatters_as_claimed():
     q, u = root @ root.T, 1e-6
     six = rng.multivariate_normal(np.zeros(6), q, count)
     tilt = rng.normal(size=(count, 2)) * u
-    sample = np.array([joined_tilt(s, q, t, u)[0] for s, t in zip(six, tilt, strict=True)])
-    claimed = joined_tilt(six[0], q, tilt[0], u)[1]
+    sample = np.array([joined_tilt(s, q, t, u=u)[0] for s, t in zip(six, tilt, strict=True)])
+    claimed = joined_tilt(six[0], q, tilt[0], u=u)[1]
     assert np.abs(holds(sample, claimed, count)).max() < 4.0
     assert np.all(np.diag(claimed)[3:5] < u**2)

@@ -53,7 +53,7 @@ def planted(epoch, site, body, *, shift=(0, 0, 0), turn=(0, 0, 0)):
 
 def offset(later, earlier, site):
     dish, arm = (pose_of_group(later, earlier, site, group=g, frame="reflector") for g in ("dish", "feed-arm"))
-    cross = cross_covariance(arm, dish, site, earlier)
+    cross = cross_covariance(arm, dish, site, earlier=earlier)
     return pointing_offset(dish.pose, arm.pose, site, cross=cross)
 
 
@@ -87,7 +87,7 @@ def test_a_pointing_offset_of_two_arc_seconds_is_found_to_a_quarter_with_sixty_p
 def test_what_points_share_makes_the_beam_surer_than_its_parts(epoch, night_01):
     """Rangers of the arm see the dish: their own motion is common to both, and a covariance without that is larger."""
     dish, arm = (pose_of_group(epoch, epoch, night_01, group=g, frame="reflector") for g in ("dish", "feed-arm"))
-    joint = pointing_offset(dish.pose, arm.pose, night_01, cross=cross_covariance(arm, dish, night_01, epoch))
+    joint = pointing_offset(dish.pose, arm.pose, night_01, cross=cross_covariance(arm, dish, night_01, earlier=epoch))
     apart = pointing_offset(dish.pose, arm.pose, night_01)
     assert np.all(np.diag(joint.covariance) < 0.4 * np.diag(apart.covariance))
 

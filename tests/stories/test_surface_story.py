@@ -50,7 +50,7 @@ def test_the_night_shows_what_the_day_did_though_the_dish_came_back_elsewhere():
     day = prisms(
         panels + half_path_of(Term(2, -2), 1e-4), u=6e-5, seed=6, rows=seen, turn=(1e-4, 5e-5), shift=(0, 0.01, 0)
     )
-    change = change_between(night, replace(day, source="day"), APERTURE, SETTINGS)
+    change = change_between(night, replace(day, source="day"), APERTURE, settings=SETTINGS)
     k = change.expansion.terms.index(Term(2, -2))
     u = float(np.sqrt(change.expansion.covariance[k, k]))
     assert u < 6e-6

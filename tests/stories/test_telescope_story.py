@@ -71,7 +71,7 @@ def offset(later, before):
         pose_of_group(later.points, before.points, before.campaign, group=g, frame="reflector")
         for g in ("dish", "feed-arm")
     )
-    cross = cross_covariance(arm, dish, before.campaign, before.points)
+    cross = cross_covariance(arm, dish, before.campaign, earlier=before.points)
     return pointing_offset(dish.pose, arm.pose, before.campaign, cross=cross)
 
 
@@ -131,7 +131,7 @@ def test_astigmatism_of_0_3_mm_is_found_from_samples(written, before, count):
     settings = ShapeSettings(terms=10)
     values, u = [], 0.0
     for later in nights(written, before, moved, count):
-        change = change_between(before.surface, later.surface, aperture, settings)
+        change = change_between(before.surface, later.surface, aperture, settings=settings)
         k = change.expansion.terms.index(term)
         values.append(change.expansion.value[k])
         u = float(np.sqrt(change.expansion.covariance[k, k]))

@@ -193,7 +193,7 @@ def step_by_step(site, night):
     of_balls = first.covariance[: 3 * n, : 3 * n]
     ranger = np.tile(np.repeat(np.arange(k), 2), n)
     covariance = np.diag(variance(night.to_prisms).ravel()) + U_ZERO**2 * (ranger[:, None] == ranger)
-    ranges = ball_ranges(site.units, site.scan, night.to_prisms, covariance)
+    ranges = ball_ranges(site.units, site.scan, night.to_prisms, covariance=covariance)
     return scan_points_from_balls(
         site.scan, first.x[: 3 * n].reshape(n, 3), ball_covariance=of_balls, ranges=ranges
     ).require_converged()

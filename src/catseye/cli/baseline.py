@@ -210,7 +210,7 @@ def baseline(
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, read.observations) as directory:
-                write_calibration(calibration, directory, inputs, progress)
+                write_calibration(calibration, directory, inputs, progress=progress)
                 keep()  # no directory without the record that was asked for, too
         else:
             keep()

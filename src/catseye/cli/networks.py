@@ -172,7 +172,7 @@ def _write_adjusted(
     from catseye.gateways.writers.output import whole_directory
 
     with whole_directory(out, source) as directory:
-        write_network(epoch, directory, input_hashes(source), progress, treated=treated)
+        write_network(epoch, directory, input_hashes(source), progress=progress, treated=treated)
 
 
 def _tell_adjusted(treated: "AdjustedNetwork", epoch: "Findings", json: bool, quiet: bool, out: Path | None) -> None:
@@ -227,7 +227,7 @@ def _compared(
 
         hashes = {f"{k + 1}: {name}": h for k, s in enumerate(sources) for name, h in input_hashes(s).items()}
         with whole_directory(out, sources[0]) as directory:
-            write_comparison(compared, directory, hashes, progress)
+            write_comparison(compared, directory, hashes, progress=progress)
     progress.clear()
     if json:
         say(json_line(comparison_object(compared)))
@@ -336,7 +336,7 @@ def plan(
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, network) as directory:
-                write_plan(plan_findings, directory, input_hashes(network), progress)
+                write_plan(plan_findings, directory, input_hashes(network), progress=progress)
     finally:
         progress.clear()
     _tell_plan(plan_findings, json, quiet, out)

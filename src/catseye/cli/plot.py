@@ -50,7 +50,7 @@ def _counts(text: str) -> tuple[float, float]:
     "examples/night-01/mirrors/ZP103.toml --at 2003-09-10T18:00:00Z --longitude-deg=-79.84 "
     "--keep-out examples/keep-out.toml --from=18500,10000 --to=21500,12000 --out sky.svg"
 )
-def sky(
+def sky(  # noqa: PLR0913 - its options are its command line
     out: Out,
     monument: Annotated[Path, typer.Option("--monument", metavar="M.toml", help="The ranger's monument.")],
     mirror: Annotated[Path, typer.Option("--mirror", metavar="Z.toml", help="The mirror on it.")],
@@ -77,7 +77,7 @@ def sky(
         raise typer.BadParameter("go together: --from and --to.", param_hint="'--from'")
     way = None if start is None or end is None else (_counts(start), _counts(end))
     place = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-    drawn = sky_plot(monument, mirror, mjd_of(at), way, keep_out, **place)
+    drawn = sky_plot(monument, mirror, mjd_of(at), way=way, keep_out=keep_out, **place)
     _finish("sky", drawn, out, json, quiet, inputs=(monument, mirror, keep_out))
 
 
@@ -99,7 +99,7 @@ def servo(
 @plots.command(
     epilog="\b\nExample: catseye plot air --temperature-c 20 --pressure-hpa 933 --u-temperature-c 0.2 --out air.svg"
 )
-def air(
+def air(  # noqa: PLR0913 - its options are its command line
     out: Out,
     temperature_c: Annotated[float, typer.Option("--temperature-c", help="°C.")] = 20.0,
     pressure_hpa: Annotated[float, typer.Option("--pressure-hpa", help="hPa.")] = 1013.25,

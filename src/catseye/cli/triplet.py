@@ -71,7 +71,7 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
             hashes[path] = folder.hashes[path.name]
         if out is not None:
             with whole_directory(out, files[0]) as directory:
-                write_triplets(dict(units), directory, hashes, progress)
+                write_triplets(dict(units), directory, hashes, progress=progress)
     finally:
         progress.clear()
     return units

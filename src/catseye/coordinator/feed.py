@@ -271,7 +271,9 @@ class MotionScript:
         return LivePosture(ticks, *angles, *rates)
 
 
-async def play(script: MotionScript, clock: Clock, posture: Callable[[LivePosture], None], every: float = 0.1) -> None:
+async def play(
+    script: MotionScript, clock: Clock, posture: Callable[[LivePosture], None], *, every: float = 0.1
+) -> None:
     """Give a script's postures at 10 Hz, until cancelled."""
     while True:
         posture(script.at(ticks_now(clock)))

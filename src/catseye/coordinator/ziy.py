@@ -182,7 +182,7 @@ class Coordinator:
         if self.feed is not None:
             self._spawn(self.feed.run(), "feed")
         if self._script is not None:
-            self._spawn(play(self._script, self.clock, self._posed, self.settings.posture_every), "script")
+            self._spawn(play(self._script, self.clock, self._posed, every=self.settings.posture_every), "script")
         self._spawn(
             BeamWatchdog(self.links, self._guard, clock=self.clock, event_log=self._event_log).run(), "watchdog"
         )
@@ -305,7 +305,11 @@ class Coordinator:
             measurement = measurement_of(reply)
             self.intake.take(
                 shot_of(
-                    link.ranger, link.names.get(measurement.cube, measurement.name), measurement, None, link.sampling
+                    link.ranger,
+                    link.names.get(measurement.cube, measurement.name),
+                    measurement,
+                    buffer=None,
+                    usual=link.sampling,
                 )
             )
         except InputError as problem:

@@ -29,7 +29,7 @@ def cos_incidence(x: ArrayLike, y: ArrayLike, focal_length: float) -> NDArray[np
     return 1.0 / np.sqrt(1.0 + (x * x + y * y) / (2.0 * focal_length) ** 2)
 
 
-def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, focal_length: float) -> NDArray[np.float64]:
+def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, *, focal_length: float) -> NDArray[np.float64]:
     """Half of what normal deviations shorten the path to the focus by, m.
 
     deviation      m, along the normal, above zero towards the focus

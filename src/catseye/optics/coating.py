@@ -215,7 +215,7 @@ def group_path(
     return -np.angle(above * np.conj(below)) / (2.0 * STEP * k)
 
 
-def quarter_wave(material: Material, wavelength_um: float, incidence: float = 0.0, medium: Material = 1.0) -> Layer:
+def quarter_wave(material: Material, wavelength_um: float, incidence: float = 0.0, *, medium: Material = 1.0) -> Layer:
     """A layer of a quarter wave for light that comes at an angle.
 
     material        of the layer, without absorption

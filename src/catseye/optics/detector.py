@@ -72,7 +72,7 @@ def place_response(place: ArrayLike, diode: Photodiode, modulation_hz: float = 1
     return iv(0, kappa * r) / iv(0, kappa * diode.radius)
 
 
-def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz: float = 1500e6) -> Complex:
+def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, *, modulation_hz: float = 1500e6) -> Complex:
     """Complex share (...) of a Gaussian spot's signal that comes out; light beside the disc counts as nothing.
 
     offset          (...) m, 0 or more: of the spot's centre from the disc's
@@ -96,7 +96,7 @@ def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, modulation_
     return np.sum(half * weight * light * place_response(place, diode, modulation_hz), axis=-1)
 
 
-def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz: float = 1500e6) -> Array:
+def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, *, modulation_hz: float = 1500e6) -> Array:
     """Metres that a range reads too long because of the diode's own delay for a spot at a place.
 
     offset, spot, diode, modulation_hz   as for `spot_response`
@@ -117,7 +117,7 @@ def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, modulation_hz:
             f"a photodiode of {diode.sheet_resistance:g} ohm per square and {diode.capacitance:g} F turns the phase by "
             f"more than half a turn at {modulation_hz:g} Hz (expected less resistance or capacitance)"
         )
-    response = spot_response(offset, spot, diode, modulation_hz)
+    response = spot_response(offset, spot, diode, modulation_hz=modulation_hz)
     turn = np.where(response == 0.0, np.nan, np.angle(response))
     return -turn * SPEED_OF_LIGHT / (2.0 * TWO_PI * modulation_hz)
 

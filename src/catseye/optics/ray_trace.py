@@ -159,7 +159,7 @@ def beam(to_ranger: ArrayLike, offsets: ArrayLike, start: float = 1.0) -> Rays:
     return Rays(position, np.broadcast_to(-towards, points.shape), np.zeros(len(points)))
 
 
-def half_path(rays: Rays, to_ranger: ArrayLike, point: ArrayLike, start: float = 1.0) -> Array:
+def half_path(rays: Rays, to_ranger: ArrayLike, point: ArrayLike, *, start: float = 1.0) -> Array:
     """How much further than a point the light of returned rays seems to have been, (r,) m, one way.
 
     rays        from `beam`, out in the air again; each is taken on to the plane across its own direction

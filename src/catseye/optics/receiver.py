@@ -71,7 +71,7 @@ def u_phase(amplitude: ArrayLike, density: ArrayLike, duration: ArrayLike) -> ND
     return np.sqrt(np.asarray(density, float) / np.asarray(duration, float)) / np.asarray(amplitude, float)
 
 
-def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, group: ArrayLike) -> NDArray[np.float64]:
+def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, *, group: ArrayLike) -> NDArray[np.float64]:
     """Path (...), m, by which the modulation through a lens at a height comes later than on the axis: below zero.
 
     height   (...) m, from the axis
@@ -120,7 +120,7 @@ def lens_group_range(
     tiny = x < 1e-4  # even light: the Gaussian's expression loses its digits
     safe = np.where(tiny, 1.0, x)
     mean = a**2 * np.where(tiny, 0.5 - x / 12.0, 1.0 / safe - np.exp(-safe) / -np.expm1(-safe))
-    return 0.5 * lens_group_lag(np.sqrt(mean), powers, phase, group)
+    return 0.5 * lens_group_lag(np.sqrt(mean), powers, phase, group=group)
 
 
 def traced_lens(

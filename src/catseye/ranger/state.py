@@ -198,7 +198,7 @@ class RangerState:
                 f"where the Sun is was not told for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
             )
         else:
-            reason = refusal(self.cubes.station, self.here if start is None else start, end, self.suns())
+            reason = refusal(self.cubes.station, self.here if start is None else start, end, suns=self.suns())
         self.sun_refused = reason is not None
         if reason is not None:
             raise InputError(reason)

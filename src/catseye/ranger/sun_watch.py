@@ -55,7 +55,7 @@ def own_sun(site: Location) -> OwnSun:
 
 
 def nearest_sun(
-    station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike], *, exact: bool = False
+    station: MirrorStation, start: ArrayLike, end: ArrayLike, *, suns: Sequence[ArrayLike], exact: bool = False
 ) -> float:
     """Least angle, rad, that the beam can come to any of the Suns while both axes move between counts; inf without one.
 
@@ -77,7 +77,7 @@ def nearest_sun(
     return float(np.min(_angles(station, looks, suns))) - servo_margin(half)
 
 
-def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequence[ArrayLike]) -> str | None:
+def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, *, suns: Sequence[ArrayLike]) -> str | None:
     """Why a move must not be made, in words; None where it may.
 
     station, start, end, suns   as for `nearest_sun`
@@ -85,13 +85,13 @@ def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequ
     A move that begins inside a Sun's cone may be made if it ends outside and nowhere comes nearer than it began, as far
     as the grid can tell: 1.6 deg.
     """
-    allowed, all_least = HALF_ANGLE + MARGIN, nearest_sun(station, start, end, suns)
+    allowed, all_least = HALF_ANGLE + MARGIN, nearest_sun(station, start, end, suns=suns)
     if all_least >= allowed:
         return None
     blocked = []
     for sun in suns:
-        least = nearest_sun(station, start, end, [sun])
-        begin, final = (nearest_sun(station, start, at, [sun], exact=True) for at in (start, end))
+        least = nearest_sun(station, start, end, suns=[sun])
+        begin, final = (nearest_sun(station, start, at, suns=[sun], exact=True) for at in (start, end))
         leaves = begin < allowed <= final and least >= begin - servo_margin([0.5 * LARGEST_STEP] * 2)
         if least < allowed and not leaves:
             blocked.append(least)
@@ -105,7 +105,7 @@ def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, suns: Sequ
 
 
 def way_out(
-    station: MirrorStation, here: ArrayLike, suns: Sequence[ArrayLike], limits: tuple[float, float]
+    station: MirrorStation, here: ArrayLike, suns: Sequence[ArrayLike], *, limits: tuple[float, float]
 ) -> tuple[int, int] | None:
     """Counts to drive to from inside a cone: the shortest free move of one axis that ends 20 deg from every Sun.
 
@@ -123,7 +123,7 @@ def way_out(
     elevation = elevation[np.abs(elevation[:, 1] - station.zeros[1]) <= COUNTS_PER_TURN / 4]  # Phi of half a turn
     ends = np.concatenate([elevation, azimuth[(azimuth[:, 0] >= limits[0]) & (azimuth[:, 0] <= limits[1])]])
     for end in ends[np.min(_angles(station, beam(station, ends), suns), axis=1) >= PARKED]:
-        if refusal(station, at, end, suns) is None:
+        if refusal(station, at, end, suns=suns) is None:
             return round(float(end[0])), round(float(end[1]))
     return None
 

@@ -133,7 +133,7 @@ class RangersServed:
         try:
             await self._served.start()
             if self._warming is not None and self._twin is not None:
-                await warm(self._site, self._served.rangers, self._warming, self._twin.live_posture)
+                await warm(self._site, self._served.rangers, self._warming, posture=self._twin.live_posture)
             if self._late is not None:
                 await self._late.open()
             at = None

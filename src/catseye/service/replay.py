@@ -60,7 +60,7 @@ class ReplayOutcome:
         return self.epochs == self.same_epochs and self.shots == self.same_shots
 
 
-def replayed(journal: str, which: int | str | None, calibrations: Path | None, progress: Progress) -> ReplayOutcome:
+def replayed(journal: str, which: int | str | None, calibrations: Path | None, *, progress: Progress) -> ReplayOutcome:
     """A run again, with its own records or others.
 
     Raises InputError: no such journal, run or folder; a run that does not say how it was reduced; nothing solved in it.

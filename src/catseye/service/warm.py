@@ -65,7 +65,7 @@ def initialising_commands(site: SiteFolder) -> Callable[[str], list[Request]]:
 
 
 async def warm(
-    site: SiteFolder, rangers: Mapping[str, Ranger], clock: WarmingClock, posture: Callable[[int], LivePosture]
+    site: SiteFolder, rangers: Mapping[str, Ranger], clock: WarmingClock, *, posture: Callable[[int], LivePosture]
 ) -> None:
     """Make rangers that nobody is connected to ready, as a coordinator would that left a moment ago.
 

@@ -48,7 +48,11 @@ class BoundaryLayer:
         z = point[..., 2]
         warmth = self.temperature(z, t)
         column = 0.5 * (self.temperature(np.zeros(z.shape), t) + warmth)
-        return warmth + self.turbulence(point, t), hydrostatic_pressure_hpa(self.pressure, column, 0.0, z), self.damp
+        return (
+            warmth + self.turbulence(point, t),
+            hydrostatic_pressure_hpa(self.pressure, column, 0.0, z_to=z),
+            self.damp,
+        )
 
     def mean_index(self, a, b, t):
         share = (np.arange(60) + 0.5) / 60
@@ -136,11 +140,11 @@ UP = np.array([[0.0, 0.0, 0.0]]), np.array([[30.0, 0.0, 100.0]])
 
 
 def test_in_air_at_rest_of_one_temperature_the_mean_is_that_of_the_exponential():
-    upper = hydrostatic_pressure_hpa(930.0, 15.0, 0.0, 45.0)
+    upper = hydrostatic_pressure_hpa(930.0, 15.0, 0.0, z_to=45.0)
     profile = AirProfile.of(still_weather(pressure=(930.0, upper), humidity=0.0), ground=GROUND)
     found = profile.along([1800.0], *UP)
     z = (np.arange(2000) + 0.5) / 20.0
-    exact = group_refractivity(15.0, hydrostatic_pressure_hpa(930.0, 15.0, 0.0, z), 0.0).mean()
+    exact = group_refractivity(15.0, hydrostatic_pressure_hpa(930.0, 15.0, 0.0, z_to=z), 0.0).mean()
     assert found.refractivity[0] == pytest.approx(exact, abs=2e-12)
     assert found.temperature_c[0] == pytest.approx(15.0, abs=1e-6)
 

@@ -22,7 +22,7 @@ def test_the_gradient_of_the_index_is_that_of_the_model_up_a_column_of_air(lapse
 
     def model(z):
         middle = 20.0 + lapse * z / 2
-        return phase_refractivity(20.0 + lapse * z, hydrostatic_pressure_hpa(933.0, middle, 0.0, z), 0.0)
+        return phase_refractivity(20.0 + lapse * z, hydrostatic_pressure_hpa(933.0, middle, 0.0, z_to=z), 0.0)
 
     expected = (model(step) - model(-step)) / (2 * step)
     # 1 %: air is no ideal gas, n - 1 falls by 0.2 % more with temperature; near -0.0342 °C/m nothing is left to share

@@ -126,7 +126,7 @@ ICAO = [(-500.0, 1074.78), (500.0, 954.608), (1000.0, 898.746), (2000.0, 794.952
 
 @pytest.mark.parametrize(("altitude", "expected"), ICAO)
 def test_the_standard_atmosphere_is_its_printed_table(altitude, expected):
-    got = float(carried_pressure(1013.25, 15.0, 0.0, altitude).pressure_hpa)
+    got = float(carried_pressure(1013.25, 15.0, 0.0, z_to=altitude).pressure_hpa)
     # ICAO's molar mass and gas constant differ from today's: 1.1e-5 and 1.7e-5 of the exponent, in the same direction
     constants = 3.2e-5 * abs(np.log(expected / 1013.25)) * expected
     assert got == pytest.approx(
@@ -146,7 +146,7 @@ def exact_pressure(p, t, lapse, e, g, rise):
 def test_pressure_and_all_its_slopes_are_those_of_the_integral_in_high_precision(lapse, rise):
     point = (933.0, 20.0, lapse, 11.7, 9.798, rise)
     got = carried_pressure(
-        933.0, 20.0, 800.0, 800.0 + rise, lapse_c_per_m=lapse, vapour_pressure_hpa=11.7, gravity=9.798
+        933.0, 20.0, 800.0, z_to=800.0 + rise, lapse_c_per_m=lapse, vapour_pressure_hpa=11.7, gravity=9.798
     )
     with mp.workdps(30):
         at = [mp.mpf(x) for x in point]
@@ -158,15 +158,17 @@ def test_pressure_and_all_its_slopes_are_those_of_the_integral_in_high_precision
 
 def test_without_a_lapse_it_is_the_hydrostatic_pressure_of_the_path():
     for rise in (-50.0, 148.0):
-        flat = carried_pressure(933.0, 20.0, 0.0, rise, lapse_c_per_m=0.0, vapour_pressure_hpa=11.7).pressure_hpa
-        other = path.hydrostatic_pressure_hpa(933.0, 20.0, 0.0, rise, vapour_pressure_hpa=11.7)
+        flat = carried_pressure(933.0, 20.0, 0.0, z_to=rise, lapse_c_per_m=0.0, vapour_pressure_hpa=11.7).pressure_hpa
+        other = path.hydrostatic_pressure_hpa(933.0, 20.0, 0.0, z_to=rise, vapour_pressure_hpa=11.7)
         assert float(flat) == pytest.approx(float(other), rel=1e-14)
 
 
 def test_the_notes_lapse_to_the_highest_point_is_0_2_hpa_too_steep():
     constant = path.pressure_at(933.0, 0.0, 148.0)
     assert float(933.0 - constant) == pytest.approx(16.28, abs=1e-9)
-    assert float(carried_pressure(933.0, 20.0, 0.0, 148.0).pressure_hpa - constant) == pytest.approx(0.34, abs=0.05)
+    assert float(carried_pressure(933.0, 20.0, 0.0, z_to=148.0).pressure_hpa - constant) == pytest.approx(
+        0.34, abs=0.05
+    )
 
 
 def test_carried_pressures_uncertainty_is_the_scatter_of_a_monte_carlo():
@@ -177,9 +179,9 @@ def test_carried_pressures_uncertainty_is_the_scatter_of_a_monte_carlo():
         for mean, sigma in zip((933.0, 20.0, 0.0065, 11.7, 9.798, 148.0), (0.1, *u.values()), strict=True)
     )
     scatter = carried_pressure(
-        p, t, 0.0, rise, lapse_c_per_m=lapse, vapour_pressure_hpa=e, gravity=g
+        p, t, 0.0, z_to=rise, lapse_c_per_m=lapse, vapour_pressure_hpa=e, gravity=g
     ).pressure_hpa.std()
-    middle = carried_pressure(933.0, 20.0, 0.0, 148.0, vapour_pressure_hpa=11.7, gravity=9.798)
+    middle = carried_pressure(933.0, 20.0, 0.0, z_to=148.0, vapour_pressure_hpa=11.7, gravity=9.798)
     claimed = float(middle._replace(u_formula_hpa=0.0).standard_uncertainty_hpa(0.1, **u))
     assert scatter == pytest.approx(claimed, rel=0.02)  # 20 000 draws know a standard deviation to 0.5 %
     assert float(middle.u_formula_hpa) == pytest.approx(4e-4 * 16.0, rel=0.05)
@@ -194,11 +196,11 @@ def test_carried_pressures_uncertainty_is_the_scatter_of_a_monte_carlo():
         (lambda: barometer.normal_gravity(38.45, 797.3), "latitude 38.45 rad is outside"),
         (lambda: barometer.normal_gravity(0.6, 79730.0), "elevation 79730 m"),
         (lambda: barometer.normal_gravity(0.6, 0.0, formula="wgs72"), "choose one of smithsonian, grs80"),
-        (lambda: carried_pressure(93300.0, 20.0, 0.0, 1.0), "pressure 93300 hPa"),
-        (lambda: carried_pressure(933.0, -300.0, 0.0, 1.0), "temperature -300 °C"),
-        (lambda: carried_pressure(933.0, 20.0, 0.0, 1e5), "difference of elevation 100000 m"),
-        (lambda: carried_pressure(933.0, 20.0, 0.0, 1000.0, lapse_c_per_m=6.5), "absolute temperature at the top"),
-        (lambda: carried_pressure(933.0, 20.0, 0.0, 1.0, vapour_pressure_hpa=1000.0), "vapour's share"),
+        (lambda: carried_pressure(93300.0, 20.0, 0.0, z_to=1.0), "pressure 93300 hPa"),
+        (lambda: carried_pressure(933.0, -300.0, 0.0, z_to=1.0), "temperature -300 °C"),
+        (lambda: carried_pressure(933.0, 20.0, 0.0, z_to=1e5), "difference of elevation 100000 m"),
+        (lambda: carried_pressure(933.0, 20.0, 0.0, z_to=1000.0, lapse_c_per_m=6.5), "absolute temperature at the top"),
+        (lambda: carried_pressure(933.0, 20.0, 0.0, z_to=1.0, vapour_pressure_hpa=1000.0), "vapour's share"),
     ],
 )
 def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text):

@@ -188,7 +188,7 @@ def test_a_dew_point_gives_back_its_vapour_pressure_and_relative_humidity_its_ow
     assert float(dew) <= t + 1e-9
     back = humidity.vapour_pressure_of_dew_point_hpa(dew, p, formula)
     assert float(back) == pytest.approx(float(e), rel=1e-10)  # 1e-9 °C is 1e-10 of the pressure
-    assert float(humidity.relative_humidity_percent(e, t, p, formula)) == pytest.approx(h, rel=1e-12)
+    assert float(humidity.relative_humidity_percent(e, t, p, formula=formula)) == pytest.approx(h, rel=1e-12)
 
 
 @given(st.floats(-95.0, 0.0), pressures, st.sampled_from(["buck", "iapws"]))
@@ -197,7 +197,9 @@ def test_a_frost_point_gives_back_its_vapour_pressure_and_lies_above_the_dew_poi
     assert float(humidity.frost_point_c(e, p, formula)) == pytest.approx(frost, abs=1e-8)
     # at 0 °C Buck's two fits cross by 0.02 %, 0.002 °C
     assert float(humidity.dew_point_c(e, p, "buck")) < frost + 0.01 or formula == "iapws"
-    assert float(humidity.relative_humidity_percent(e, frost, p, formula, over_ice=True)) == pytest.approx(100.0)
+    assert float(humidity.relative_humidity_percent(e, frost, p, formula=formula, over_ice=True)) == pytest.approx(
+        100.0
+    )
 
 
 def test_relative_humidity_over_ice_is_the_higher_number_for_the_same_vapour():

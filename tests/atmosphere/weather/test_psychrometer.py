@@ -194,7 +194,7 @@ def test_a_readings_uncertainty_in_vapour_pressure_and_index_is_the_scatter_of_a
 
 def test_the_thermometers_two_ways_into_the_index_add_before_they_are_squared():
     formula = air.MODELS["ciddor_hill1999"].vapour_formula
-    at = hygrometer.of_relative_humidity(20.0, 933.0, 50.0, formula)
+    at = hygrometer.of_relative_humidity(20.0, 933.0, 50.0, formula=formula)
     partials = air.group_partials(20.0, 933.0, at.vapour_pressure_hpa)
     u = float(at._replace(u_formula_hpa=0.0).index_uncertainty(partials, 0.0, u_temperature_c=1.0))
     assert u == pytest.approx(abs(float(air.air(20.0, 933.0, 50.0).sensitivity.temperature_c)), rel=1e-12)
@@ -205,8 +205,8 @@ def test_the_thermometers_two_ways_into_the_index_add_before_they_are_squared():
 @pytest.mark.parametrize("formula", ["buck", "ciddor", "iapws"])
 def test_the_formulas_own_uncertainty_covers_what_they_differ_by(formula):
     t = np.linspace(-20.0, 30.0, 51)
-    e = [hygrometer.of_relative_humidity(t, 933.0, 100.0, name) for name in (formula, "iapws")]
+    e = [hygrometer.of_relative_humidity(t, 933.0, 100.0, formula=name) for name in (formula, "iapws")]
     apart = np.abs(e[0].vapour_pressure_hpa - e[1].vapour_pressure_hpa)
     assert np.all(apart <= 2.0 * np.hypot(e[0].u_formula_hpa, e[1].u_formula_hpa))
     with pytest.raises(ValidityError, match="relative humidity 101 %"):
-        hygrometer.of_relative_humidity(20.0, 933.0, 101.0, formula)
+        hygrometer.of_relative_humidity(20.0, 933.0, 101.0, formula=formula)

@@ -55,7 +55,9 @@ def test_the_search_finds_what_looking_everywhere_finds(seed):
     stations = stations_about(rng, ranges)
     lengths = ranged(stations, u * rng.standard_normal(3), sigma * rng.standard_normal(ranges))
     best, second = by_grid(u, stations, lengths, sigma)
-    mine = locate(np.zeros(3), u**2 * np.eye(3), stations, lengths, period=HALF, covariance=np.full(ranges, sigma**2))
+    mine = locate(
+        np.zeros(3), u**2 * np.eye(3), stations, lengths=lengths, period=HALF, covariance=np.full(ranges, sigma**2)
+    )
     assert tuple(mine.cycles) == best[1]
     assert mine.chi_square == pytest.approx(best[0], abs=1e-4)
     np.testing.assert_allclose(mine.x, best[2], rtol=0, atol=2e-5)
@@ -68,7 +70,12 @@ def test_half_a_metre_off_the_geometry_is_no_longer_linear_and_the_search_does_n
     stations = stations_about(rng, 7, 50.0, 60.0)
     point = np.array([1.1, -0.9, 0.8])  # 1.6 m: 3.3 sigma
     found = locate(
-        np.zeros(3), 0.25 * np.eye(3), stations, ranged(stations, point), period=HALF, covariance=np.full(7, 1e-8)
+        np.zeros(3),
+        0.25 * np.eye(3),
+        stations,
+        lengths=ranged(stations, point),
+        period=HALF,
+        covariance=np.full(7, 1e-8),
     )
     assert found.status is AmbiguityStatus.FOUND
     np.testing.assert_allclose(found.x, point, rtol=0, atol=1e-7)
@@ -83,7 +90,7 @@ def test_the_covariance_is_that_of_prior_and_ranges():
     stations = stations_about(rng, 6)
     c = np.diag(rng.uniform(1e-9, 4e-9, 6)) + 4e-9  # a zero that all share
     found = locate(
-        np.zeros(3), 0.01 * np.eye(3), stations, ranged(stations, np.full(3, 0.05)), period=HALF, covariance=c
+        np.zeros(3), 0.01 * np.eye(3), stations, lengths=ranged(stations, np.full(3, 0.05)), period=HALF, covariance=c
     )
     e = (found.x - stations) / np.linalg.norm(found.x - stations, axis=1)[:, None]
     expected = np.linalg.inv(e.T @ np.linalg.inv(c) @ e + 100 * np.eye(3))
@@ -103,7 +110,9 @@ def test_the_stations_covariance_acts_along_the_rays():
     plain = np.full(6, 1e-8)
     by_hand = plain + np.einsum("ia,iab,ib->i", e, blocks, e)
     results = [
-        locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths, period=HALF, covariance=c, station_covariance=s)
+        locate(
+            np.zeros(3), 0.01 * np.eye(3), stations, lengths=lengths, period=HALF, covariance=c, station_covariance=s
+        )
         for c, s in ((plain, blocks), (plain, whole), (by_hand, None))
     ]
     for other in results[1:]:
@@ -140,10 +149,10 @@ def test_an_error_that_all_ranges_share_does_not_make_a_misfit_when_it_is_said()
     stations = stations_about(rng, 7)
     lengths = ranged(stations, np.array([0.1, 0.0, -0.1]), 2e-3)  # a zero 2 mm wrong
     said = 1e-8 * np.eye(7) + 4e-6
-    found = locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths, period=HALF, covariance=said)
+    found = locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths=lengths, period=HALF, covariance=said)
     assert found.status is AmbiguityStatus.FOUND
     np.testing.assert_allclose(found.x, [0.1, 0.0, -0.1], rtol=0, atol=2e-3)
-    unsaid = locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths, period=HALF, covariance=np.full(7, 1e-8))
+    unsaid = locate(np.zeros(3), 0.01 * np.eye(3), stations, lengths=lengths, period=HALF, covariance=np.full(7, 1e-8))
     assert unsaid.status is AmbiguityStatus.MISFIT
 
 
@@ -154,10 +163,10 @@ def test_one_wrong_range_of_seven_is_named_and_left_out_only_when_asked_for():
     lengths = ranged(stations, point, 5e-5 * rng.standard_normal(7))
     lengths[3] += 0.004
     ask = {"period": HALF, "covariance": np.full(7, 25e-10)}
-    plain = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, **ask)
+    plain = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths=lengths, **ask)
     assert plain.status is AmbiguityStatus.MISFIT
     assert "no whole cycles fit its 7 ranges" in plain.text
-    found = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, limits=AmbiguityLimits(wrong=0.01), **ask)
+    found = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths=lengths, limits=AmbiguityLimits(wrong=0.01), **ask)
     assert (found.status, found.left_out) == (AmbiguityStatus.FOUND, 3)
     np.testing.assert_allclose(found.x, point, rtol=0, atol=3e-4)
     right = np.rint((np.linalg.norm(stations - point, axis=1) - lengths) / HALF)
@@ -171,10 +180,12 @@ def test_a_wrong_range_can_make_wrong_cycles_fit_and_who_says_so_is_not_deceived
     lengths = ranged(stations, point)
     lengths[0] += 0.004
     ask = {"period": HALF, "covariance": np.full(5, 25e-10)}
-    trusting = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths, **ask)
+    trusting = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths=lengths, **ask)
     assert trusting.status is AmbiguityStatus.FOUND  # 1.6 m off: why `wrong` exists
     assert np.linalg.norm(trusting.x - point) > 1.0
-    careful = locate(np.zeros(3), 0.09 * np.eye(3), stations, lengths, limits=AmbiguityLimits(wrong=0.01), **ask)
+    careful = locate(
+        np.zeros(3), 0.09 * np.eye(3), stations, lengths=lengths, limits=AmbiguityLimits(wrong=0.01), **ask
+    )
     assert careful.status is AmbiguityStatus.AMBIGUOUS
     assert careful.probability < 0.9
 
@@ -186,12 +197,12 @@ def test_the_price_of_leaving_a_range_out_is_the_odds_that_it_is_wrong():
     lengths = ranged(stations, np.array([0.1, 0.05, -0.1]), sigma * rng.standard_normal(5))
     ask = {"period": HALF}
     prior = 0.01 * np.eye(3)
-    all_five = locate(np.zeros(3), prior, stations, lengths, covariance=np.full(5, sigma**2), **ask)
+    all_five = locate(np.zeros(3), prior, stations, lengths=lengths, covariance=np.full(5, sigma**2), **ask)
     price = 2 * np.log((1 - wrong) / wrong * HALF / (np.sqrt(2 * np.pi) * sigma))
     rivals = [all_five.discrimination]
     for i in range(5):
         some = np.delete(np.arange(5), i)
-        four = locate(np.zeros(3), prior, stations[some], lengths[some], covariance=np.full(4, sigma**2), **ask)
+        four = locate(np.zeros(3), prior, stations[some], lengths=lengths[some], covariance=np.full(4, sigma**2), **ask)
         square = (
             four.chi_square if np.any(four.cycles != all_five.cycles[some]) else four.chi_square + four.discrimination
         )
@@ -200,7 +211,7 @@ def test_the_price_of_leaving_a_range_out_is_the_odds_that_it_is_wrong():
         np.zeros(3),
         prior,
         stations,
-        lengths,
+        lengths=lengths,
         covariance=np.full(5, sigma**2),
         limits=AmbiguityLimits(wrong=wrong),
         **ask,
@@ -213,7 +224,7 @@ def test_the_price_of_leaving_a_range_out_is_the_odds_that_it_is_wrong():
             np.zeros(3),
             prior,
             stations,
-            lengths,
+            lengths=lengths,
             covariance=np.full(5, sigma**2),
             limits=AmbiguityLimits(wrong=0.5),
             **ask,
@@ -226,10 +237,10 @@ def test_fewer_than_four_ranges_are_too_few_unless_the_prior_itself_is_good_enou
     stations = stations_about(rng, ranges)
     ask = {"period": HALF, "covariance": np.full(ranges, 1e-8)}
     lengths = ranged(stations, np.array([0.002, -0.001, 0.003]))
-    bad = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths, **ask)
+    bad = locate(np.zeros(3), 0.04 * np.eye(3), stations, lengths=lengths, **ask)
     assert bad.status is AmbiguityStatus.TOO_FEW
     assert f"ranged from {ranges} stations only: four are needed" in bad.text
-    good = locate(np.zeros(3), 0.005**2 * np.eye(3), stations, lengths, **ask)
+    good = locate(np.zeros(3), 0.005**2 * np.eye(3), stations, lengths=lengths, **ask)
     assert good.status is AmbiguityStatus.FOUND
     np.testing.assert_array_equal(
         good.cycles, np.rint((np.linalg.norm(stations - [0.002, -0.001, 0.003], axis=1) - lengths) / HALF)
@@ -245,7 +256,7 @@ def test_a_station_known_to_decimetres_is_the_same_problem():
         np.zeros(3),
         0.09 * np.eye(3),
         targets,
-        ranged(targets, station, 1e-4),
+        lengths=ranged(targets, station, 1e-4),
         period=HALF,
         covariance=25e-10 * np.eye(8) + 1e-8,
     )
@@ -258,7 +269,7 @@ def test_what_cannot_be_searched_is_a_status():
     stations = stations_about(rng, 6)
     lengths = ranged(stations, np.zeros(3))
     c = np.full(6, 1e-8)
-    lost = locate(np.zeros(3), 100.0 * np.eye(3), stations, lengths, period=HALF, covariance=c)
+    lost = locate(np.zeros(3), 100.0 * np.eye(3), stations, lengths=lengths, period=HALF, covariance=c)
     assert lost.status is AmbiguityStatus.TOO_MANY
     for broken in (
         {"lengths": np.where(np.arange(6) == 2, np.nan, lengths)},
@@ -268,14 +279,21 @@ def test_what_cannot_be_searched_is_a_status():
     ):
         given = {"prior": 0.01 * np.eye(3), "lengths": lengths, "period": HALF, "c": c} | broken
         answer = locate(
-            np.zeros(3), given["prior"], stations, given["lengths"], period=given["period"], covariance=given["c"]
+            np.zeros(3),
+            given["prior"],
+            stations,
+            lengths=given["lengths"],
+            period=given["period"],
+            covariance=given["c"],
         )
         assert answer.status is AmbiguityStatus.REFUSED
         assert np.isnan(answer.x).all()
     with pytest.raises(InputError, match=r"start \(2,\)"):
-        locate(np.zeros(2), np.eye(3), stations, lengths, period=HALF, covariance=c)
+        locate(np.zeros(2), np.eye(3), stations, lengths=lengths, period=HALF, covariance=c)
     with pytest.raises(InputError, match=r"station_covariance has shape \(6, 6\)"):
-        locate(np.zeros(3), np.eye(3), stations, lengths, period=HALF, covariance=c, station_covariance=np.eye(6))
+        locate(
+            np.zeros(3), np.eye(3), stations, lengths=lengths, period=HALF, covariance=c, station_covariance=np.eye(6)
+        )
 
 
 def test_many_points_at_once_are_each_point_alone():
@@ -287,11 +305,16 @@ def test_many_points_at_once_are_each_point_alone():
     seen = rng.random((9, 8)) < 0.8
     prior = 0.01 * np.eye(3)
     for c in (np.full((9, 8), 1e-8), 1e-8 * np.eye(8), np.broadcast_to(1e-8 * np.eye(8), (9, 8, 8))):
-        found = locate_all(start, prior, stations, lengths, period=HALF, covariance=c, seen=seen)
+        found = locate_all(start, prior, stations, lengths=lengths, period=HALF, covariance=c, seen=seen)
         for i, one in enumerate(found):
             mine = seen[i]
             alone = locate(
-                start[i], prior, stations[mine], lengths[i, mine], period=HALF, covariance=np.full(mine.sum(), 1e-8)
+                start[i],
+                prior,
+                stations[mine],
+                lengths=lengths[i, mine],
+                period=HALF,
+                covariance=np.full(mine.sum(), 1e-8),
             )
             assert one.status is alone.status
             np.testing.assert_array_equal(one.cycles, alone.cycles)

@@ -40,7 +40,7 @@ def sights(x, y, pairs, *, repeats=1, zero=0.0, noise=0.0, systematic=None, effe
 
 @pytest.mark.parametrize("zero", [0.0, 0.00123, -0.034])
 def test_perfect_distances_give_the_planted_zero_and_no_scatter(zero):
-    found = full_test(START, END, ALONG + zero, range(7))
+    found = full_test(START, END, ALONG + zero, order=range(7))
     assert found.zero == pytest.approx(zero, abs=1e-12)
     assert found.s < 1e-12
     assert found.degrees_of_freedom == 14
@@ -53,7 +53,7 @@ def test_a_planted_pattern_of_residuals_is_returned_exactly():
     for (i, j, k), sign in (((0, 1, 2), 1.0), ((3, 4, 5), -1.0)):
         for pair, way in (((i, j), 1.0), ((j, k), 1.0), ((i, k), -1.0)):
             pattern[[tuple(p) for p in PAIRS].index(pair)] += sign * way
-    found = full_test(START, END, ALONG + 0.002 + 0.5e-3 * pattern, range(7))
+    found = full_test(START, END, ALONG + 0.002 + 0.5e-3 * pattern, order=range(7))
     assert found.residual == pytest.approx(0.5e-3 * pattern, abs=1e-12)
     assert found.s == pytest.approx(0.5e-3 * np.sqrt(6.0 / 14.0), rel=1e-9)
     assert found.zero == pytest.approx(0.002, abs=1e-12)
@@ -71,9 +71,9 @@ def test_the_closed_form_of_all_pairs_holds_for_any_number_of_points(p, seed):
     closed = 6.0 * (d.sum() - b @ big / p) / ((p - 1) * (p - 2))
     if len(i) == p:  # three points: three distances, three unknowns
         with pytest.raises(EstimationError, match="redundant"):
-            full_test(i, j, d, range(p))
+            full_test(i, j, d, order=range(p))
         return
-    found = full_test(i, j, d, range(p))
+    found = full_test(i, j, d, order=range(p))
     assert found.zero == pytest.approx(closed, abs=1e-10)
     assert found.u_zero == pytest.approx(found.s * np.sqrt(6.0 / ((p - 1) * (p - 2))), rel=1e-8)
 
@@ -81,9 +81,9 @@ def test_the_closed_form_of_all_pairs_holds_for_any_number_of_points(p, seed):
 def test_either_way_and_any_numbering_is_the_same_distance():
     rng = np.random.default_rng(1)
     d = ALONG + 0.001 + 1e-3 * rng.standard_normal(21)
-    plain = full_test(START, END, d, range(7))
+    plain = full_test(START, END, d, order=range(7))
     mixed = np.array([3, 0, 6, 2, 5, 1, 4])  # number of the k-th point along the line
-    turned = full_test(mixed[END], mixed[START], d, mixed)
+    turned = full_test(mixed[END], mixed[START], d, order=mixed)
     assert (turned.zero, turned.s) == pytest.approx((plain.zero, plain.s), abs=1e-12)
     assert turned.x[mixed] == pytest.approx(plain.x, abs=1e-10)
 
@@ -91,7 +91,7 @@ def test_either_way_and_any_numbering_is_the_same_distance():
 def test_limits_are_those_of_printed_tables():
     """chi2(0.95, 14) = 23.68, F(0.975; 14, 14) = 2.98, t(0.975; 14) = 2.145: any book of tables."""
     assert within_claim(1.0, 14).limit * 14 == pytest.approx(23.685, abs=5e-4)
-    assert same_precision(1.0, 14, 1.0, 14).limit == pytest.approx(2.979, abs=5e-4)
+    assert same_precision(1.0, 14, 1.0, before=14).limit == pytest.approx(2.979, abs=5e-4)
     assert is_nothing(0.0, 1.0, 14).limit == pytest.approx(2.1448, abs=5e-5)
 
 
@@ -99,11 +99,13 @@ def test_every_question_can_be_answered_with_no():
     limit = np.sqrt(23.6848 / 14)
     assert within_claim((0.999 * limit) ** 2, 14).passed
     assert not within_claim((1.001 * limit) ** 2, 14).passed
-    assert not same_precision(2.0, 14, 1.0, 14).passed
-    assert not same_precision(1.0, 14, 2.0, 14).passed
+    assert not same_precision(2.0, 14, 1.0, before=14).passed
+    assert not same_precision(1.0, 14, 2.0, before=14).passed
     assert not is_nothing(-2.2, 1.0, 14).passed
     rng = np.random.default_rng(2)
-    bad = full_test(START, END, ALONG + 0.005 + 2.5e-3 * rng.standard_normal(21), range(7), np.full(21, 1e-3))
+    bad = full_test(
+        START, END, ALONG + 0.005 + 2.5e-3 * rng.standard_normal(21), order=range(7), sigma=np.full(21, 1e-3)
+    )
     assert not within_claim(bad.s**2, 14).passed
     assert not is_nothing(0.005, 2.5e-3 * np.sqrt(0.2), 14).passed
 
@@ -116,11 +118,11 @@ def test_good_instruments_fail_each_question_in_five_of_a_hundred(runs):
     failed, before = np.zeros(3), None
     for _ in range(runs):
         d = ALONG + sigma * rng.standard_normal(21)
-        found = full_test(START, END, d, range(7), sigma)
+        found = full_test(START, END, d, order=range(7), sigma=sigma)
         failed[0] += not within_claim(found.s**2, 14).passed
         failed[1] += not is_nothing(found.zero, found.u_zero, 14).passed
         if before is not None:
-            failed[2] += not same_precision(found.s, 14, before, 14).passed
+            failed[2] += not same_precision(found.s, 14, before, before=14).passed
         before = found.s
     assert failed / runs == pytest.approx([0.05] * 3, abs=same_sigmas(0.012, 3000, runs))
 
@@ -235,7 +237,7 @@ def test_what_distances_cannot_tell_is_refused_by_name():
 
 def test_the_place_of_a_pillar_seen_once_is_not_guessed():
     with pytest.raises(EstimationError, match="pillar number 3 has 1 distances"):
-        places_in_line([0, 0, 1, 1], [1, 2, 2, 3], [20.0, 120.0, 100.0, 30.0], 4)
+        places_in_line([0, 0, 1, 1], [1, 2, 2, 3], [20.0, 120.0, 100.0, 30.0], count=4)
 
 
 def test_the_whole_and_its_parts_place_the_pillars_and_tell_the_zero():
@@ -243,7 +245,7 @@ def test_the_whole_and_its_parts_place_the_pillars_and_tell_the_zero():
     pairs = [(0, 3), (0, 1), (1, 2), (2, 3), (3, 0), (1, 0), (2, 1), (3, 2)]
     x = np.array([0.0, 100.0, 250.0, 400.0])
     s = sights(x, np.zeros(4), pairs, zero=0.0021)
-    assert places_in_line(s.start, s.end, s.distance, 4) == pytest.approx(x, abs=0.01)
+    assert places_in_line(s.start, s.end, s.distance, count=4) == pytest.approx(x, abs=0.01)
     assert adjust_baseline(s, x, np.zeros(4), before=BaselineNoise(noise=TINY)).of("zero")[0] == pytest.approx(
         0.0021, abs=1e-9
     )
@@ -251,7 +253,7 @@ def test_the_whole_and_its_parts_place_the_pillars_and_tell_the_zero():
 
 def test_a_pillar_that_may_stand_on_either_side_is_not_guessed():
     with pytest.raises(EstimationError, match="on which side pillar number"):
-        places_in_line([0, 0, 1, 1, 2], [1, 2, 2, 3, 3], [200.0, 100.0, 100.0, 50.0, 50.0 * 5**0.5], 4)
+        places_in_line([0, 0, 1, 1, 2], [1, 2, 2, 3, 3], [200.0, 100.0, 100.0, 50.0, 50.0 * 5**0.5], count=4)
 
 
 def test_a_set_that_nothing_controls_has_no_standardised_residual():
@@ -278,7 +280,7 @@ def test_known_uncertainties_have_no_degrees_of_freedom():
 @given(st.permutations(range(7)))
 def test_places_follow_from_distances_in_any_numbering(order):
     order = np.array(order)
-    found = places_in_line(START, END, np.abs(SEVEN[order][END] - SEVEN[order][START]), 7)
+    found = places_in_line(START, END, np.abs(SEVEN[order][END] - SEVEN[order][START]), count=7)
     assert np.abs(found[END] - found[START]) == pytest.approx(np.abs(SEVEN[order][END] - SEVEN[order][START]))
     low, high = int(np.argmin(found)), int(np.argmax(found))
     assert low < high

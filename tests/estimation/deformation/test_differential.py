@@ -31,7 +31,7 @@ def test_without_noise_a_movement_of_any_size_is_recovered_exactly(seed, size):
     points = rng.uniform([-20, -20, 20], [20, 20, 60], (7, 3))
     true = rng.normal(size=(7, 3)) * size
     before, after = (np.linalg.norm(p[:, None] - STATIONS, axis=-1) for p in (points, points + true))
-    found = displacements(STATIONS, points, after - before, SIGMA)
+    found = displacements(STATIONS, points, after - before, sigma=SIGMA)
     assert set(found.status) == {DETERMINED}
     np.testing.assert_allclose(found.displacement[:, 0], true, rtol=0, atol=1e-10)  # the step where it stops
     np.testing.assert_allclose(change_of_range(STATIONS, points, true), after - before, rtol=0, atol=5e-13)
@@ -41,7 +41,7 @@ def test_it_is_the_weighted_least_squares_that_scipy_finds():
     rng = np.random.default_rng(1)
     sigma = np.array([1, 2, 3, 4, 5, 6.0]) * 1e-4
     change = change_of_range(STATIONS, GROUP[0], np.array([0.5, -0.3, 0.2])) + rng.normal(size=6) * sigma
-    found = displacements(STATIONS, GROUP[0], change, sigma)
+    found = displacements(STATIONS, GROUP[0], change, sigma=sigma)
 
     def residuals(dx):
         both = (np.linalg.norm(p - STATIONS, axis=1) for p in (GROUP[0] + dx, GROUP[0]))
@@ -59,7 +59,7 @@ def test_missing_channels_are_left_out_and_too_few_are_said():
     changes = change_of_range(STATIONS, GROUP, np.full((4, 3), 1e-3))
     changes[0, :2] = np.nan
     changes[1, 2:] = np.nan
-    found = displacements(STATIONS, GROUP, changes, SIGMA)
+    found = displacements(STATIONS, GROUP, changes, sigma=SIGMA)
     np.testing.assert_allclose(found.displacement[[0, 2, 3], 0], 1e-3, rtol=0, atol=1e-12)
     assert np.isnan(found.displacement[1]).all()
     assert np.isnan(found.covariance[1]).all()
@@ -67,13 +67,13 @@ def test_missing_channels_are_left_out_and_too_few_are_said():
     np.testing.assert_array_equal(found.rank, [3, 2, 3, 3])
     np.testing.assert_array_equal(found.degrees_of_freedom, [1, 0, 3, 3])
     assert np.isnan(found.residual[0, 0, :2]).all()
-    alone = displacements(STATIONS[2:], GROUP[:1], changes[:1, 2:], SIGMA)
+    alone = displacements(STATIONS[2:], GROUP[:1], changes[:1, 2:], sigma=SIGMA)
     np.testing.assert_allclose(found.covariance[0], alone.covariance[0], rtol=1e-12)
-    flat = displacements(STATIONS * [1, 1, 0], GROUP[0] * [1, 1, 0], np.full(6, 1e-4), SIGMA)
+    flat = displacements(STATIONS * [1, 1, 0], GROUP[0] * [1, 1, 0], np.full(6, 1e-4), sigma=SIGMA)
     assert flat.status == "undetermined: 2 of 3 directions seen by 6 channels"
-    nothing = displacements(STATIONS, GROUP[0], np.full(6, np.nan), SIGMA)
+    nothing = displacements(STATIONS, GROUP[0], np.full(6, np.nan), sigma=SIGMA)
     assert nothing.status == "undetermined: 0 of 3 directions seen by 0 channels"
-    lost = displacements(STATIONS, GROUP[0], np.full(6, -200.0), SIGMA)  # further than the stations are
+    lost = displacements(STATIONS, GROUP[0], np.full(6, -200.0), sigma=SIGMA)  # further than the stations are
     assert str(lost.status).startswith("not converged")
     assert np.isnan(lost.displacement).all()
 
@@ -83,9 +83,9 @@ def test_epochs_and_points_broadcast_and_each_is_as_if_alone():
     true = rng.normal(size=(5, 4, 3)) * 1e-3
     sigma = rng.uniform(1, 3, (4, 6)) * SIGMA
     changes = change_of_range(STATIONS, GROUP, true) + rng.normal(size=(5, 4, 6)) * sigma
-    found = displacements(STATIONS, GROUP, changes, sigma, u_stations=0.1, u_points=0.2)
+    found = displacements(STATIONS, GROUP, changes, sigma=sigma, u_stations=0.1, u_points=0.2)
     assert found.displacement.shape == (5, 4, 1, 3)
-    one = displacements(STATIONS, GROUP[3], changes[2, 3], sigma[3], u_stations=0.1, u_points=0.2)
+    one = displacements(STATIONS, GROUP[3], changes[2, 3], sigma=sigma[3], u_stations=0.1, u_points=0.2)
     np.testing.assert_allclose(found.displacement[2, 3], one.displacement, rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.covariance[2, 3], one.covariance, rtol=1e-9, atol=1e-25)
 
@@ -93,14 +93,17 @@ def test_epochs_and_points_broadcast_and_each_is_as_if_alone():
 def test_sensitivities_are_the_derivatives_by_the_approximate_places():
     true, h = np.array([0.4, -0.3, 0.6]), 1e-4
     change = change_of_range(STATIONS, GROUP[0], true)
-    found = displacements(STATIONS, GROUP[0], change, SIGMA)
+    found = displacements(STATIONS, GROUP[0], change, sigma=SIGMA)
     for i, e in enumerate(np.eye(3) * h):
-        ends = [displacements(STATIONS, GROUP[0] + s * e, change, SIGMA).displacement[0] for s in (1, -1)]
+        ends = [displacements(STATIONS, GROUP[0] + s * e, change, sigma=SIGMA).displacement[0] for s in (1, -1)]
         np.testing.assert_allclose(found.sensitivity_points[:, i], (ends[0] - ends[1]) / (2 * h), atol=1e-7)
     for k in range(18):
         e = np.zeros(18)
         e[k] = h
-        ends = [displacements(STATIONS + s * e.reshape(6, 3), GROUP[0], change, SIGMA).displacement[0] for s in (1, -1)]
+        ends = [
+            displacements(STATIONS + s * e.reshape(6, 3), GROUP[0], change, sigma=SIGMA).displacement[0]
+            for s in (1, -1)
+        ]
         np.testing.assert_allclose(found.sensitivity_stations[:, k], (ends[0] - ends[1]) / (2 * h), atol=1e-7)
     size = np.abs(found.sensitivity_points).max()
     assert 1e-3 < size < 0.05  # the movement over the distance, times the geometry: 0.8 m in 100 m
@@ -114,8 +117,8 @@ def check_budget(runs, seed):
     for _ in range(runs):
         stations, point = STATIONS + rng.normal(size=(6, 3)) * u, GROUP[0] + rng.normal(size=3) * u
         changes = change_of_range(STATIONS, GROUP[0], true) + rng.normal(size=6) * SIGMA
-        found_errors.append(displacements(stations, point, changes, SIGMA).displacement[0] - true)
-    claimed = displacements(STATIONS, GROUP[0], change_of_range(STATIONS, GROUP[0], true), SIGMA,
+        found_errors.append(displacements(stations, point, changes, sigma=SIGMA).displacement[0] - true)
+    claimed = displacements(STATIONS, GROUP[0], change_of_range(STATIONS, GROUP[0], true), sigma=SIGMA,
                             u_stations=u, u_points=u)  # fmt: skip
     assert 0.2 < np.trace(claimed.approximation) / np.trace(claimed.noise) < 5.0
     white = np.linalg.solve(np.linalg.cholesky(claimed.covariance), np.array(found_errors).T)
@@ -136,7 +139,7 @@ def test_approximate_places_err_alike_in_all_epochs():
     true = np.array([0.02, 0.01, -0.03])
     wrong = np.random.default_rng(5).normal(size=(6, 3)) * 0.05
     changes = change_of_range(STATIONS, GROUP[0], np.array([true, 2 * true]))
-    found = displacements(STATIONS + wrong, GROUP[0], changes, SIGMA)
+    found = displacements(STATIONS + wrong, GROUP[0], changes, sigma=SIGMA)
     error = found.displacement[:, 0] - [true, 2 * true]
     np.testing.assert_allclose(error, found.sensitivity_stations @ wrong.ravel(), rtol=0, atol=5e-8)
     np.testing.assert_allclose(error[1], 2 * error[0], rtol=0, atol=5e-8)  # second order in 10 cm and 70 mm over 100 m
@@ -150,10 +153,10 @@ def test_a_constraint_that_holds_wins_and_its_covariance_is_true():
     rng = np.random.default_rng(6)
     true = np.concatenate([rng.normal(size=(4, 2)) * 1e-3, np.zeros((4, 1))], axis=1)
     changes = change_of_range(STATIONS, GROUP, true) + rng.normal(size=(500, 4, 6)) * SIGMA
-    found = constrained(STATIONS, GROUP, changes, SIGMA, basis=FLAT)
-    free = constrained(STATIONS, GROUP, changes, SIGMA, basis=np.eye(12))
+    found = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=FLAT)
+    free = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=np.eye(12))
     assert np.all(found.displacement[..., 2] == 0.0)
-    np.testing.assert_allclose(free.displacement[:, 1], displacements(STATIONS, GROUP[1], changes[:, 1], SIGMA)
+    np.testing.assert_allclose(free.displacement[:, 1], displacements(STATIONS, GROUP[1], changes[:, 1], sigma=SIGMA)
                                .displacement[:, 0], rtol=0, atol=1e-13)  # fmt: skip
     error = (found.displacement - true)[..., :2].reshape(500, 8)
     root = np.linalg.cholesky(found.parameters_covariance[0])
@@ -173,7 +176,7 @@ def test_a_constraint_that_holds_wins_and_its_covariance_is_true():
 def test_a_constraint_that_does_not_hold_costs_the_bias_foretold_and_is_found_out():
     true = np.array([[1e-3, 0, 3e-4], [0, 1e-3, 0], [0, 0, -2e-4], [0, 0, 0]])
     changes = change_of_range(STATIONS, GROUP, true)
-    found = constrained(STATIONS, GROUP, changes, SIGMA, basis=FLAT, u_violation=3e-4)
+    found = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=FLAT, u_violation=3e-4)
     outside = true * [0, 0, 1]
     error = found.displacement - true
     np.testing.assert_allclose(found.bias(outside), error, rtol=0, atol=2e-8)  # second order of 1 mm in 100 m
@@ -182,7 +185,7 @@ def test_a_constraint_that_does_not_hold_costs_the_bias_foretold_and_is_found_ou
     unit = np.array([found.bias(e.reshape(4, 3)).ravel() for e in np.eye(12)[2::3]])
     np.testing.assert_allclose(found.violation, 3e-4**2 * unit.T @ unit, atol=1e-20)
     np.testing.assert_allclose(found.covariance, found.noise + found.violation, atol=1e-22)
-    _, p = constraint_test(found, constrained(STATIONS, GROUP, changes, SIGMA, basis=np.eye(12)))
+    _, p = constraint_test(found, constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=np.eye(12)))
     assert p < 1e-6
 
 
@@ -194,13 +197,13 @@ def test_a_body_is_determined_where_no_single_point_is():
     changes = change_of_range(STATIONS, GROUP, true)
     seen = np.array([[1, 1, 0, 0, 0, 0], [0, 0, 1, 1, 0, 0], [0, 0, 0, 0, 1, 1], [1, 0, 0, 1, 0, 0]], dtype=bool)
     changes[~seen] = np.nan
-    assert (displacements(STATIONS, GROUP, changes, SIGMA).rank == 2).all()
-    found = constrained(STATIONS, GROUP, changes, SIGMA, basis=basis)
+    assert (displacements(STATIONS, GROUP, changes, sigma=SIGMA).rank == 2).all()
+    found = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=basis)
     assert found.status == DETERMINED
     np.testing.assert_allclose(found.parameters, motion, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.displacement, true, rtol=0, atol=1e-12)
     assert found.degrees_of_freedom == 2
-    lift = constrained(STATIONS, GROUP, changes, SIGMA, basis=rigid_group(GROUP, motions=[2]))
+    lift = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=rigid_group(GROUP, motions=[2]))
     assert lift.parameters.shape == (1,)
 
 
@@ -228,7 +231,7 @@ def test_what_makes_no_sense_is_refused(change, said):
     given = {"stations": STATIONS, "points": GROUP, "sigma": SIGMA, "basis": FLAT, **change}
     stations, points, sigma = given.pop("stations"), given.pop("points"), given.pop("sigma")
     with pytest.raises(EstimationError, match=said):
-        constrained(stations, points, np.zeros((4, 6)), sigma, **given)
+        constrained(stations, points, np.zeros((4, 6)), sigma=sigma, **given)
 
 
 def test_directions_and_tests_that_make_no_sense_are_refused():
@@ -237,8 +240,8 @@ def test_directions_and_tests_that_make_no_sense_are_refused():
     with pytest.raises(EstimationError, match="not zero"):
         allowed_directions(2, allowed=np.zeros(3))
     zero = np.zeros((4, 6))
-    flat = constrained(STATIONS, GROUP, zero, SIGMA, basis=FLAT)
-    upright = constrained(STATIONS, GROUP, zero, SIGMA, basis=np.eye(12)[:, 2:])
+    flat = constrained(STATIONS, GROUP, zero, sigma=SIGMA, basis=FLAT)
+    upright = constrained(STATIONS, GROUP, zero, sigma=SIGMA, basis=np.eye(12)[:, 2:])
     with pytest.raises(EstimationError, match="do not nest"):
         constraint_test(flat, upright)
     with pytest.raises(EstimationError, match="must be a part"):

@@ -144,7 +144,9 @@ def test_air_that_is_wrong_shows_beside_the_claim(ranging_network):
     network, _ = ranging_network(10)
     wrong = scatter(network, adjust_network, runs=30, seed=2, disturbance=Disturbance(common_ppm=3.0))
     assert wrong.ratio > 1.5
-    drawn, bad = measured(network, network.points.xyz.ravel(), np.random.default_rng(0), Disturbance(blunders=0.2))
+    drawn, bad = measured(
+        network, network.points.xyz.ravel(), np.random.default_rng(0), disturbance=Disturbance(blunders=0.2)
+    )
     assert 3 <= bad[0].sum() <= 30
     off = np.abs(drawn.groups[0].observed - network.groups[0].predict(network.points.xyz.ravel())[0])
     assert off[bad[0]].min() > 15 * 5e-5
@@ -157,7 +159,9 @@ def test_refraction_lifts_targets_by_its_square_of_distance():
     fixed = np.zeros((2, 3), dtype=bool)
     network = ObservationNetwork(NetworkPoints(("A", "B"), true, fixed, fixed), (), (zenith,))
     draws = [
-        measured(network, true.ravel(), np.random.default_rng(seed), Disturbance(refraction=0.2))[0].groups[0].observed
+        measured(network, true.ravel(), np.random.default_rng(seed), disturbance=Disturbance(refraction=0.2))[0]
+        .groups[0]
+        .observed
         for seed in range(400)
     ]
     k = (zenith.predict(true.ravel())[0] - np.ravel(draws)) * 2 * 6_371_000.0 / 500.0  # k > 0 lifts: the angle shrinks
@@ -172,7 +176,9 @@ def test_correlated_observations_are_drawn_with_their_correlations():
     nothing = np.zeros((2, 3), dtype=bool)
     network = ObservationNetwork(NetworkPoints(("A", "B"), np.zeros((2, 3)), nothing, nothing), (), (vectors,))
     rng = np.random.default_rng(5)
-    drawn = np.array([measured(network, np.zeros(6), rng, Disturbance())[0].groups[0].observed for _ in range(3000)])
+    drawn = np.array(
+        [measured(network, np.zeros(6), rng, disturbance=Disturbance())[0].groups[0].observed for _ in range(3000)]
+    )
     found = np.cov(drawn.T)
     assert found[:3, :3] == pytest.approx(covariance, abs=0.12)  # four standard deviations of a covariance near 1
     assert found[3:, 3:] == pytest.approx(4 * covariance, abs=0.48)

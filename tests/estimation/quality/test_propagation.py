@@ -30,7 +30,7 @@ def rng(seed=1):
 
 
 def drawing(inputs, correlation=None):
-    return lambda generator, n: draw_inputs(inputs, generator, n, correlation)
+    return lambda generator, n: draw_inputs(inputs, generator, n, correlation=correlation)
 
 
 def test_the_end_gauge_of_the_guide_comes_out_as_printed():
@@ -121,7 +121,7 @@ def test_a_mean_of_few_readings_is_drawn_from_students_distribution():
 def test_correlated_inputs_are_drawn_with_their_correlation():
     joined = np.array([[1.0, 0.6, 0.0], [0.6, 1.0, 0.0], [0.0, 0.0, 1.0]])
     inputs = [Input("a", 0.0, 1.0), Input("b", 0.0, 3.0), Input("c", 0.0, 2.0, "rectangular")]
-    drawn = draw_inputs(inputs, rng(7), 400_000, joined)
+    drawn = draw_inputs(inputs, rng(7), 400_000, correlation=joined)
     assert np.corrcoef(drawn.T) == pytest.approx(joined, abs=0.007)
     assert drawn.std(axis=0) == pytest.approx([1.0, 3.0, 2.0], rel=0.006)
 

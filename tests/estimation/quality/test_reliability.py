@@ -174,10 +174,10 @@ def test_an_undetected_error_moves_the_parameters_by_what_bias_to_noise_says():
     sigma = np.full(24, 2.0)
     q = 4.0 * NETWORK.q
     bias = r.detectable_bias(sigma, NETWORK.redundancy, delta0)
-    effects = r.effects_of_bias(q, NETWORK.a, sigma**2, bias)
+    effects = r.effects_of_bias(q, NETWORK.a, sigma**2, bias=bias)
     length = np.sqrt(np.sum(effects @ np.linalg.inv(q) * effects, axis=1))
     np.testing.assert_allclose(length, r.bias_to_noise(NETWORK.redundancy, delta0), rtol=1e-9)
-    np.testing.assert_allclose(r.effects_of_bias(q, NETWORK.a, np.diag(sigma**2), bias), effects, rtol=1e-9)
+    np.testing.assert_allclose(r.effects_of_bias(q, NETWORK.a, np.diag(sigma**2), bias=bias), effects, rtol=1e-9)
     # exact: adjust once with the error, once without
     observed = np.zeros(24)
     observed[5] = bias[5]
@@ -193,7 +193,7 @@ def test_effects_with_correlated_observations_are_those_of_a_second_adjustment()
     c = root @ root.T + np.eye(24)
     p = np.linalg.inv(c)
     q = np.linalg.inv(NETWORK.a.T @ p @ NETWORK.a)
-    effects = r.effects_of_bias(q, NETWORK.a, c, np.full(24, 3.0))
+    effects = r.effects_of_bias(q, NETWORK.a, c, bias=np.full(24, 3.0))
     np.testing.assert_allclose(effects[7], q @ NETWORK.a.T @ p @ (3.0 * np.eye(24)[7]), rtol=1e-9)
 
 
@@ -205,7 +205,7 @@ def test_an_unchecked_observation_hides_any_error_where_it_matters_and_none_wher
     redundancy = 1 - np.sum(a[:, :3] @ q * a[:, :3], axis=1)
     assert redundancy[2] == 0.0
     bias = r.detectable_bias(np.ones(4), redundancy, 4.0)
-    effects = r.effects_of_bias(q, a[:, :3], np.ones(4), bias)
+    effects = r.effects_of_bias(q, a[:, :3], np.ones(4), bias=bias)
     assert np.isinf(effects[2, 2])
     assert effects[2, 0] == effects[2, 1] == 0.0
     assert np.isfinite(effects[[0, 1, 3]]).all()

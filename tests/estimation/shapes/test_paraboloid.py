@@ -38,7 +38,7 @@ def test_a_moved_paraboloid_is_found_and_its_points_lie_on_it(seed, size):
     turn = OUTER.rotation[:, :2] @ tilt  # about the two axes across the paraboloid's own
     moved = Rotation.from_rotvec(turn).as_matrix() @ OUTER.rotation
     points = local @ moved.T + OUTER.translation + shift
-    fit = fit_paraboloid(points, zero(12), OUTER, F)
+    fit = fit_paraboloid(points, zero(12), OUTER, focal_length=F)
     np.testing.assert_allclose(fit.deviation, 0.0, atol=1e-11)
     np.testing.assert_allclose(fit.translation, shift, atol=1e-8)
     np.testing.assert_allclose(fit.rotation, turn, atol=1e-9)
@@ -51,7 +51,7 @@ def test_it_never_turns_about_its_own_axis():
     rng = np.random.default_rng(3)
     local = surface(rng)
     spun = local @ Rotation.from_rotvec([0, 0, 0.4]).as_matrix().T + rng.normal(size=(12, 3)) * 1e-3
-    fit = fit_paraboloid(OUTER.points(spun), np.eye(36), OUTER, F)
+    fit = fit_paraboloid(OUTER.points(spun), np.eye(36), OUTER, focal_length=F)
     axis = OUTER.rotation[:, 2]
     assert abs(fit.rotation @ axis) < 1e-15
     assert abs(axis @ fit.covariance[3:, 3:] @ axis) < 1e-15 * np.trace(fit.covariance[3:, 3:])
@@ -64,7 +64,7 @@ def test_a_point_towards_the_focus_deviates_positively():
     raised[7] += 1e-3 * normals(local)[7]
     towards_focus = np.array([0, 0, F]) - local[7]
     assert normals(local)[7] @ towards_focus > 0
-    fit = fit_paraboloid(OUTER.points(raised), zero(40), OUTER, F)
+    fit = fit_paraboloid(OUTER.points(raised), zero(40), OUTER, focal_length=F)
     assert fit.deviation[7] == np.abs(fit.deviation).max()
     assert 0.5e-3 < fit.deviation[7] < 1e-3  # the fit takes its share
 
@@ -74,7 +74,7 @@ def test_the_deviation_is_the_distance_to_the_nearest_point_of_the_surface(seed)
     rng = np.random.default_rng(seed)
     local = surface(rng, k=8)
     rough = local + rng.normal(size=(8, 1)) * 0.02 * normals(local)
-    fit = fit_paraboloid(OUTER.points(rough), zero(8), OUTER, F)
+    fit = fit_paraboloid(OUTER.points(rough), zero(8), OUTER, focal_length=F)
     for point, deviation in zip(fit.local, fit.deviation, strict=True):
 
         def squared(xy, p=point):
@@ -91,7 +91,7 @@ def test_the_deviations_are_the_least_that_scipy_finds(seed):
     rng = np.random.default_rng(seed)
     local = surface(rng)
     rough = OUTER.points(local + rng.normal(size=(12, 3)) * 1e-3)
-    fit = fit_paraboloid(rough, zero(12), OUTER, F)
+    fit = fit_paraboloid(rough, zero(12), OUTER, focal_length=F)
 
     def cost(p):
         axes = Rotation.from_rotvec(OUTER.rotation[:, :2] @ p[3:] * 0.02).as_matrix() @ OUTER.rotation
@@ -114,9 +114,9 @@ def test_turning_everything_turns_the_answer():
     covariance = a @ a.T * 1e-9
     r, t = Rotation.random(random_state=8).as_matrix(), np.array([10.0, -20, 5])
     big = np.kron(np.eye(12), r)
-    one = fit_paraboloid(points, covariance, OUTER, F)
+    one = fit_paraboloid(points, covariance, OUTER, focal_length=F)
     world = Transform("world", "ground", r, t)
-    other = fit_paraboloid(world.points(points), big @ covariance @ big.T, world @ OUTER, F)
+    other = fit_paraboloid(world.points(points), big @ covariance @ big.T, world @ OUTER, focal_length=F)
     np.testing.assert_allclose(other.translation, r @ one.translation, atol=1e-10)
     np.testing.assert_allclose(other.rotation, r @ one.rotation, atol=1e-11)
     np.testing.assert_allclose(other.deviation, one.deviation, atol=1e-12)
@@ -135,7 +135,8 @@ def test_the_claimed_covariance_is_the_scatter(trials):
     root = np.linalg.cholesky(covariance)
     truth = OUTER.points(local)
     fits = [
-        fit_paraboloid(truth + (root @ rng.normal(size=27)).reshape(-1, 3), covariance, OUTER, F) for _ in range(trials)
+        fit_paraboloid(truth + (root @ rng.normal(size=27)).reshape(-1, 3), covariance, OUTER, focal_length=F)
+        for _ in range(trials)
     ]
     tilts = OUTER.rotation[:, :2]
     place = np.array([np.append(f.translation, tilts.T @ f.rotation) for f in fits])
@@ -152,14 +153,16 @@ def test_the_claimed_covariance_is_the_scatter(trials):
 
 
 def test_the_deviations_of_five_points_vanish_and_are_certain():
-    fit = fit_paraboloid(OUTER.points(surface(np.random.default_rng(2), k=5) + 1e-3), 1e-8 * np.eye(15), OUTER, F)
+    fit = fit_paraboloid(
+        OUTER.points(surface(np.random.default_rng(2), k=5) + 1e-3), 1e-8 * np.eye(15), OUTER, focal_length=F
+    )
     np.testing.assert_allclose(fit.deviation, 0.0, atol=1e-10)
     assert np.abs(fit.deviation_covariance).max() < 1e-8 * 1e-6
 
 
 def test_four_points_are_refused():
     with pytest.raises(EstimationError, match="needs 5 points, 4 given"):
-        fit_paraboloid(OUTER.points(surface(np.random.default_rng(1), k=4)), zero(4), OUTER, F)
+        fit_paraboloid(OUTER.points(surface(np.random.default_rng(1), k=4)), zero(4), OUTER, focal_length=F)
 
 
 def circle(radius):
@@ -175,9 +178,9 @@ def line():
 @pytest.mark.parametrize("points", [circle(30.0), line()], ids=["circle", "meridian"])
 def test_points_that_do_not_hold_it_are_refused(points):
     with pytest.raises(EstimationError, match="9 points do not hold the paraboloid"):
-        fit_paraboloid(OUTER.points(points), zero(9), OUTER, F)
+        fit_paraboloid(OUTER.points(points), zero(9), OUTER, focal_length=F)
 
 
 def test_the_same_point_five_times_is_refused():
     with pytest.raises(EstimationError, match="do not hold"):
-        fit_paraboloid(OUTER.points(np.repeat(circle(30.0)[:1], 5, axis=0)), zero(5), OUTER, F)
+        fit_paraboloid(OUTER.points(np.repeat(circle(30.0)[:1], 5, axis=0)), zero(5), OUTER, focal_length=F)

@@ -48,7 +48,7 @@ def test_all_parameters_are_those_of_scipy_on_true_distances(seed):
     moved = local @ Rotation.from_rotvec([2e-4, -1e-4, 0.0]).as_matrix().T + rng.normal(size=3) * 5e-3
     points = OUTER.points(moved + rng.normal(size=(60, 3)) * 3e-4)
     blocks = np.broadcast_to(9e-8 * np.eye(3), (60, 3, 3))
-    fit = fit_paraboloid(points, blocks, OUTER, F, free=ALL, weights=weights)
+    fit = fit_paraboloid(points, blocks, OUTER, focal_length=F, free=ALL, weights=weights)
     translation, rotation, focal, residual = by_scipy(points, weights)
     # our design leaves out terms of deviation / f, 1e-5: a thousandth of what the points' roughness leaves open
     u = np.sqrt(np.diag(fit.covariance))
@@ -70,7 +70,7 @@ def test_what_was_moved_is_found_and_what_is_held_stays(free):
     turn = OUTER.rotation[:, :2] @ tilt
     points = local @ (Rotation.from_rotvec(turn).as_matrix() @ OUTER.rotation).T + OUTER.translation + shift
     for measure in ("normal", "half-path"):
-        fit = fit_paraboloid(points, np.zeros((80, 3, 3)), OUTER, F, free=free[::-1], measure=measure)
+        fit = fit_paraboloid(points, np.zeros((80, 3, 3)), OUTER, focal_length=F, free=free[::-1], measure=measure)
         assert fit.free == free
         np.testing.assert_allclose(fit.translation, shift, atol=1e-9)
         np.testing.assert_allclose(fit.rotation, turn, atol=1e-10)
@@ -82,7 +82,7 @@ def test_nothing_free_gives_plain_deviations_and_their_covariance():
     rng = np.random.default_rng(5)
     local = section(rng, 7)
     local[2, 2] += 1e-3
-    fit = fit_paraboloid(OUTER.points(local), np.full((7, 3, 3), 0) + 1e-8 * np.eye(3), OUTER, F, free=())
+    fit = fit_paraboloid(OUTER.points(local), np.full((7, 3, 3), 0) + 1e-8 * np.eye(3), OUTER, focal_length=F, free=())
     cos = 1 / np.sqrt(1 + (local[2, 0] ** 2 + local[2, 1] ** 2) / (4 * F**2))
     assert fit.deviation[2] == pytest.approx(1e-3 * cos, abs=1e-9)
     assert fit.half_path[2] == pytest.approx(1e-3 * cos**2, abs=1e-9)
@@ -94,7 +94,9 @@ def test_the_half_path_squares_are_least():
     rng = np.random.default_rng(8)
     local, weights = section(rng, 50), rng.uniform(0.0, 1.0, 50)
     points = OUTER.points(local + rng.normal(size=(50, 3)) * 4e-4)
-    fit = fit_paraboloid(points, np.zeros((50, 3, 3)), OUTER, F, free=ALL, weights=weights, measure="half-path")
+    fit = fit_paraboloid(
+        points, np.zeros((50, 3, 3)), OUTER, focal_length=F, free=ALL, weights=weights, measure="half-path"
+    )
 
     def cost(p):
         axes = OUTER.rotation @ Rotation.from_rotvec([p[3] / 50, p[4] / 50, 0.0]).as_matrix()
@@ -117,8 +119,8 @@ def test_blocks_are_a_covariance_without_correlations_between_points(free):
     full = np.zeros((60, 60))
     for k in range(20):
         full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = blocks[k]
-    one = fit_paraboloid(OUTER.points(local), blocks, OUTER, F, free=free)
-    two = fit_paraboloid(OUTER.points(local), full, OUTER, F, free=free)
+    one = fit_paraboloid(OUTER.points(local), blocks, OUTER, focal_length=F, free=free)
+    two = fit_paraboloid(OUTER.points(local), full, OUTER, focal_length=F, free=free)
     for name in ("covariance", "deviation_covariance", "parameter_covariance", "along"):
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-12, atol=1e-25)
 
@@ -127,7 +129,7 @@ def test_many_points_are_the_same_by_the_short_product():
     rng = np.random.default_rng(3)
     local = section(rng, 501)
     variance = rng.uniform(1, 2, 501) * 1e-9
-    fit = fit_paraboloid(OUTER.points(local), variance[:, None, None] * np.eye(3), OUTER, F, free=ALL)
+    fit = fit_paraboloid(OUTER.points(local), variance[:, None, None] * np.eye(3), OUTER, focal_length=F, free=ALL)
     rest = np.eye(501) - fit.design @ fit.gain
     np.testing.assert_allclose(fit.deviation_covariance, (rest * variance) @ rest.T, atol=1e-20)
 
@@ -135,7 +137,7 @@ def test_many_points_are_the_same_by_the_short_product():
 def test_rows_at_other_places_are_the_change_there():
     """By moving the paraboloid and looking at the surface's height, not by the same formula."""
     rng = np.random.default_rng(4)
-    fit = fit_paraboloid(OUTER.points(section(rng, 30)), np.zeros((30, 3, 3)), OUTER, F, free=ALL)
+    fit = fit_paraboloid(OUTER.points(section(rng, 30)), np.zeros((30, 3, 3)), OUTER, focal_length=F, free=ALL)
     places = section(rng, 9)
     rows = design_rows(fit, places[:, :2], OUTER)
     points = OUTER.points(places)
@@ -164,11 +166,11 @@ def test_the_claimed_covariances_are_the_scatter(free, trials):
     covariance = (a @ a.T / 42 + np.eye(42)) * 1e-8
     root = np.linalg.cholesky(covariance)
     truth = OUTER.points(local + 3e-4 * rng.normal(size=(14, 3)))
-    base = fit_paraboloid(truth, covariance, OUTER, F, free=free, weights=weights, measure="half-path")
+    base = fit_paraboloid(truth, covariance, OUTER, focal_length=F, free=free, weights=weights, measure="half-path")
     off, half = [], []
     for _ in range(trials):
         noisy = truth + (root @ rng.normal(size=42)).reshape(-1, 3)
-        fit = fit_paraboloid(noisy, covariance, OUTER, F, free=free, weights=weights, measure="half-path")
+        fit = fit_paraboloid(noisy, covariance, OUTER, focal_length=F, free=free, weights=weights, measure="half-path")
         parts = {"vertex": fit.translation - base.translation, "focal-length": [fit.focal_length - base.focal_length]}
         parts["axis"] = OUTER.rotation[:, :2].T @ (fit.rotation - base.rotation)
         off.append(np.concatenate([parts[name] for name in fit.free]))
@@ -185,11 +187,17 @@ def test_the_claimed_covariances_are_the_scatter(free, trials):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda p: fit_paraboloid(p[:5], np.zeros((5, 3, 3)), OUTER, F, free=ALL), "needs 6 points, 5 given"),
-        (lambda p: fit_paraboloid(p, np.zeros((9, 3, 3)), OUTER, F, free=("focus",)), "'focus' is not a part"),
+        (
+            lambda p: fit_paraboloid(p[:5], np.zeros((5, 3, 3)), OUTER, focal_length=F, free=ALL),
+            "needs 6 points, 5 given",
+        ),
+        (
+            lambda p: fit_paraboloid(p, np.zeros((9, 3, 3)), OUTER, focal_length=F, free=("focus",)),
+            "'focus' is not a part",
+        ),
         (
             lambda p: fit_paraboloid(
-                p, np.zeros((9, 3, 3)), OUTER, F, free=ALL, weights=np.r_[np.ones(5), np.zeros(4)]
+                p, np.zeros((9, 3, 3)), OUTER, focal_length=F, free=ALL, weights=np.r_[np.ones(5), np.zeros(4)]
             ),
             "needs 6 points, 5 given",
         ),

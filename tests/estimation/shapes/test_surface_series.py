@@ -31,7 +31,7 @@ def test_the_compiled_form_is_the_plain_one(free, measure):
     weights[4] = 0.0
     points[1, 7] = points[3, :30] = np.nan
     one, two = (
-        fit_series(points, variance, OUTER, F, free=free, weights=weights, measure=measure, compiled=c)
+        fit_series(points, variance, OUTER, focal_length=F, free=free, weights=weights, measure=measure, compiled=c)
         for c in (True, False)
     )
     assert (one.status == 0).all()
@@ -49,7 +49,7 @@ def test_an_epoch_without_an_answer_says_why_and_the_others_have_theirs():
     points[1, 4:] = np.nan  # four points
     points[2, :, :] = OUTER.points([0.0, 40.0, 40.0**2 / (4 * F)])  # one place forty times
     for compiled in (True, False):
-        found = fit_series(points, np.full(40, 1e-9), OUTER, F, compiled=compiled)
+        found = fit_series(points, np.full(40, 1e-9), OUTER, focal_length=F, compiled=compiled)
         assert found.status.tolist() == [0, 1, 2, 0]
         assert found.points[1] == 4 or not compiled
         assert np.isnan(found.parameters[1:3]).all()
@@ -63,7 +63,9 @@ def test_each_epochs_covariance_is_the_scatter():
     base, k, epochs = scene(rng, 1, 60)[0], 60, 4000
     u = rng.uniform(3e-5, 1e-4, k)
     points = base + rng.normal(size=(epochs, k, 3)) * u[:, None]
-    found = fit_series(points, u**2, OUTER, F, free=ALL, measure="half-path", compiled=True).require_converged()
+    found = fit_series(
+        points, u**2, OUTER, focal_length=F, free=ALL, measure="half-path", compiled=True
+    ).require_converged()
     off = found.parameters - found.parameters.mean(axis=0)
     normalised = np.einsum("ti,ij,tj->t", off, np.linalg.inv(found.covariance[0]), off).mean() / 6
     assert normalised == pytest.approx(1.0, abs=0.04)  # 4000 trials of six: 0.9 %
@@ -71,4 +73,4 @@ def test_each_epochs_covariance_is_the_scatter():
 
 def test_a_wrong_shape_is_refused():
     with pytest.raises(EstimationError, match="expected epochs, points, 3"):
-        fit_series(np.zeros((5, 3)), np.ones(5), OUTER, F)
+        fit_series(np.zeros((5, 3)), np.ones(5), OUTER, focal_length=F)

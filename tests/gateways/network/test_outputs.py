@@ -534,7 +534,7 @@ def test_no_name_breaks_a_file(solution):
 
 def test_every_file_is_written_and_its_hash_kept(found, path, tmp_path):
     steps = []
-    write_network(found, tmp_path, input_hashes(path), lambda what, done, of: steps.append((what, done, of)))
+    write_network(found, tmp_path, input_hashes(path), progress=lambda what, done, of: steps.append((what, done, of)))
     provenance = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
     outputs = provenance["outputs"]
     assert set(outputs) | {"provenance.json"} == {f.name for f in tmp_path.iterdir()}

@@ -60,7 +60,7 @@ def test_every_column_of_the_tilt_has_the_unit_of_its_name():
     azimuth = np.radians(np.arange(0.0, 360.0, 30.0))
     turns = np.stack([3.0 + np.cos(2 * azimuth), -2.0 + np.sin(azimuth)], axis=-1) * ARCSECOND
     spread = np.repeat((np.diag([1.0, 4.0]) * (0.2 * ARCSECOND) ** 2)[None], 12, axis=0)
-    found = track_profile(azimuth, turns, spread, None, harmonics=2)
+    found = track_profile(azimuth, turns, spread, tilts=None, harmonics=2)
     at = np.radians(np.arange(0.0, 360.0, 5.0))
     tilt, covariance = found.series.at(at)
     told = {

@@ -95,7 +95,7 @@ def test_a_search_shows_its_places_and_its_centre(kept):
 def test_the_matrix_has_a_cell_for_each_pair(kept, night_01):
     targets = retroreflectors_of(night_01)
     rangers = {"ZY101": np.array([-32.0, 117.0, 0.3]), "ZY113": np.array([0.0, 40.0, 110.0])}
-    found = visibility(rangers, targets, Solids(), frames_at(0.5, 0.6))
+    found = visibility(rangers, targets, Solids(), frames=frames_at(0.5, 0.6))
     drawn(visibility_figure(found))
     image = kept[0].axes[0].images[0]
     np.testing.assert_array_equal(image.get_array(), found.code)

@@ -61,7 +61,7 @@ def shape():
 
 @pytest.fixture(scope="module")
 def change():
-    return change_between(prisms(0.5 * BENT, rows=ROWS), prisms(BENT, rows=ROWS, seed=1), APERTURE, SETTINGS)
+    return change_between(prisms(0.5 * BENT, rows=ROWS), prisms(BENT, rows=ROWS, seed=1), APERTURE, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")

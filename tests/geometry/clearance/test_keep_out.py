@@ -171,7 +171,7 @@ def test_what_passes_beside_a_cone_is_free_and_what_starts_inside_says_so():
     move = straight([0, ne], [40_000, ne], 40.0)
     assert first_entry(STATION, move, [ConeZone(beside, 5 * DEGREE)]).status == EntryStatus.FREE
     assert first_entry(STATION, move, [ConeZone(beside, 5.02 * DEGREE)]).status == EntryStatus.ENTERS
-    assert first_entry(STATION, move, [ConeZone(beside, 5 * DEGREE)], 0.02 * DEGREE).status == EntryStatus.ENTERS
+    assert first_entry(STATION, move, [ConeZone(beside, 5 * DEGREE)], margin=0.02 * DEGREE).status == EntryStatus.ENTERS
     inside = first_entry(STATION, move, [ConeZone(ray(STATION, [10, ne]).direction, 5 * DEGREE)])
     assert inside.status == EntryStatus.STARTS_INSIDE
     assert inside.time == 0
@@ -207,9 +207,9 @@ def batch(n, seed=7):
 
 def test_the_kernel_answers_as_the_plain_form(monkeypatch):
     moves, zones = batch(3000)
-    plain = first_entry(STATION, moves, zones, 0.002)
+    plain = first_entry(STATION, moves, zones, margin=0.002)
     monkeypatch.setattr(keep_out, "COMPILED_FROM", 1)
-    fast = first_entry(STATION, moves, zones, 0.002)
+    fast = first_entry(STATION, moves, zones, margin=0.002)
     assert np.array_equal(plain.status, fast.status)
     assert np.array_equal(plain.zone, fast.zone)
     assert np.array_equal(np.isnan(plain.time), np.isnan(fast.time))

@@ -22,7 +22,7 @@ TURN = st.floats(-7.0, 7.0)
 @given(theta=TURN, shaft=st.floats(-1.6, 1.6), tilt=SMALL, axis_tilt=SMALL)
 def test_the_face_stands_where_a_body_turned_on_its_shafts_has_it(theta, shaft, tilt, axis_tilt):
     np.testing.assert_allclose(
-        face_normal(theta, shaft, tilt, axis_tilt), normal_of(theta, shaft, tilt, axis_tilt), atol=1e-14
+        face_normal(theta, shaft, tilt, axis_tilt=axis_tilt), normal_of(theta, shaft, tilt, axis_tilt), atol=1e-14
     )
 
 
@@ -56,7 +56,7 @@ def test_a_reading_off_the_mirror_is_the_traced_one(theta, shaft, tilt, beta, le
 )
 def test_a_reading_off_the_flat_is_the_traced_one(off, tilt, beta, lean, roll, flat, prime):
     theta, shaft = (off + np.pi, -np.pi / 4) if prime else (off, np.pi / 4)
-    seen = flat_reading(face_normal(theta, shaft, tilt), beta, [*lean, roll], flat)
+    seen = flat_reading(face_normal(theta, shaft, tilt), beta, [*lean, roll], flat=flat)
     np.testing.assert_allclose(
         seen, autocollimator_reads(normal_of(theta, shaft, tilt), beta, lean, roll, flat), atol=1e-13
     )
@@ -70,7 +70,7 @@ def test_the_notes_example_shows_z_rotated_up_and_towards_x():
 
 def test_the_circle_has_its_centre_at_beta_and_the_shafts_angle_for_radius():
     theta = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    seen = 0.5 * mirror_reading(face_normal(theta, 3e-4, 2e-4, 5e-5), [-7e-4, 1e-4])
+    seen = 0.5 * mirror_reading(face_normal(theta, 3e-4, 2e-4, axis_tilt=5e-5), [-7e-4, 1e-4])
     centre = seen.mean(axis=0)
     np.testing.assert_allclose(centre, [1e-4, 7e-4], atol=1e-9)  # third order: (1e-3)^3
     np.testing.assert_allclose(np.hypot(*(seen - centre).T), np.hypot(3e-4, 2e-4 - 5e-5), rtol=1e-5)
@@ -81,7 +81,7 @@ def zero(beta, tilt=0.0, axis_tilt=0.0, *, alignment=(0.0, 0.0, 0.0), prime=Fals
     """Theta' from the notes' step 6 at which y of the flat is zero."""
     base, shaft = (np.pi, -np.pi / 4) if prime else (0.0, np.pi / 4)
     return brentq(
-        lambda t: flat_reading(face_normal(base + t, shaft, tilt, axis_tilt), beta, alignment)[1], -0.01, 0.01
+        lambda t: flat_reading(face_normal(base + t, shaft, tilt, axis_tilt=axis_tilt), beta, alignment)[1], -0.01, 0.01
     )
 
 

@@ -50,7 +50,7 @@ def covered_to(pattern, half):
 @pytest.mark.parametrize("reach", [8e-5, 2e-4, 1e-3])
 def test_a_raster_moves_little_and_leaves_no_gap(centre, reach):
     half = np.array([2e-3, 1e-3])
-    pattern = raster(centre, ZEROS, half, reach, OPEN)
+    pattern = raster(centre, ZEROS, half, reach=reach, limits=OPEN)
     assert covered_to(pattern, half) <= reach * (1 + 1e-3)  # the sky is not flat over 2 mrad
     assert np.all(pattern.counts == np.rint(pattern.counts))
     assert len(np.unique(pattern.counts, axis=0)) == len(pattern)
@@ -66,7 +66,7 @@ def test_a_raster_moves_little_and_leaves_no_gap(centre, reach):
 @pytest.mark.parametrize("centre", [DIRECT, PRIME, np.array([2691.0, 1434.0 + 30.0])])
 @pytest.mark.parametrize("reach", [1.2e-4, 3e-4])
 def test_a_spiral_begins_in_the_middle_and_leaves_no_gap(centre, reach):
-    pattern = spiral(centre, ZEROS, 3e-3, reach, OPEN)
+    pattern = spiral(centre, ZEROS, 3e-3, reach=reach, limits=OPEN)
     assert covered_to(pattern, 3e-3) <= reach
     r = np.hypot(*pattern.offsets.T)
     assert r[0] < 1e-4
@@ -77,15 +77,15 @@ def test_a_spiral_begins_in_the_middle_and_leaves_no_gap(centre, reach):
 
 
 def test_places_beyond_the_stops_are_left_out_and_counted():
-    whole = spiral(DIRECT, ZEROS, 3e-3, 2e-4, OPEN)
-    part = spiral(DIRECT, ZEROS, 3e-3, 2e-4, (-21_309.0, 9000.0))
+    whole = spiral(DIRECT, ZEROS, 3e-3, reach=2e-4, limits=OPEN)
+    part = spiral(DIRECT, ZEROS, 3e-3, reach=2e-4, limits=(-21_309.0, 9000.0))
     assert part.left_out + len(part) == len(whole)
     assert part.left_out > 0.3 * len(whole)
     assert part.counts[:, 0].max() <= 9000.0
-    turned = spiral(np.add(DIRECT, [100_000.0, 0.0]), ZEROS, 3e-3, 2e-4, (-21_309.0, 75_691.0))
+    turned = spiral(np.add(DIRECT, [100_000.0, 0.0]), ZEROS, 3e-3, reach=2e-4, limits=(-21_309.0, 75_691.0))
     assert turned.left_out == 0  # a whole turn on is the same place
     np.testing.assert_allclose(np.sort(turned.counts[:, 0]), np.sort(whole.counts[:, 0]))
-    assert len(spiral(DIRECT, ZEROS, 1e-3, 2e-4, (60_000.0, 61_000.0))) == 0
+    assert len(spiral(DIRECT, ZEROS, 1e-3, reach=2e-4, limits=(60_000.0, 61_000.0))) == 0
 
 
 def test_the_spirals_steps_along_its_arc_are_even():
@@ -98,16 +98,22 @@ def test_the_spirals_steps_along_its_arc_are_even():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: raster(DIRECT, ZEROS, (1e-3, 1e-3), 5e-5, OPEN), "below half the diagonal of a count"),
-        (lambda: raster(DIRECT, ZEROS, (1e-3, -1e-3), 1e-3, OPEN), "is below 0"),
-        (lambda: raster(np.add(ZEROS, [0.0, 5.0]), ZEROS, (1e-3, 1e-3), 1e-3, OPEN), "reaches the azimuth axis"),
-        (lambda: raster(np.add(ZEROS, [0.0, 24_999.0]), ZEROS, (1e-3, 1e-3), 1e-3, OPEN), "reaches the azimuth axis"),
-        (lambda: raster(DIRECT, ZEROS, (1.0, 1.0), 1e-4, OPEN), "more than 2000000"),
-        (lambda: raster(DIRECT, ZEROS, (1e-3, 1e-3), 1e-3, (5, 5)), "not in order"),
-        (lambda: spiral(DIRECT, ZEROS, 1e-3, 9e-5, OPEN), "too little for a spiral"),
-        (lambda: spiral(DIRECT, ZEROS, -1e-3, 1e-3, OPEN), "is not 0 or more"),
-        (lambda: spiral(DIRECT, ZEROS, 1.0, 2e-4, OPEN), "more than 2000000"),
-        (lambda: spiral([1.0], ZEROS, 1e-3, 1e-3, OPEN), "not two finite numbers"),
+        (lambda: raster(DIRECT, ZEROS, (1e-3, 1e-3), reach=5e-5, limits=OPEN), "below half the diagonal of a count"),
+        (lambda: raster(DIRECT, ZEROS, (1e-3, -1e-3), reach=1e-3, limits=OPEN), "is below 0"),
+        (
+            lambda: raster(np.add(ZEROS, [0.0, 5.0]), ZEROS, (1e-3, 1e-3), reach=1e-3, limits=OPEN),
+            "reaches the azimuth axis",
+        ),
+        (
+            lambda: raster(np.add(ZEROS, [0.0, 24_999.0]), ZEROS, (1e-3, 1e-3), reach=1e-3, limits=OPEN),
+            "reaches the azimuth axis",
+        ),
+        (lambda: raster(DIRECT, ZEROS, (1.0, 1.0), reach=1e-4, limits=OPEN), "more than 2000000"),
+        (lambda: raster(DIRECT, ZEROS, (1e-3, 1e-3), reach=1e-3, limits=(5, 5)), "not in order"),
+        (lambda: spiral(DIRECT, ZEROS, 1e-3, reach=9e-5, limits=OPEN), "too little for a spiral"),
+        (lambda: spiral(DIRECT, ZEROS, -1e-3, reach=1e-3, limits=OPEN), "is not 0 or more"),
+        (lambda: spiral(DIRECT, ZEROS, 1.0, reach=2e-4, limits=OPEN), "more than 2000000"),
+        (lambda: spiral([1.0], ZEROS, 1e-3, reach=1e-3, limits=OPEN), "not two finite numbers"),
         (lambda: spiral_offsets(1e-3, 0.0), "reach 0.0 is not above 0"),
     ],
 )
@@ -128,4 +134,4 @@ def test_what_cannot_be_searched_is_refused(call, message):
 )
 def test_a_raster_leaves_no_gap_at_its_edges_and_corners(elevation, half, reach, prime):
     centre = ZEROS + np.array([500.3, -elevation if prime else elevation])
-    assert covered_to(raster(centre, ZEROS, half, reach, OPEN), half) <= reach * (1 + 1e-3)
+    assert covered_to(raster(centre, ZEROS, half, reach=reach, limits=OPEN), half) <= reach * (1 + 1e-3)

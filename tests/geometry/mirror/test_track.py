@@ -100,12 +100,14 @@ def test_motion_seen_from_a_turning_ranger_is_that_of_scipys_rotations():
         return body.inv().apply(p + v * t + 0.5 * a * t**2 - s - vs * t)
 
     mirror_from_ground = start.inv().as_matrix()
-    place, speed, bend = apparent_motion(mirror_from_ground, p - s, v - vs, a, spin=spin)
+    place, speed, bend = apparent_motion(mirror_from_ground, p - s, v - vs, acceleration=a, spin=spin)
     h = 0.5
     np.testing.assert_allclose(place, seen(0.0), atol=1e-12)
     np.testing.assert_allclose(speed, (seen(h) - seen(-h)) / (2 * h), atol=3e-5)  # w^3 r h^2/6
     np.testing.assert_allclose(bend, (seen(h) - 2 * seen(0.0) + seen(-h)) / h**2, atol=1e-6)
-    turning = apparent_motion(mirror_from_ground, p - s, 0 * v, 0 * a, spin=0 * spin, spin_rate=[0, 0, 1e-3])[2]
+    turning = apparent_motion(
+        mirror_from_ground, p - s, 0 * v, acceleration=0 * a, spin=0 * spin, spin_rate=[0, 0, 1e-3]
+    )[2]
     np.testing.assert_allclose(turning, mirror_from_ground @ -np.cross([0, 0, 1e-3], p - s), atol=1e-15)
 
 
@@ -127,7 +129,7 @@ def test_the_first_order_estimate_is_what_happens_over_a_short_interval(seed):
     middle = count_motion(p + v * h / 2 + a * h**2 / 8, v + a * h / 2, a)[1]
     estimate = line_estimate(middle, h)
     np.testing.assert_allclose(np.abs(off), estimate, rtol=0.02, atol=2e-9)  # counts; atol: rounding of 50 000 counts
-    bound, angle, way = line_bound(p, np.linalg.norm(v), np.linalg.norm(a), h)
+    bound, angle, way = line_bound(p, np.linalg.norm(v), np.linalg.norm(a), interval=h)
     assert np.all(np.abs(off) <= bound + 1e-9)
     assert miss(flat, line.at(h / 2), points[1]) <= way + 1e-11
     assert angle <= way / 90.0
@@ -135,12 +137,12 @@ def test_the_first_order_estimate_is_what_happens_over_a_short_interval(seed):
 
 def test_the_bound_is_that_of_the_worst_place_and_speed_within_reach():
     """By hand: from rest at 20 m, 0.5 m/s^2 for 4 s reach 4 m and 2 m/s; (0.5/16 + (2/16)^2) 16/8 rad = 0.09375 rad."""
-    counted, angle, way = line_bound([0.0, 20.0, 0.0], 0.0, 0.5, 4.0)
+    counted, angle, way = line_bound([0.0, 20.0, 0.0], 0.0, 0.5, interval=4.0)
     assert counted[0] == pytest.approx(0.09375 * 1e5 / (2 * np.pi), rel=1e-12)
     assert counted[1] == pytest.approx(0.09375 * 1e5 / (4 * np.pi), rel=1e-12)  # cot Phi at most 4/16
     assert angle == pytest.approx(np.sqrt(2.0) * 0.09375, rel=1e-12)
     assert way == pytest.approx(24.0 * angle, rel=1e-12)
-    assert np.isinf(line_bound([0.0, 4.0, 100.0], 0.0, 0.5, 4.0)[0]).all()
+    assert np.isinf(line_bound([0.0, 4.0, 100.0], 0.0, 0.5, interval=4.0)[0]).all()
 
 
 def test_the_longest_interval_shrinks_towards_the_azimuth_axis_and_is_zero_on_it():
@@ -150,7 +152,7 @@ def test_the_longest_interval_shrinks_towards_the_azimuth_axis_and_is_zero_on_it
     assert found[-1] == 0.0
     assert longest_interval([0.0, 1000.0, 0.0], 0.0, 0.0) == 3600.0
     by_angle = longest_interval([0.0, 120.0, 0.0], 1.0, 0.02, limit_angle=1e-3 / 120.0)
-    assert line_bound([0.0, 120.0, 0.0], 1.0, 0.02, by_angle)[1] == pytest.approx(1e-3 / 120.0, rel=1e-9)
+    assert line_bound([0.0, 120.0, 0.0], 1.0, 0.02, interval=by_angle)[1] == pytest.approx(1e-3 / 120.0, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -163,8 +165,8 @@ def test_the_longest_interval_shrinks_towards_the_azimuth_axis_and_is_zero_on_it
         (lambda: longest_interval([1.0, 0, 0], 1.0, 1.0, longest=np.inf), "longest = inf"),
         (lambda: longest_interval([0, 120.0, 0], -1.0, 0.02), r"speed -1\.0 is not 0 or more"),
         (lambda: longest_interval([0, 120.0, 0], 1.0, [-0.02, 0.1]), r"acceleration -0\.02 is not 0 or more"),
-        (lambda: line_bound([0, 120.0, 0], np.nan, 0.02, 0.128), "speed nan is not"),
-        (lambda: line_bound([0, 120.0, 0], 1.0, 0.02, -0.128), r"interval -0\.128"),
+        (lambda: line_bound([0, 120.0, 0], np.nan, 0.02, interval=0.128), "speed nan is not"),
+        (lambda: line_bound([0, 120.0, 0], 1.0, 0.02, interval=-0.128), r"interval -0\.128"),
     ],
 )
 def test_what_cannot_be_is_refused(call, message):

@@ -41,7 +41,9 @@ def test_polaris_is_where_astropy_has_it():
                 obstime=Time(2000.0, format="jyear", scale="tdb"),
             ).apply_space_motion(one)
             seen = sky.transform_to(AltAz(obstime=one, location=place))
-            azimuth, zenith = star_place(POLARIS, mjd[k], PHI, LAM, height=HEIGHT, ut1_utc=ut1[k], pole=tuple(poles[k]))
+            azimuth, zenith = star_place(
+                POLARIS, mjd[k], PHI, longitude=LAM, height=HEIGHT, ut1_utc=ut1[k], pole=tuple(poles[k])
+            )
             # Both rest on ERFA; the ways through it differ, by parallax and light deflection at finite distance.
             assert azimuth == pytest.approx(seen.az.rad, abs=5e-3 * ARCSECOND)
             assert zenith == pytest.approx(seen.zen.rad, abs=5e-3 * ARCSECOND)
@@ -59,7 +61,7 @@ def test_theta_persei_by_its_printed_apparent_place():
     east = -np.cos(dec) * np.sin(hour)
     north = np.cos(PHI) * np.sin(dec) - np.sin(PHI) * np.cos(dec) * np.cos(hour)
     up = np.sin(PHI) * np.sin(dec) + np.cos(PHI) * np.cos(dec) * np.cos(hour)
-    azimuth, zenith = star_place(THETA_PERSEI, jd - 2_400_000.5, PHI, LAM)
+    azimuth, zenith = star_place(THETA_PERSEI, jd - 2_400_000.5, PHI, longitude=LAM)
     # What the printed place lacks is the diurnal aberration, 0.25".
     across = np.remainder(azimuth - np.arctan2(east, north) + np.pi, 2 * np.pi) - np.pi
     off = np.array([across * np.hypot(east, north), zenith - np.arctan2(np.hypot(east, north), up)])
@@ -68,15 +70,17 @@ def test_theta_persei_by_its_printed_apparent_place():
 
 def test_polaris_moves_in_azimuth_by_a_fifth_of_a_second_a_second_at_most():
     mjd = 61_280.0 + np.arange(0, 1, 1 / 288)
-    moved = (star_place(POLARIS, mjd, PHI, LAM, ut1_utc=0.9)[0] - star_place(POLARIS, mjd, PHI, LAM)[0]) / 0.9
+    moved = (
+        star_place(POLARIS, mjd, PHI, longitude=LAM, ut1_utc=0.9)[0] - star_place(POLARIS, mjd, PHI, longitude=LAM)[0]
+    ) / 0.9
     moved = np.remainder(moved + np.pi, 2 * np.pi) - np.pi
     assert np.abs(moved).max() / ARCSECOND == pytest.approx(0.21, abs=0.03)
 
 
 def test_times_and_stars_that_cannot_be_meant_are_refused():
     with pytest.raises(ValidityError, match="1972 to 2100"):
-        star_place(POLARIS, 2_461_280.5, PHI, LAM)
+        star_place(POLARIS, 2_461_280.5, PHI, longitude=LAM)
     with pytest.raises(ValidityError, match="degrees"):
         Star("Polaris", 37.95, 89.26)
-    late = star_place(POLARIS, 85_000.0, PHI, LAM)[1]  # no leap seconds are known there: no warning either
+    late = star_place(POLARIS, 85_000.0, PHI, longitude=LAM)[1]  # no leap seconds are known there: no warning either
     assert np.isfinite(late)

@@ -213,7 +213,7 @@ def test_a_wide_beam_s_pulse_lasts_as_the_beam_is_wide():
     ],
 )
 def test_many_pulses_shrink_the_limit_as_the_edition_of_2014_says(count, duration, subtense, total, expected):
-    assert repetition_factor(count, duration, subtense, 0.78, total) == pytest.approx(expected)
+    assert repetition_factor(count, duration, subtense, wavelength_um=0.78, total=total) == pytest.approx(expected)
 
 
 def test_a_sweep_is_never_worse_than_standing_and_slow_ones_become_it():

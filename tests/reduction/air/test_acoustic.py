@@ -95,7 +95,7 @@ def test_a_bent_ray_and_its_frequency_are_taken_off():
     bent = temperatures(forth * early, back * early, 0.0, **PATH, u_crosswind=0.0, speed_gradient=0.3)
     assert bent.temperature_c[0] == pytest.approx(20.0, abs=1e-4)
     e = sound(20.0, P, H, model="real_gas").vapour_pressure_hpa
-    fast = 1.0 + dispersion(20.0, P, e, 4000.0).of_a_pulse()[0]
+    fast = 1.0 + dispersion(20.0, P, e, frequency_hz=4000.0).of_a_pulse()[0]
     chirp = temperatures(*times(20.0), 0.0, **{**PATH, "length": LENGTH * fast}, u_crosswind=0.0, frequency_hz=4e3)
     assert chirp.temperature_c[0] == pytest.approx(20.0, abs=1e-6)
 

@@ -15,7 +15,7 @@ DEGREE = np.pi / 180
 def reading_of(kind, t, p, e, formula):
     """What each instrument shows in air with the vapour pressure e."""
     return {
-        "humidity_percent": lambda: humidity.relative_humidity_percent(e, t, p, formula),
+        "humidity_percent": lambda: humidity.relative_humidity_percent(e, t, p, formula=formula),
         "dew_point_c": lambda: humidity.dew_point_c(e, p, formula),
         "frost_point_c": lambda: humidity.frost_point_c(e, p),
         "wet_bulb_c": lambda: wet_bulb_c(t, e, p),

@@ -248,17 +248,21 @@ def test_second_velocity_and_chord_shorten_a_long_line(tmp_path):
     seen, level = table(tmp_path / "o.csv", pairs=[(0, 1)], aimed=False), np.zeros(2)
     seen.slope = seen.slope * 0.0 + 11_000.0
     settings = replace(EXACT, corrected=True)
-    bent = reduce_lengths(seen, level, level, 0.0, replace(settings, refraction=0.13)).distance
-    assert bent - reduce_lengths(seen, level, level, 0.0, settings).distance == pytest.approx(-0.332e-3, abs=2e-6)
+    bent = reduce_lengths(
+        seen, level, level, reference_height=0.0, settings=replace(settings, refraction=0.13)
+    ).distance
+    assert bent - reduce_lengths(seen, level, level, reference_height=0.0, settings=settings).distance == pytest.approx(
+        -0.332e-3, abs=2e-6
+    )
 
 
 def test_weather_works_on_the_slope(tmp_path, heights):
     """Against the distance in air 0.1 °C warmer, on a line of 45 degrees."""
     seen, tops = table(tmp_path / "o.csv", pairs=[(0, 2)], aimed=False), np.array([0.0, 86.6])
     settings = replace(EXACT, u_temperature_c=0.1)
-    base = reduce_lengths(seen, tops, np.zeros(2), 0.0, settings)
+    base = reduce_lengths(seen, tops, np.zeros(2), reference_height=0.0, settings=settings)
     seen.temperature_c = seen.temperature_c + 0.1
-    moved = reduce_lengths(seen, tops, np.zeros(2), 0.0, settings)
+    moved = reduce_lengths(seen, tops, np.zeros(2), reference_height=0.0, settings=settings)
     assert base.stretch[0] > 1.4
     assert moved.distance - base.distance == pytest.approx(base.systematic[:, 0], rel=1e-3)
 

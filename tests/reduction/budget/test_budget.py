@@ -76,7 +76,7 @@ def sight(reduced_night_01, phases_of):
             campaign,
             phases,
             follow_electronics(campaign, phases)[1],
-            row,
+            row=row,
             ends=ends,
             place=place or coordinates.places[names[1]],
             settings=settings,
@@ -112,7 +112,7 @@ def slope_of(items, key):
 def test_every_range_is_the_one_that_the_adjustment_starts_from(night_01, reduced_night_01):
     """By `shot_group`, a chain of its own, with all unknowns as the records have them: zeros, air, normals, leakage."""
     r = reduced_night_01
-    network = build_network(night_01, r.phases, r.electronics, r.settings)
+    network = build_network(night_01, r.phases, r.electronics, settings=r.settings)
     x = np.array(network.layout.start)
     for row, name in enumerate(r.coordinates.points):
         x[network.layout.columns(name)] = r.coordinates.x[row]
@@ -298,7 +298,7 @@ def test_two_cycles_have_an_interval_but_no_standard_uncertainty_by_draws(night_
     short = part(night_01, np.arange(len(night_01.shots)), cycles=np.full(len(night_01.shots), 2))
     scene = sight(short, PRISM)
     items = items_of(scene)
-    budget, scattered = budget_of(scene, items), scatter_of(scene, items, 50_000, 1)
+    budget, scattered = budget_of(scene, items), scatter_of(scene, items, 50_000, seed=1)
     assert next(i for i in items if i.key == "noise").given.degrees_of_freedom == 2.0
     assert budget.degrees_of_freedom < 6.0
     assert np.isnan(scattered.u)
@@ -515,7 +515,7 @@ def bent(campaign):
 
 def test_a_campaign_that_gives_the_phase_index_is_reduced_with_two_indices(night_01, reduced_night_01, sight):
     r, campaign = reduced_night_01, bent(night_01)
-    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    network = build_network(campaign, r.phases, r.electronics, settings=r.settings)
     x = np.array(network.layout.start)
     for row, name in enumerate(r.coordinates.points):
         x[network.layout.columns(name)] = r.coordinates.x[row]

@@ -21,7 +21,7 @@ def parameters(u0=np.inf, u1=np.inf, start=(4.0, 0.5)):
 
 def test_it_finds_what_scipy_finds_with_its_covariance():
     y = decay([5.0, 0.8]) + 0.05 * np.random.default_rng(2).standard_normal(len(X))
-    found = fit_curved(y, decay, parameters(), ObservedScatter(0.05**2 * np.eye(len(X))))
+    found = fit_curved(y, decay, parameters(), scatter=ObservedScatter(0.05**2 * np.eye(len(X))))
     best, covariance = curve_fit(lambda x, a, b: a * np.exp(-b * x), X, y, (4.0, 0.5), 0.05 * np.ones(len(X)), True)
     np.testing.assert_allclose(found.values, best, rtol=1e-6)
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-4)  # scipy's derivatives are one-sided
@@ -31,7 +31,9 @@ def test_it_finds_what_scipy_finds_with_its_covariance():
 
 def test_a_prior_pulls_like_one_more_reading_of_the_parameter():
     y = decay([5.0, 0.8]) + 0.05 * np.random.default_rng(3).standard_normal(len(X))
-    found = fit_curved(y, decay, parameters(u1=0.01, start=(4.0, 0.7)), ObservedScatter(0.05**2 * np.eye(len(X))))
+    found = fit_curved(
+        y, decay, parameters(u1=0.01, start=(4.0, 0.7)), scatter=ObservedScatter(0.05**2 * np.eye(len(X)))
+    )
 
     def both(x, a, b):
         return np.append(a * np.exp(-b * x[:-1]), b)
@@ -45,7 +47,7 @@ def test_a_prior_pulls_like_one_more_reading_of_the_parameter():
 
 def test_a_held_parameter_stays_and_has_no_uncertainty():
     found = fit_curved(
-        decay([5.0, 0.8]), decay, parameters(u1=0.0, start=(4.0, 0.8)), ObservedScatter(0.01 * np.eye(len(X)))
+        decay([5.0, 0.8]), decay, parameters(u1=0.0, start=(4.0, 0.8)), scatter=ObservedScatter(0.01 * np.eye(len(X)))
     )
     assert found.value("rate") == 0.8
     assert found.u("rate") == 0.0
@@ -58,7 +60,7 @@ def test_what_no_reading_holds_is_named():
             decay([5.0, 0.8]) * 0 + 3.0,
             lambda v: np.full(len(X), v[0] + v[1]),
             parameters(),
-            ObservedScatter(np.eye(len(X))),
+            scatter=ObservedScatter(np.eye(len(X))),
         )
 
 
@@ -70,7 +72,7 @@ def test_a_wrong_row_leaves_with_all_its_values_and_is_told():
         y,
         decay,
         parameters(),
-        ObservedScatter(0.05**2 * np.eye(len(X))),
+        scatter=ObservedScatter(0.05**2 * np.eye(len(X))),
         options=FitOptions(together=rows, reject=True),
     )
     assert (~found.fit.active).nonzero()[0].tolist() == [6, 7, 8]

@@ -69,7 +69,7 @@ def test_two_components_of_a_balanced_table_are_those_of_the_analysis_of_varianc
     means = y.reshape(groups, each).mean(axis=1)
     within = np.sum((y.reshape(groups, each) - means[:, None]) ** 2) / (groups * (each - 1))
     between = np.var(means, ddof=1) - within / each
-    theta = restricted_likelihood(y, np.ones((m, 1)), [np.eye(m), same], np.zeros((m, m)))
+    theta = restricted_likelihood(y, np.ones((m, 1)), [np.eye(m), same], claimed=np.zeros((m, m)))
     assert theta == pytest.approx([within, between], rel=1e-6)
     c = theta[0] * np.eye(m) + theta[1] * same
     assert effective_degrees(np.ones((m, 1)), [np.eye(m), same], c) == pytest.approx([groups - 1.0], rel=1e-6)
@@ -79,7 +79,7 @@ def test_a_component_below_zero_is_zero():
     y = np.tile([1.0, -1.0], 6) + 1e-3 * np.arange(12)  # groups of two that agree better than single readings
     label = np.repeat(np.arange(6), 2)
     same = (label[:, None] == label).astype(float)
-    theta = restricted_likelihood(y, np.ones((12, 1)), [np.eye(12), same], np.zeros((12, 12)))
+    theta = restricted_likelihood(y, np.ones((12, 1)), [np.eye(12), same], claimed=np.zeros((12, 12)))
     assert theta[1] == 0.0
     assert theta[0] == pytest.approx(np.var(y, ddof=1), rel=1e-6)
 

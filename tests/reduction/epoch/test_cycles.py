@@ -42,7 +42,9 @@ def triplet_off(campaign, name, by=WRONG, u=300.0):
 def adjusting(reduction):
     """Function campaign -> coordinates, from the phases of a reduction."""
     r = reduction
-    return lambda campaign, settings=None: adjust_coordinates(campaign, r.phases, r.electronics, settings or r.settings)
+    return lambda campaign, settings=None: adjust_coordinates(
+        campaign, r.phases, r.electronics, settings=settings or r.settings
+    )
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +132,7 @@ def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, 
 def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
     # one ranger sees ZBM02, at a distance known to some hundredths of a millimetre
     r = reduced_few_01
-    resolved = resolve_cycles(target_off(few_01, "ZBM02"), r.phases, r.electronics, r.settings)
+    resolved = resolve_cycles(target_off(few_01, "ZBM02"), r.phases, r.electronics, settings=r.settings)
     assert (resolved.rejected, resolved.notes) == ({}, ())
     (certified,) = (b for b in few_01.benchmarks if b.target == "ZBM02")
     ranger = r.coordinates.x[r.coordinates.index(certified.ranger)]
@@ -140,7 +142,7 @@ def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
 
 def test_night_01_itself_needs_no_search(night_01, reduced_night_01):
     r = reduced_night_01
-    resolved = resolve_cycles(night_01, r.phases, r.electronics, r.settings)
+    resolved = resolve_cycles(night_01, r.phases, r.electronics, settings=r.settings)
     assert (resolved.starts, resolved.rejected, resolved.notes) == ({}, {}, ())
     assert not r.coordinates.unresolved
     assert not r.coordinates.ranges.thin.any()
@@ -150,7 +152,7 @@ def test_points_are_doubtful_by_their_own_uncertainty_before_the_settings(night_
     r = reduced_night_01
 
     def doubtful(campaign, **settings):
-        return doubtful_points(build_network(campaign, r.phases, r.electronics, ReductionSettings(**settings)))
+        return doubtful_points(build_network(campaign, r.phases, r.electronics, settings=ReductionSettings(**settings)))
 
     assert doubtful(night_01) == set()  # 10 mm, the layout's
     assert doubtful(target_off(night_01, "DP005", u=9.0)) == set()

@@ -145,7 +145,7 @@ def planted(campaign, reduced, effects):
 def solved(campaign, phases):
     electronics, _ = follow_electronics(campaign, phases)
     with threadpool_limits(limits=1, user_api="blas"):
-        return adjust_coordinates(campaign, phases, electronics, ReductionSettings())
+        return adjust_coordinates(campaign, phases, electronics, settings=ReductionSettings())
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +221,7 @@ def open_minded(few_01, reduced_few_01, effects):
 def linear(campaign, phases, start):
     """Adjustment about given coordinates with every usable shot of night-01: layout, answer."""
     electronics, _ = follow_electronics(campaign, phases)
-    network = build_network(campaign, phases, electronics, ReductionSettings())
+    network = build_network(campaign, phases, electronics, settings=ReductionSettings())
     x = np.array(network.layout.start)
     for row, name in enumerate(start.points):
         x[network.layout.columns(name)] = start.x[row]
@@ -295,7 +295,7 @@ def test_priors_of_the_heads_show_in_the_covariance_and_grow_with_it(few_01, red
 def test_every_derivative_by_a_heads_parameter_is_a_finite_difference(few_01, reduced_few_01, effects, name):
     campaign = told(few_01, effects, LOOSE)
     electronics, _ = follow_electronics(campaign, reduced_few_01.phases)
-    network = build_network(campaign, reduced_few_01.phases, electronics, ReductionSettings())
+    network = build_network(campaign, reduced_few_01.phases, electronics, settings=ReductionSettings())
     x = np.array(network.layout.start)
     plain = shot_group(network, name, x)[1].head
     for unknown in head_unknowns(campaign, name):
@@ -322,7 +322,7 @@ def test_a_parameter_shifts_the_prediction_as_the_same_number_on_the_sheet(few_0
         n: e | {"cyclic_sine_mm": (e["cyclic_sine_mm"][0] + 0.01, e["cyclic_sine_mm"][1])} for n, e in effects.items()
     }
     networks = [
-        build_network(told(few_01, said, LOOSE), reduced_few_01.phases, electronics, ReductionSettings())
+        build_network(told(few_01, said, LOOSE), reduced_few_01.phases, electronics, settings=ReductionSettings())
         for said in (effects, more)
     ]
     x = np.array(networks[0].layout.start)
@@ -344,7 +344,7 @@ def test_whole_cycles_are_counted_after_the_heads_corrections(few_01, reduced_fe
         (campaign, planted(campaign, reduced_few_01, large)[0]),
     ):
         electronics, _ = follow_electronics(known, phases)
-        network = build_network(known, phases, electronics, ReductionSettings())
+        network = build_network(known, phases, electronics, settings=ReductionSettings())
         _, parts = shot_group(network, "ZY104", np.array(network.layout.start))
         margins.append(parts.margin)
     assert np.abs(parts.head.value).min() > 10e-3
@@ -371,7 +371,7 @@ def test_axes_on_the_feed_arm_are_refused_since_nothing_says_how_the_mirror_is_t
 ):
     r = reduced_few_01
     with pytest.raises(InputError) as caught:
-        build_network(changed(few_01, "ZY115", **said), r.phases, r.electronics, r.settings)
+        build_network(changed(few_01, "ZY115", **said), r.phases, r.electronics, settings=r.settings)
     assert str(caught.value).startswith(f"mirrors/ZP115.toml: {shown} cannot be applied: ZY115 is on the feed arm and")
     assert "\n" not in str(caught.value)
 
@@ -385,7 +385,7 @@ def test_axes_on_the_feed_arm_are_applied_where_the_record_says_how_the_mount_is
     ]
     arm = few_01.feedarm.model_copy(update={"ranger": tuple(turned)})
     campaign = changed(dataclasses.replace(few_01, feedarm=arm), "ZY115", mirror_offset_mm=0.2, u_axis_mm=0.01)
-    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    network = build_network(campaign, r.phases, r.electronics, settings=r.settings)
     mirror = campaign.mirror_of("ZY115")
     assert Parameter(ParameterKind.AXES, "ZY115") in {unknown.quantity for unknown in head_unknowns(campaign, "ZY115")}
     station = station_in(campaign, "ZY115")
@@ -403,7 +403,7 @@ def test_a_cube_behind_the_mirror_has_no_axis_correction_and_says_so(few_01, red
     r = reduced_few_01
     ne0 = few_01.mirror_of("ZY104").ne0
     campaign = changed(few_01, "ZY104", u_axis_mm=0.01, elv_zrg=ne0 + 26_000)
-    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    network = build_network(campaign, r.phases, r.electronics, settings=r.settings)
     said = r"^mirrors/ZP104\.toml: elv_zrg = \d+ turns the mirror's face from the beam, 93\.6 degrees"
     with pytest.raises(InputError, match=said):
         shot_group(network, "ZY104", np.array(network.layout.start))
@@ -412,7 +412,7 @@ def test_a_cube_behind_the_mirror_has_no_axis_correction_and_says_so(few_01, red
 def test_a_target_straight_behind_a_mirror_that_stands_forward_is_refused(few_01, reduced_few_01):
     r = reduced_few_01
     campaign = changed(few_01, "ZY104", mirror_offset_mm=5.0, u_axis_mm=0.01)
-    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    network = build_network(campaign, r.phases, r.electronics, settings=r.settings)
     x = np.array(network.layout.start)
     target = network.campaign.shots.target[r.electronics["ZY104"].shots[0]]
     behind = mirror_axes(campaign, "ZY104").T @ [0.0, 1e-4, -50.0]
@@ -424,7 +424,7 @@ def test_a_target_straight_behind_a_mirror_that_stands_forward_is_refused(few_01
 def test_an_uncertainty_alone_makes_parameters_with_that_prior(few_01, reduced_few_01):
     r = reduced_few_01
     campaign = changed(few_01, "ZY104", u_axis_mm=0.02, u_amplitude_to_phase_rad=1e-3, u_cyclic_mm=0.004)
-    network = build_network(campaign, r.phases, r.electronics, r.settings)
+    network = build_network(campaign, r.phases, r.electronics, settings=r.settings)
     (group,) = (p for p in network.priors if p.name == "head effects")
     np.testing.assert_allclose(np.sqrt(group.covariance), [*[2e-5] * 4, 1e-3, *[4e-6] * 4])
     assert not group.observed.any()
@@ -446,7 +446,7 @@ def test_a_zero_uncertainty_of_a_head_is_refused_where_it_stands(few_01, reduced
     mirror = few_01.mirrors[zp].model_copy(update={key: 0.0})
     campaign = dataclasses.replace(few_01, mirrors={**few_01.mirrors, zp: mirror})
     with pytest.raises(InputError, match=rf"^mirrors/ZP104\.toml: {key} = 0 \(expected above 0"):
-        build_network(campaign, r.phases, r.electronics, r.settings)
+        build_network(campaign, r.phases, r.electronics, settings=r.settings)
 
 
 @pytest.mark.slow
@@ -478,6 +478,6 @@ def test_a_sheet_that_the_ranges_contradict_is_named(few_01, reduced_few_01):
     r, zp = reduced_few_01, few_01.mirror_of("ZY101").zp
     mirror = few_01.mirrors[zp].model_copy(update={"axis_offset_mm": 2.0, "u_axis_mm": 0.01})
     campaign = dataclasses.replace(few_01, mirrors=few_01.mirrors | {zp: mirror})
-    notes = adjust_coordinates(campaign, r.phases, r.electronics, r.settings).notes
+    notes = adjust_coordinates(campaign, r.phases, r.electronics, settings=r.settings).notes
     assert any(n.startswith("axes ZY101 axis offset: not the mirror sheet's") for n in notes)
     assert not any("not the mirror sheet's" in n for n in r.notes)

@@ -113,7 +113,7 @@ def test_a_zero_uncertainty_that_cannot_be_weighed_is_refused_where_it_stands(
 ):
     r = reduced_night_01
     with pytest.raises(InputError) as caught:
-        build_network(changed(night_01, what, key), r.phases, r.electronics, r.settings)
+        build_network(changed(night_01, what, key), r.phases, r.electronics, settings=r.settings)
     assert str(caught.value).startswith(place)
     assert "\n" not in str(caught.value)
 
@@ -122,6 +122,6 @@ def test_a_surveyed_coordinate_of_zero_uncertainty_is_held(night_01, reduced_nig
     r = reduced_night_01
     fixed = night_01.monuments["ZY101"].model_copy(update={"u_x_mm": 0.0, "u_y_mm": 0.0, "u_z_mm": 0.0})
     campaign = dataclasses.replace(night_01, monuments=night_01.monuments | {"ZY101": fixed})
-    layout = build_network(campaign, r.phases, r.electronics, r.settings).layout
+    layout = build_network(campaign, r.phases, r.electronics, settings=r.settings).layout
     held = [n for n, free in zip(layout.names, layout.free, strict=True) if not free]
     assert held == ["ZY101-F x", "ZY101-F y", "ZY101-F z", "ZY103-F z"]

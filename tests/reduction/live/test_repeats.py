@@ -31,7 +31,7 @@ def taken(number, seconds, distance, *, target="ZEG1", amplitude=1.0, reason=Non
 
 
 def joined(rows, lengths):
-    return joined_repeats(rows, lengths, 1.5e9, INDEX)
+    return joined_repeats(rows, lengths, 1.5e9, index=INDEX)
 
 
 def phase_of(row, distance):

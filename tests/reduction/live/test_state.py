@@ -126,7 +126,7 @@ def cross(w):
 def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
     before = with_velocities(with_reference(state(6), ["A"]), ["B", "E"], USUAL)
     elevation = 0.7 + np.radians(degrees)
-    after = carried_on(before, 2000, seconds, elevation, BODIES, USUAL, 0.5)
+    after = carried_on(before, 2000, seconds, elevation=elevation, bodies=BODIES, rule=USUAL, profile_sigma=0.5)
     t, n = max(seconds, 0.0), len(before.x)
     column = {name: i for i, name in enumerate(before.names)}
     f, q = np.eye(n), np.zeros((n, n))
@@ -167,7 +167,7 @@ def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
 
 def test_the_profile_returns_to_its_prior_and_the_reference_stands():
     before = with_reference(state(7), ["A", "D"])
-    after = carried_on(before, 0, 24 * 3600.0, 0.7, BODIES, USUAL, 0.4)
+    after = carried_on(before, 0, 24 * 3600.0, elevation=0.7, bodies=BODIES, rule=USUAL, profile_sigma=0.4)
     bend = after.columns([parameter("the air bend")])[0]
     assert after.x[bend] == pytest.approx(0.0, abs=1e-12)
     assert after.covariance[bend, bend] == pytest.approx(0.16, rel=1e-9)
@@ -186,7 +186,7 @@ def test_there_and_back_through_the_ground_is_where_it_was(seed):
     x, p = to_ground(before, frames)
     np.testing.assert_allclose(x[:3], frames["A"].points(before.x[:3]), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(x[3:], before.x[3:])
-    back = from_ground(before.parameters, x, p, frames, ticks=1, elevation=0.0)
+    back = from_ground(before.parameters, x, p, frames=frames, ticks=1, elevation=0.0)
     np.testing.assert_allclose(back.x, before.x, rtol=0, atol=1e-12)
     np.testing.assert_allclose(back.covariance, before.covariance, rtol=0, atol=1e-18)
 
@@ -199,7 +199,7 @@ def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(veloci
     seen_names = [n for n in NAMES if not n.startswith("E ")]
     r = 1e-8
     for epoch in range(500):
-        now = carried_on(now, epoch, 10.0, 0.7 + 1e-4 * epoch, BODIES, USUAL, 0.4)
+        now = carried_on(now, epoch, 10.0, elevation=0.7 + 1e-4 * epoch, bodies=BODIES, rule=USUAL, profile_sigma=0.4)
         at = now.columns(parameters(seen_names))
         p, h = now.covariance[np.ix_(at, at)], rng.normal(size=(40, len(at)))
         gain = np.linalg.solve(h @ p @ h.T + r * np.eye(40), h @ p).T
@@ -228,7 +228,7 @@ def test_what_lasts_of_a_path_returns_to_its_prior():
     """Half an hour takes e^-1 of it and gives 1 - e^-2 of its variance back."""
     path = parameters(["path ZY1 A", "normal A 1"])
     before = Carried(path, np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
-    after = carried_on(before, 1, 1800.0, 0.5, {}, USUAL, 0.5, 0.105)
+    after = carried_on(before, 1, 1800.0, elevation=0.5, bodies={}, rule=USUAL, profile_sigma=0.5, path_sigma_ppm=0.105)
     kept = np.exp(-1.0)
     np.testing.assert_allclose(after.x, [0.1 * kept, 2.0], rtol=1e-12)
     expected = [[4e-4 * kept**2 + (1 - kept**2) * 0.105**2, 1e-4 * kept], [1e-4 * kept, 1.0]]

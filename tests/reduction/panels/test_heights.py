@@ -47,7 +47,7 @@ def test_without_noise_the_heights_are_those_of_the_solid_panels(tmp_path, sheet
     rng = np.random.default_rng(1)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = panel_readings(solid, sheet, calm(rng), CornerTour(turns=(0, 1, 2, 3)))
+    rows, stands = panel_readings(solid, sheet, calm(rng), tour=CornerTour(turns=(0, 1, 2, 3)))
     found = reduce_panels(
         read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet, survey=survey(stands, 1e-7, rng)
     )
@@ -146,7 +146,7 @@ def test_a_wrong_reading_is_found_by_name_and_left_out(tmp_path, sheet):
     rng = np.random.default_rng(6)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(turns=(0, 1, 2), members=("Ada",)))
+    rows, stands = panel_readings(solid, sheet, Crew(rng), tour=CornerTour(turns=(0, 1, 2), members=("Ada",)))
     at = next(k for k, row in enumerate(rows) if row.startswith("DP21P01,1,"))
     cells = rows[at].split(",")
     cells[6] = f"{float(cells[6]) + 0.08:.3f}"
@@ -190,7 +190,7 @@ def test_turns_of_screws_bring_corners_together(tmp_path, sheet):
     rng = np.random.default_rng(8)
     layout = patch()
     solid = standing_by_chance(layout, sheet, rng)
-    rows, stands = panel_readings(solid, sheet, Crew(rng), CornerTour(turns=(0, 1, 2, 3)))
+    rows, stands = panel_readings(solid, sheet, Crew(rng), tour=CornerTour(turns=(0, 1, 2, 3)))
     known = survey(stands, 50e-6, rng)
     found = reduce_panels(read(rows, tmp_path / "r.csv", layout, sheet), layout, sheet, survey=known)
     moved = screwed(solid, 0.9 * np.where(found.known, found.turns, 0.0) * 1.27e-3)
@@ -198,7 +198,7 @@ def test_turns_of_screws_bring_corners_together(tmp_path, sheet):
     assert standing(found).rms > 150e-6
     left_over = 0.1 * found.relative[found.known]
     assert np.abs((true[found.known] - left_over) / found.u_relative[found.known]).max() < 4.0
-    rows, _ = panel_readings(moved, sheet, Crew(rng), CornerTour(turns=(0, 1, 2, 3)), shafts=stands)
+    rows, _ = panel_readings(moved, sheet, Crew(rng), tour=CornerTour(turns=(0, 1, 2, 3)), shafts=stands)
     left = reduce_panels(read(rows, tmp_path / "l.csv", layout, sheet), layout, sheet, survey=known)
     done = setting(found, left)
     assert done.gain == pytest.approx(0.9, abs=4.0 * done.u_gain + 0.001)
@@ -216,7 +216,7 @@ def test_maps_lay_the_best_fit_on_the_design(tmp_path, sheet):
     bumpy = solid_panels(layout, rng, piston=0.0, slope=0.0, twist=0.0, bump=60e-6)
     solid = replace(calm_panels, bumps=bumpy.bumps, bump_k=bumpy.bump_k, bump_phase=bumpy.bump_phase)
     maps = {name: fitted_map(_map_of(solid, p, rng)) for p, name in enumerate(layout.panels)}
-    rows, stands = panel_readings(solid, tool(), Crew(rng), CornerTour(turns=(0, 1, 2, 3)))
+    rows, stands = panel_readings(solid, tool(), Crew(rng), tour=CornerTour(turns=(0, 1, 2, 3)))
     known = survey(stands, 20e-6, rng)
     readings = read(rows, tmp_path / "r.csv", layout, tool())
     with_maps = reduce_panels(readings, layout, tool(), survey=known, maps=maps)
@@ -309,10 +309,10 @@ def test_a_careless_member_and_a_drifting_session_stand_out(tmp_path, sheet):
     solid = standing_by_chance(layout, sheet, rng)
     half = len(layout.corners) // 2
     good, stands = panel_readings(
-        solid, sheet, Crew(rng), CornerTour(corners=np.arange(half), members=("Ada",), turns=(0, 1, 2))
+        solid, sheet, Crew(rng), tour=CornerTour(corners=np.arange(half), members=("Ada",), turns=(0, 1, 2))
     )
     rest = CornerTour(corners=np.arange(half, len(layout.corners)), members=("Ben",), turns=(0, 1, 2))
-    bad, _ = panel_readings(solid, sheet, Crew(rng, gauge=9e-6), rest, shafts=stands)
+    bad, _ = panel_readings(solid, sheet, Crew(rng, gauge=9e-6), tour=rest, shafts=stands)
     rows = good + [row.replace(",day", ",late") for row in bad[1:]]
     readings = read(rows, tmp_path / "r.csv", layout, sheet)
     found = reduce_panels(readings, layout, sheet, survey=survey(stands, 80e-6, rng))

@@ -89,7 +89,7 @@ def test_the_beam_is_what_the_coordinator_says_of_the_same_points(night_01, opti
     later = epoch(night_01, dish=(TURN, SHIFT), arm=(0.5 * TURN, 2.0 * SHIFT))
     before = epoch(night_01, seed=1)
     dish, arm = (pose_of_group(later, before, night_01, group=g, frame="reflector") for g in ("dish", "feed-arm"))
-    cross = cross_covariance(arm, dish, night_01, before)
+    cross = cross_covariance(arm, dish, night_01, earlier=before)
     found = pointing_offset(dish.pose, arm.pose, night_01, cross=cross, optics=optics)
     np.testing.assert_allclose(sum(found.terms.values()), found.offset, rtol=1e-12)
     np.testing.assert_array_equal(found.correction, -found.offset)

@@ -38,7 +38,7 @@ ROUND = np.linspace(0, 2 * np.pi, 100)[:-1]
 
 @pytest.mark.parametrize("tilts", [None, readings(ROUND)])
 def test_what_is_planted_is_found(tilts):
-    found = track_profile(AT, of_the_alidade(AT), spread(12), tilts, harmonics=3)
+    found = track_profile(AT, of_the_alidade(AT), spread(12), tilts=tilts, harmonics=3)
     a = np.linspace(0, 7, 50)
     np.testing.assert_allclose(found.series.at(a)[0], tilt(a), rtol=0, atol=1e-9 * ARCSECOND)
     told = dict(zip(coefficient_names(3), found.series.values / ARCSECOND, strict=True))
@@ -63,8 +63,8 @@ def test_the_mean_tilt_is_where_the_axis_leans():
 
 def test_an_inclinometer_alone_cannot_tell_its_zero_from_one_wave():
     with pytest.raises(EstimationError, match=r"cos 1A east.*zero x"):
-        track_profile(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), readings(ROUND), harmonics=1)
-    found = track_profile(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), readings(ROUND), harmonics=0)
+        track_profile(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), tilts=readings(ROUND), harmonics=1)
+    found = track_profile(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)), tilts=readings(ROUND), harmonics=0)
     assert found.poses == 0  # the mean alone is held: the zero goes round, the axis does not
 
 
@@ -82,11 +82,11 @@ def test_a_joined_reading_is_the_least_squares_of_both():
     root = rng.normal(size=(6, 9)) * np.array([1e-4] * 3 + [1e-5] * 3)[:, None]
     q, six, u = root @ root.T, rng.normal(size=6) * 1e-5, 2e-6
     reading = np.array([1e-5, -2e-5])
-    found, claimed = joined_tilt(six, q, reading, u)
+    found, claimed = joined_tilt(six, q, reading, u=u)
     pick = np.eye(6)[3:5]
     normal = np.linalg.inv(q) + pick.T @ pick / u**2
     np.testing.assert_allclose(claimed, np.linalg.inv(normal), rtol=1e-6)
     np.testing.assert_allclose(found, np.linalg.solve(normal, np.linalg.solve(q, six) + pick.T @ reading / u**2),
                                rtol=1e-6)  # fmt: skip
     with pytest.raises(EstimationError, match="expected above 0"):
-        joined_tilt(six, q, reading, 0.0)
+        joined_tilt(six, q, reading, u=0.0)

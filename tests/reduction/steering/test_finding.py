@@ -112,7 +112,7 @@ def errors(rng, n, true_of, **how):
     for _ in range(n):
         true = true_of(rng)
         start = true + rng.uniform(-1.5, 1.5, 2)
-        scan = raster(start, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), 0.25 * RADIUS, HEAD.azimuth_limits)
+        scan = raster(start, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), reach=0.25 * RADIUS, limits=HEAD.azimuth_limits)
         measure = ranger(rng, true, **how)
         spot = fit_spot(
             scan.counts,
@@ -183,7 +183,7 @@ def test_a_clipped_top_does_not_lower_the_peak():
     rng = np.random.default_rng(5)
     from catseye.geometry.mirror.search_pattern import raster
 
-    scan = raster(TRUE, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), 0.25 * RADIUS, HEAD.azimuth_limits)
+    scan = raster(TRUE, HEAD.zeros, (1.6 * RADIUS, 1.6 * RADIUS), reach=0.25 * RADIUS, limits=HEAD.azimuth_limits)
     clean = returned(scan.counts, TRUE, real=False)
     noisy = clean + 0.02 * rng.normal(size=len(clean))
     head = SearchHead(
@@ -217,7 +217,7 @@ def test_too_little_light_or_too_few_readings_or_an_edge_is_a_status():
 
 def test_a_found_target_has_coordinates_with_their_covariance():
     spot = Spot("found", np.add(TRUE, [2.0, -1.0]), np.array([[0.04, 0.01], [0.01, 0.09]]), 5.0, RADIUS, 0.0, 1.0, 50)
-    point, covariance = found_point(STATION, spot, RANGE, 5e-3)
+    point, covariance = found_point(STATION, spot, RANGE, u_distance=5e-3)
     origin, direction = ray(STATION, spot.counts)
     np.testing.assert_allclose(point, origin + RANGE * direction, atol=1e-12)
     np.testing.assert_allclose(counts(STATION, point), spot.counts, atol=1e-6)
@@ -226,17 +226,21 @@ def test_a_found_target_has_coordinates_with_their_covariance():
     distance = RANGE + 5e-3 * rng.normal(size=(len(drawn), 1))
     many = np.cov((STATION.scan_point + distance * ray(STATION, drawn).direction).T)
     np.testing.assert_allclose(covariance, many, atol=0.03 * np.abs(many).max())
-    wider = found_point(STATION, spot, RANGE, 5e-3, of_station=np.diag([1e-8] * 3 + [1e-10] * 3 + [0.0] * 7))[1]
+    wider = found_point(
+        STATION, spot, RANGE, u_distance=5e-3, of_station=np.diag([1e-8] * 3 + [1e-10] * 3 + [0.0] * 7)
+    )[1]
     assert np.all(np.linalg.eigvalsh(wider - covariance) >= -1e-15)
     # the fixed point's share is its own covariance
-    only = found_point(STATION, spot, RANGE, 5e-3, of_station=np.diag([1e-8] * 3 + [0.0] * 10))[1] - covariance
+    only = (
+        found_point(STATION, spot, RANGE, u_distance=5e-3, of_station=np.diag([1e-8] * 3 + [0.0] * 10))[1] - covariance
+    )
     np.testing.assert_allclose(only, 1e-8 * np.eye(3), atol=1e-15)
     with pytest.raises(ValidityError, match="no point for a target that was not found"):
-        found_point(STATION, Spot("not found: dark"), RANGE, 1e-4)
+        found_point(STATION, Spot("not found: dark"), RANGE, u_distance=1e-4)
     with pytest.raises(ValidityError, match=r"distance -1\.0 m"):
-        found_point(STATION, spot, -1.0, 1e-4)
+        found_point(STATION, spot, -1.0, u_distance=1e-4)
     with pytest.raises(ValidityError, match=r"distance inf m"):
-        found_point(STATION, spot, np.inf, 1e-4)
+        found_point(STATION, spot, np.inf, u_distance=1e-4)
 
 
 def test_search_results_are_a_table_that_keeps_the_microsecond():

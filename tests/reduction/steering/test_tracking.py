@@ -153,10 +153,10 @@ def test_the_miss_is_what_estimate_and_bound_say(ground):
         stations.mirror_from_ground[:, None],
         place[:, None] - stations.scan_point[:, None],
         speed[:, None],
-        bend[:, None],
+        acceleration=bend[:, None],
     )
     estimate = line_estimate(count_motion(*seen)[1], BUFFER)
-    bound, _, way = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), 0.06, BUFFER)
+    bound, _, way = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), 0.06, interval=BUFFER)
     assert np.all(estimate <= bound)
     assert np.median(bound / estimate) < 30.0
     path = AntennaPath(SLEW.azimuth, SLEW.elevation)
@@ -206,7 +206,7 @@ def test_a_feed_arm_ranger_rides_with_the_reflector_and_follows_a_ground_target(
     s, vs, as_ = SLEW.motion([[2.0, -9.0, 52.0]], "reflector", when)
     spin, change = SLEW.spin(when)
     m = riding(np.array([when]))[0, 0, 0].mirror_from_ground
-    seen = apparent_motion(m, place - s, speed - vs, bend - as_, spin=spin, spin_rate=change)
+    seen = apparent_motion(m, place - s, speed - vs, acceleration=bend - as_, spin=spin, spin_rate=change)
     np.testing.assert_allclose(moving.lines.rate[0, 0, 0], count_motion(*seen)[0][0], rtol=1e-5)
 
 
@@ -270,7 +270,7 @@ def test_no_acceleration_exceeds_the_most_that_is_told(frame):
 def test_over_a_safe_interval_the_line_holds_its_limit(ground, limit):
     stations, _limits = ground
     times = np.array([5.0, 40.0, 80.0])
-    safe = safe_intervals(stations, DISH, "reflector", SLEW, times, **limit)
+    safe = safe_intervals(stations, DISH, "reflector", path=SLEW, times=times, **limit)
     assert safe.shape == (3, 12, 9)
     assert np.all(safe > 0.0)
     targets = fixed(DISH, "reflector", SLEW)

@@ -68,7 +68,7 @@ def inside_any(solids, frames, x, margin):
 
 def test_every_pair_of_the_night_agrees_with_points_taken_along_its_path(solids, scene):
     rangers, targets, frames = scene
-    found = visibility(rangers, targets, solids, frames, beam_radius=0.0)
+    found = visibility(rangers, targets, solids, frames=frames, beam_radius=0.0)
     every = slice(0, None, 29)
     seen_names = set()
     for i, name in enumerate(rangers):
@@ -92,7 +92,7 @@ def test_every_pair_of_the_night_agrees_with_points_taken_along_its_path(solids,
 
 def test_reasons_are_lines_that_a_person_reads(solids, scene):
     rangers, targets, frames = scene
-    found = visibility(rangers, targets, solids, frames)
+    found = visibility(rangers, targets, solids, frames=frames)
     reasons = {found.reason(i, j) for i in range(len(rangers)) for j in range(len(targets.names))}
     assert "seen" in reasons
     assert any(r.startswith("obstructed by 'reflector' at ") for r in reasons)
@@ -109,7 +109,7 @@ def test_reasons_are_lines_that_a_person_reads(solids, scene):
 def test_what_was_ranged_that_night_is_seen(night_01, scene):
     """Shots of the night, with nothing in the way: every one lies within the acceptance of its retroreflector."""
     rangers, targets, frames = scene
-    found = visibility(rangers, targets, Solids(), frames)
+    found = visibility(rangers, targets, Solids(), frames=frames)
     row, column = list(rangers), {name: k for k, name in enumerate(targets.names)}
     pairs = {(r, t) for r, t in zip(night_01.shots.ranger, night_01.shots.target, strict=True) if t in column}
     assert len(pairs) > 50
@@ -129,7 +129,9 @@ def test_the_order_of_reasons_and_the_limits():
     kinds = ("prism", "prism", "prism", "hollow", "hollow", "ball")
     targets = Retroreflectors(tuple("abcdef"), kinds, points, axes)
     frames = frames_at(0.3, 0.7)
-    found = visibility(rangers, targets, Solids(), frames, reachable=np.array([[True] * 3 + [False] + [True] * 2]))
+    found = visibility(
+        rangers, targets, Solids(), frames=frames, reachable=np.array([[True] * 3 + [False] + [True] * 2])
+    )
     assert found.code[0].tolist() == [
         Sight.TOO_NEAR,
         Sight.TOO_FAR,
@@ -142,7 +144,7 @@ def test_the_order_of_reasons_and_the_limits():
     assert found.reason(0, 1) == "too far: 600.0 m above 500"
     assert found.reason(0, 2) == "incidence 63 deg above 45"
     assert found.reason(0, 3) == "beyond the azimuth stops"
-    wide = visibility(rangers, targets, Solids(), frames, limits=RangeLimits(0.5, 1000.0))
+    wide = visibility(rangers, targets, Solids(), frames=frames, limits=RangeLimits(0.5, 1000.0))
     assert wide.seen[0, :2].all()
 
 
@@ -152,8 +154,8 @@ def test_a_beam_is_not_a_line():
     near = Solids.model_validate(
         {"sphere": [{"name": "s", "frame": "ground", "centre_mm": [50_000.0, 1005.0, 0.0], "radius_mm": 1000.0}]}
     )
-    assert visibility(rangers, targets, near, frames_at(0, 1), beam_radius=0.0).seen[0, 0]
-    assert not visibility(rangers, targets, near, frames_at(0, 1), beam_radius=BEAM_RADIUS).seen[0, 0]
+    assert visibility(rangers, targets, near, frames=frames_at(0, 1), beam_radius=0.0).seen[0, 0]
+    assert not visibility(rangers, targets, near, frames=frames_at(0, 1), beam_radius=BEAM_RADIUS).seen[0, 0]
 
 
 def test_solids_move_with_their_frame():
@@ -163,9 +165,11 @@ def test_solids_move_with_their_frame():
     box = Solids.model_validate(
         {"box": [{"name": "b", "frame": "alidade", "centre_mm": [0.0, 20_000.0, 10_000.0], "size_mm": [2000.0] * 3}]}
     )
-    assert visibility(rangers, targets, box, frames_at(0.0, 1.0)).reason(0, 0) == "obstructed by 'b' at 79.0 m"
-    assert visibility(rangers, targets, box, frames_at(np.pi / 2, 1.0)).seen[0, 0]
-    assert visibility(rangers, targets, box, frames_at(np.pi, 1.0)).reason(0, 0) == "obstructed by 'b' at 119.0 m"
+    assert visibility(rangers, targets, box, frames=frames_at(0.0, 1.0)).reason(0, 0) == "obstructed by 'b' at 79.0 m"
+    assert visibility(rangers, targets, box, frames=frames_at(np.pi / 2, 1.0)).seen[0, 0]
+    assert (
+        visibility(rangers, targets, box, frames=frames_at(np.pi, 1.0)).reason(0, 0) == "obstructed by 'b' at 119.0 m"
+    )
     better = Transform("ground", "reflector", from_vector([0.1, 0.0, 0.0]), np.zeros(3))
     assert frames_at(0.0, 1.0, better)["reflector"] is better
 

@@ -76,7 +76,7 @@ def swinging(antenna, time=100.0):
 
 
 def test_it_is_the_station_of_one_posture_with_the_deformed_arm(antenna, mirror):
-    moving = moving_ranger(RANGER, mirror, antenna, DRIVE, TIMES, u_mount=1e-5)
+    moving = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=TIMES, u_mount=1e-5)
     for i, posture in enumerate((DRIVE.posture(TIMES[0]), DRIVE.posture(TIMES[1]))):
         arm = antenna.ground_from("feed_arm", posture).single
         here = arm @ Transform("feed_arm", "reflector", np.eye(3), np.array([0.0, 8.0, -10.0]))
@@ -88,7 +88,7 @@ def test_it_is_the_station_of_one_posture_with_the_deformed_arm(antenna, mirror)
 
 
 def test_at_slew_rate_the_scan_point_moves_as_the_rates_say(antenna, mirror):
-    moving = moving_ranger(RANGER, mirror, antenna, DRIVE, TIMES, u_mount=1e-5)
+    moving = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=TIMES, u_mount=1e-5)
     speed = np.diff(moving.station.scan_point, axis=0)[0] / 0.128
     # in the elevation frame the ranger stands (-8.9, -57.94, 65.85) m from the elevation axis, nearly
     e, fall = DRIVE.elevation, -DRIVE.elevation_rate
@@ -125,11 +125,11 @@ def test_scan_point_and_turn_scatter_as_their_covariance_claims(antenna, mirror)
     rng = np.random.default_rng(1)
     state = swinging(antenna)
     swing = vibrating(antenna.record, state, np.array(100.0))
-    moving = moving_ranger(RANGER, mirror, antenna, DRIVE, np.array(100.0), u_mount=1e-5, known=(swing,))
+    moving = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=np.array(100.0), u_mount=1e-5, known=(swing,))
     moved, added = draws(antenna, rng, state)
     drawn = FrameCorrections(added, np.zeros((30, 30)))
     times = np.full(COUNT, 100.0)
-    station = moving_ranger(RANGER, mirror, antenna, moved, times, u_mount=1e-5, known=(drawn,)).station
+    station = moving_ranger(RANGER, mirror, antenna, drive=moved, times=times, u_mount=1e-5, known=(drawn,)).station
     still = moving.station
     shift = station.scan_point + 0.5e-3 * rng.standard_normal((COUNT, 3)) - still.scan_point
     seat = from_vector(1e-5 * rng.standard_normal((COUNT, 3)))
@@ -159,7 +159,7 @@ def test_projected_targets_scatter_as_their_covariance_claims(antenna, group):
     rng = np.random.default_rng(2)
     state = swinging(antenna)
     now = np.array([100.0])
-    found = projected(antenna, group, DRIVE, now, known=(vibrating(antenna.record, state, now),))
+    found = projected(antenna, group, DRIVE, times=now, known=(vibrating(antenna.record, state, now),))
     assert found.position.shape == (1, len(antenna.groups[group].names), 3)
     moved, added = draws(antenna, rng, state)
     posture = moved.posture(np.full(COUNT, 100.0))
@@ -170,7 +170,7 @@ def test_projected_targets_scatter_as_their_covariance_claims(antenna, group):
 
 def test_projected_coordinates_at_both_ends_of_a_buffer_are_the_models(antenna):
     told = SubreflectorPosition(np.array([0.0, 0.01, 0.0]), np.array([0.0, 0.001, 0.0]), np.zeros(3))
-    found = projected(antenna, "subreflector_rim", DRIVE, TIMES, subreflector=told)
+    found = projected(antenna, "subreflector_rim", DRIVE, times=TIMES, subreflector=told)
     expected = antenna.points("subreflector_rim", DRIVE.posture(TIMES), subreflector=told)
     np.testing.assert_array_equal(found.position, expected)
     assert found.covariance.shape == (2, 4, 3, 3)
@@ -180,11 +180,18 @@ def test_projected_coordinates_at_both_ends_of_a_buffer_are_the_models(antenna):
 def test_the_encoders_uncertainty_moves_and_turns_the_mount_together(antenna, mirror):
     """By differences of the whole model: what an encoder's u adds is its slope times u, shift and turn in one."""
     now, h, u = np.array(100.0), 1e-5, 1e-3
-    still = moving_ranger(RANGER, mirror, antenna, replace(DRIVE, u_azimuth=0.0, u_elevation=0.0), now, u_mount=1e-5)
+    still = moving_ranger(
+        RANGER, mirror, antenna, drive=replace(DRIVE, u_azimuth=0.0, u_elevation=0.0), times=now, u_mount=1e-5
+    )
     for axis in ("azimuth", "elevation"):
         ends = [
             moving_ranger(
-                RANGER, mirror, antenna, replace(DRIVE, **{axis: getattr(DRIVE, axis) + s * h}), now, u_mount=1e-5
+                RANGER,
+                mirror,
+                antenna,
+                drive=replace(DRIVE, **{axis: getattr(DRIVE, axis) + s * h}),
+                times=now,
+                u_mount=1e-5,
             ).station
             for s in (1, -1)
         ]
@@ -192,7 +199,7 @@ def test_the_encoders_uncertainty_moves_and_turns_the_mount_together(antenna, mi
             [ends[0].scan_point - ends[1].scan_point, to_vector(ends[0].gamma.T @ ends[1].gamma)]
         ) / (2 * h)
         quiet = replace(DRIVE, u_azimuth=0.0, u_elevation=0.0)
-        loud = moving_ranger(RANGER, mirror, antenna, replace(quiet, **{f"u_{axis}": u}), now, u_mount=1e-5)
+        loud = moving_ranger(RANGER, mirror, antenna, drive=replace(quiet, **{f"u_{axis}": u}), times=now, u_mount=1e-5)
         added = loud.covariance - still.covariance
         size = u * np.repeat([np.linalg.norm(slope[:3]), np.linalg.norm(slope[3:])], 3)
         # 2 %: the deformations' own slopes, which are left out
@@ -204,8 +211,8 @@ def test_a_measured_correction_replaces_the_models_uncertainty(antenna, mirror):
     names = ("alidade", "elevation", "reflector", "feed_arm")
     six = {name: np.full(6, 1e-5) for name in names}
     sharp = FrameCorrections(six, np.eye(24) * 1e-14, replaces=True)
-    before = moving_ranger(RANGER, mirror, antenna, DRIVE, now, u_mount=1e-7)
-    after = moving_ranger(RANGER, mirror, antenna, DRIVE, now, u_mount=1e-7, known=(sharp,))
+    before = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=now, u_mount=1e-7)
+    after = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=now, u_mount=1e-7, known=(sharp,))
     assert np.all(np.diag(after.covariance) < np.diag(before.covariance))
     # left are encoders and seat: 2 seconds at some 75 m and 0.5 mm
     assert np.sqrt(np.trace(after.covariance[:3, :3])) < 1.5e-3
@@ -235,9 +242,9 @@ def test_strangers_are_refused(antenna, mirror):
         vibrating(antenna.record, start(0.0, [Mode(1.0, 0.01, np.eye(2), 0.1)], u_offset=1.0), 1.0)
     blind = RANGER.model_copy(update={"mount_z": None, "mount_y": None})
     with pytest.raises(InputError, match="no mount_z"):
-        moving_ranger(blind, mirror, antenna, DRIVE, TIMES, u_mount=1e-5)
+        moving_ranger(blind, mirror, antenna, drive=DRIVE, times=TIMES, u_mount=1e-5)
     with pytest.raises(ValidityError, match="outside"):
-        moving_ranger(RANGER, mirror, antenna, DRIVE, 1000.0, u_mount=1e-5)
+        moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=1000.0, u_mount=1e-5)
     assert DRIVE.posture(100.0).temperature_c == 3.0
     assert isinstance(DRIVE.posture(TIMES), TelescopePosture)
 
@@ -261,7 +268,9 @@ u_position_mm = 1.0
     path = tmp_path / "tower.toml"
     path.write_text(EXAMPLE.read_text(encoding="utf-8") + more, encoding="utf-8")
     model = antenna_of(read_structural_model(path))
-    still, loose = (projected(model, "on_tower", replace(DRIVE, u_elevation=u), TIMES).covariance for u in (0.0, 1e-3))
+    still, loose = (
+        projected(model, "on_tower", replace(DRIVE, u_elevation=u), times=TIMES).covariance for u in (0.0, 1e-3)
+    )
     np.testing.assert_array_equal(loose, still)
 
 
@@ -280,14 +289,14 @@ def test_an_arm_that_ground_rangers_track_is_foretold_as_if_a_detector_saw_it(an
     truth = antenna.points("arm", slow.posture(t), added={"feed_arm": swing(t)})
     at = antenna.groups["arm"].names.index("ZEG41040L")
     seen = truth[:, at] + u * rng.standard_normal((len(t), 3))
-    samples, noise = tracked(antenna, "ZEG41040L", seen, np.eye(3) * u**2, slow.posture(t))
+    samples, noise = tracked(antenna, "ZEG41040L", seen, covariance=np.eye(3) * u**2, posture=slow.posture(t))
     modes = [Mode(v.frequency_hz, 0.0005, np.diag([4e-6, 4e-6, 1e-7]), 0.01) for v in antenna.record.vibration]
     state = follow(start(t[0], modes, u_offset=1e-2), t, samples, noise=noise).state
     known = vibrating(antenna.record, state, ahead, seen_at=(antenna, "ZEG41040L"))
-    found = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(known,))
+    found = moving_ranger(RANGER, mirror, antenna, drive=slow, times=ahead, u_mount=1e-7, known=(known,))
     told = FrameCorrections({"feed_arm": swing(ahead)}, np.zeros((2, 6, 6)))
-    true = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7, known=(told,))
-    still = moving_ranger(RANGER, mirror, antenna, slow, ahead, u_mount=1e-7)
+    true = moving_ranger(RANGER, mirror, antenna, drive=slow, times=ahead, u_mount=1e-7, known=(told,))
+    still = moving_ranger(RANGER, mirror, antenna, drive=slow, times=ahead, u_mount=1e-7)
     off = np.linalg.norm(found.station.scan_point - true.station.scan_point, axis=-1)
     assert np.all(off < 3e-4)
     assert np.linalg.norm(still.station.scan_point - true.station.scan_point, axis=-1).max() > 1.5e-3

@@ -26,7 +26,7 @@ def twin(night_01):
     streams, planted = Streams(20), LivingPlanted(ignore=["wind"])
     start = night_01.site.campaign.start_mjd_utc
     air = LivingAir.of(night_01, LIVING_NIGHT, start, streams=streams, planted=planted)
-    return telescope(night_01, AxisMotion.parse("fixed 145 45"), start, air, streams=streams, planted=planted)
+    return telescope(night_01, AxisMotion.parse("fixed 145 45"), start, air=air, streams=streams, planted=planted)
 
 
 def place(twin, seconds):

@@ -47,7 +47,7 @@ def test_a_change_of_astigmatism_is_found_whatever_the_dish_did():
     """Two epochs, the second turned by 40 arc seconds and shifted by 20 mm, which a paraboloid takes for the same."""
     first = prisms(half_path_of(Term(2, -2), 1e-4), seed=1)
     second = prisms(half_path_of(Term(2, -2), 4e-4), seed=2, turn=(2e-4, -1e-4), shift=(0.02, 0.01, -0.005))
-    change = change_between(first, second, APERTURE, ShapeSettings(terms=15))
+    change = change_between(first, second, APERTURE, settings=ShapeSettings(terms=15))
     k = change.expansion.terms.index(Term(2, -2))
     u = float(np.sqrt(change.expansion.covariance[k, k]))
     assert u < 3e-6
@@ -65,7 +65,7 @@ def test_the_change_of_nothing_scatters_as_claimed(runs):
     for seed in range(runs):
         one = prisms(np.zeros(2209), seed=2 * seed, rows=rows)
         two = prisms(np.zeros(2209), seed=2 * seed + 1, rows=rows, turn=(1e-4, 0.0))
-        change = change_between(one, two, APERTURE, ShapeSettings(terms=6))
+        change = change_between(one, two, APERTURE, settings=ShapeSettings(terms=6))
         found.append((change.motion, change.deviation, change.expansion.value))
         claimed = change
     motion, deviation, value = (np.array(part) for part in zip(*found, strict=True))
@@ -147,4 +147,4 @@ def test_too_few_prisms_are_refused():
     rows = np.arange(0, 2209, 100)
     one, two = prisms(np.zeros(2209), rows=rows), prisms(np.zeros(2209), rows=rows[:5])
     with pytest.raises(EstimationError, match="5 prisms in common"):
-        change_between(one, two, APERTURE, ShapeSettings())
+        change_between(one, two, APERTURE, settings=ShapeSettings())

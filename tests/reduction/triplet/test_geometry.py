@@ -158,7 +158,7 @@ def test_the_memos_series_is_off_by_up_to_twenty_micrometres_and_ours_is_not():
     first = np.linspace(0.0, 0.09, 201)
     d_1, d_2 = delta + first, delta + first
     exact = np.sqrt(0.5 * (d_1**2 + d_2**2) - 0.635**2 / 4)
-    off = median_series(d_1, d_2, 0.635, delta) - exact
+    off = median_series(d_1, d_2, 0.635, delta=delta) - exact
     np.testing.assert_allclose(off, -(0.635**2) * 2 * first / (16 * delta**2), atol=0.3e-6)
     assert 13e-6 < np.max(np.abs(off)) < 20e-6
 

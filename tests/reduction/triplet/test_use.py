@@ -59,7 +59,7 @@ def test_ranges_to_both_prisms_of_any_unit_give_the_distance_to_its_ball(seed):
     rng = np.random.default_rng(seed)
     u = unit(turn=Rotation.random(random_state=rng), h_corr=rng.uniform(-20e-3, 20e-3))
     s = before(u, rng, spread=0.5)
-    found = ball_ranges([u], s, ranged(u, s)[None], np.zeros((12, 12)))
+    found = ball_ranges([u], s, ranged(u, s)[None], covariance=np.zeros((12, 12)))
     np.testing.assert_allclose(
         found.d_bc[0], np.linalg.norm(s - u.ball, axis=1), rtol=0, atol=5e-14
     )  # 100 m in doubles
@@ -84,7 +84,7 @@ def test_the_memos_subtraction_leaves_out_the_square_across_the_sight(seed):
 def test_the_ball_above_the_prisms_is_nearer_to_the_feed_arm():
     u = unit(h_corr=0.5e-3)
     s = (u.ball + 50.0 * u.normal)[None]
-    found = ball_ranges([u], s, ranged(u, s)[None], np.zeros((2, 2)))
+    found = ball_ranges([u], s, ranged(u, s)[None], covariance=np.zeros((2, 2)))
     assert float(found.d_mp[0, 0] - found.d_bc[0, 0]) == pytest.approx(0.5e-3, abs=1e-12)
 
 
@@ -97,7 +97,7 @@ def test_the_series_of_figure_ten_and_what_it_leaves_out():
         d_1, d_2 = (float(np.linalg.norm(s - [p, 0.0, 0.0])) for p in (-0.3175, 0.3175))
         delta = np.floor(min(d_1, d_2) / half - 0.5) * half
         rest = d_1 + d_2 - 2 * delta
-        left = float(median_series(d_1, d_2, 0.635, delta)) - distance
+        left = float(median_series(d_1, d_2, 0.635, delta=delta)) - distance
         assert left == pytest.approx(-(0.635**2 - (d_1 - d_2) ** 2) * rest / (16 * delta**2), rel=0.02, abs=1e-9)
         assert float(median(d_1, d_2, 0.635)) == pytest.approx(distance, abs=3e-14)
     worst = 0.635**2 * 0.2 / (16 * 46.0**2)
@@ -176,7 +176,7 @@ def test_the_claimed_covariance_of_ball_distances_is_their_scatter():
     zero, noise = 25e-6, 15e-6
     ranger = np.tile(np.repeat(np.arange(4), 2), 2)
     covariance = zero**2 * (ranger[:, None] == ranger) + noise**2 * np.eye(16)
-    claimed = ball_ranges(sheets, s, np.stack([ranged(u, s) for u in sheets]), covariance)
+    claimed = ball_ranges(sheets, s, np.stack([ranged(u, s) for u in sheets]), covariance=covariance)
     draws, batch = 2000, 50
     zeros = zero * rng.normal(size=(draws, 4))
     errors = []
@@ -189,7 +189,9 @@ def test_the_claimed_covariance_of_ball_distances_is_their_scatter():
             true[i] = np.linalg.norm(s - (u.ball + lateral), axis=1)
         ranges += zeros[:, :, None] + noise * rng.normal(size=ranges.shape)
         found = [  # many draws as if they were many rangers
-            ball_ranges([u], np.tile(s, (batch, 1)), part.reshape(1, 4 * batch, 2), np.zeros((8 * batch,) * 2)).d_bc
+            ball_ranges(
+                [u], np.tile(s, (batch, 1)), part.reshape(1, 4 * batch, 2), covariance=np.zeros((8 * batch,) * 2)
+            ).d_bc
             for part in np.split(ranges, draws // batch)
         ]
         errors.append(np.concatenate(found).reshape(draws, 4) - true)
@@ -219,15 +221,19 @@ def test_each_share_of_the_covariance_is_the_answers_own_change():
     }
     for name, ways in moves.items():
         slopes = [
-            (ball_ranges([way(1e-4)], s, d, nothing).d_bc - ball_ranges([way(-1e-4)], s, d, nothing).d_bc)[0] / 2e-4
+            (
+                ball_ranges([way(1e-4)], s, d, covariance=nothing).d_bc
+                - ball_ranges([way(-1e-4)], s, d, covariance=nothing).d_bc
+            )[0]
+            / 2e-4
             for way in ways
         ]
-        found = ball_ranges([replace(u, **{name: 1.0})], s, d, nothing).covariance
+        found = ball_ranges([replace(u, **{name: 1.0})], s, d, covariance=nothing).covariance
         # prisms that follow a leaning plate turn the sights a little: 1e-4 of the slope, and 1e-7 for differences
         np.testing.assert_allclose(found, sum(np.outer(j, j) for j in slopes), rtol=3e-3, atol=1e-9)
     sight = (s - u.ball) / np.linalg.norm(s - u.ball, axis=1, keepdims=True)
     aside = sight - (sight @ u.normal)[:, None] * u.normal
-    found = ball_ranges([replace(u, u_lateral=1.0)], s, d, nothing).covariance
+    found = ball_ranges([replace(u, u_lateral=1.0)], s, d, covariance=nothing).covariance
     np.testing.assert_allclose(found, aside @ aside.T, rtol=0, atol=1e-14)
 
 
@@ -236,9 +242,9 @@ def test_a_prism_that_was_not_ranged_leaves_the_others():
     units = [unit("A"), unit("B", ball=np.array([61.0, 0.0, 0.0]))]
     s = before(units[0], rng, k=3)
     d = np.stack([ranged(u, s) for u in units])
-    whole = ball_ranges(units, s, d, 1e-10 * np.eye(12))
+    whole = ball_ranges(units, s, d, covariance=1e-10 * np.eye(12))
     d[0, 1, 1] = np.nan
-    part = ball_ranges(units, s, d, 1e-10 * np.eye(12))
+    part = ball_ranges(units, s, d, covariance=1e-10 * np.eye(12))
     gone = np.arange(6) == 1
     assert np.isnan(part.d_bc.ravel()[gone]).all()
     assert np.isnan(part.covariance[gone]).all()
@@ -264,7 +270,7 @@ def test_scan_points_follow_from_balls():
     s = rng.normal(size=(2, 3)) * 5 + [0.0, 0.0, 60.0]
     d = np.stack([ranged(u, s) for u in units])
     d[2, 0] = np.nan
-    ranges = ball_ranges(units, s, d, 1e-10 * np.eye(20))
+    ranges = ball_ranges(units, s, d, covariance=1e-10 * np.eye(20))
     balls = np.stack([u.ball for u in units])
     found = scan_points_from_balls(s + 0.01, balls, ball_covariance=1e-10 * np.eye(15), ranges=ranges)
     np.testing.assert_allclose(found.require_converged().x[:6].reshape(2, 3), s, rtol=0, atol=1e-9)
@@ -275,7 +281,7 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(ValidityError, match="triplet TR: normal and axis are not square unit vectors"):
         replace(u, axis=u.normal)
     with pytest.raises(InputError, match=r"expected \(1, 3, 2\) and \(6, 6\) for 1 triplets and 3 scan points"):
-        ball_ranges([u], np.zeros((3, 3)), np.zeros((3, 2)), np.eye(6))
-    ranges = ball_ranges([u], before(u, np.random.default_rng(0), k=1), np.full((1, 1, 2), 60.0), np.eye(2))
+        ball_ranges([u], np.zeros((3, 3)), np.zeros((3, 2)), covariance=np.eye(6))
+    ranges = ball_ranges([u], before(u, np.random.default_rng(0), k=1), np.full((1, 1, 2), 60.0), covariance=np.eye(2))
     with pytest.raises(InputError, match=r"expected \(1, 3\), \(1, 3\)"):
         scan_points_from_balls(np.zeros(3), np.zeros((1, 3)), ball_covariance=np.eye(3), ranges=ranges)

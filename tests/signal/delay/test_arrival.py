@@ -308,12 +308,12 @@ def test_a_correlation_shows_the_phase_velocity_of_air_that_disperses(kind):
     values = {"start_hz": 1500.0, "stop_hz": 5000.0, "duration": 0.02} if kind == "chirp" else {"centre_hz": 3e3}
     template = sampled(kind, fs, **{"duration": 4e-3, **values})
     hertz = np.fft.rfftfreq(n, 1.0 / fs)
-    late = length / (speed * (1.0 + dispersion(0.0, 933.0, 1.0, hertz).phase))
+    late = length / (speed * (1.0 + dispersion(0.0, 933.0, 1.0, frequency_hz=hertz).phase))
     spectrum = np.fft.rfft(np.pad(template, (0, n - len(template))))
     plan = DelayPlan(template, sampling_hz=fs, window=2e-3)
     found = plan(np.fft.irfft(spectrum * np.exp(-2j * np.pi * hertz * late), n), length / speed)
     seen = length / float(found.delay) / speed - 1.0
-    there = dispersion(0.0, 933.0, 1.0, plan.bandwidth / (2.0 * np.pi))
+    there = dispersion(0.0, 933.0, 1.0, frequency_hz=plan.bandwidth / (2.0 * np.pi))
     # the mean over the band is that at its rms frequency to second order in its width
     assert seen == pytest.approx(there.of_a_pulse()[0], abs=2e-6)
     assert there.group - there.phase > 30e-6

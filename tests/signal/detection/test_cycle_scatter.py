@@ -114,4 +114,4 @@ def test_one_buffer_without_arrays_is_the_same(m, seed, slow, lit):
     total, between = moments(noise - noise.mean())
     phasor = complex(*rng.normal(size=2)) if lit else 0j
     found = CycleScatter(np.array([m]), total, between, np.zeros(1, dtype=int)).variance(np.array([phasor]))[0][0, 1]
-    assert variance_across(total[0], between[0], m, phasor) == pytest.approx(found, rel=1e-12, abs=1e-15)
+    assert variance_across(total[0], between[0], m, phasor=phasor) == pytest.approx(found, rel=1e-12, abs=1e-15)

@@ -113,11 +113,11 @@ def test_the_test_of_a_walk_alarms_as_often_as_it_says_and_on_either_side():
 @pytest.mark.parametrize("u_reference", [0.0, 1e-3, 5e-3])
 def test_the_middle_of_a_gap_is_as_uncertain_as_the_covariance_says(u_reference):
     alone = drift_at(
-        np.array([0.0, 100.0]), np.zeros(2), np.full(2, u_reference**2), np.array([50.0]), random_walk=WALK
+        np.array([0.0, 100.0]), np.zeros(2), np.full(2, u_reference**2), time=np.array([50.0]), random_walk=WALK
     )
     assert float(midpoint_uncertainty(100.0, WALK, u_reference)) == pytest.approx(np.sqrt(alone[1][0, 0]), rel=1e-9)
     row = 100.0 * np.arange(80)
-    _, u = drift_along(row, np.zeros(80), np.full(80, u_reference**2), np.array([3950.0]), random_walk=WALK)
+    _, u = drift_along(row, np.zeros(80), np.full(80, u_reference**2), time=np.array([3950.0]), random_walk=WALK)
     assert float(midpoint_uncertainty(100.0, WALK, u_reference, endless=True)) == pytest.approx(u[0], rel=1e-6)
 
 

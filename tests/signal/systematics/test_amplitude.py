@@ -20,8 +20,8 @@ couplings = st.floats(-0.01, 0.01)
 
 @given(volts, volts, couplings, couplings, st.floats(-10, 10))
 def test_what_is_added_can_be_taken_off(amplitude, reference, coefficient, quadratic, phase):
-    measured = phase + amplitude_phase(amplitude, reference, coefficient, quadratic)
-    back = remove_amplitude_phase(measured, amplitude, reference, coefficient, quadratic)
+    measured = phase + amplitude_phase(amplitude, reference, coefficient, quadratic=quadratic)
+    back = remove_amplitude_phase(measured, amplitude, reference, coefficient=coefficient, quadratic=quadratic)
     assert abs(back - phase) <= 1e-14
 
 
@@ -40,7 +40,9 @@ def test_a_return_of_half_the_reference_by_hand():
 
 def test_derivatives_are_those_of_the_model():
     by = amplitude_by_coefficient(LADDER, 2.0)
-    np.testing.assert_allclose(by @ [1e-3, 2e-4], amplitude_phase(LADDER, 2.0, 1e-3, 2e-4), rtol=1e-14, atol=1e-18)
+    np.testing.assert_allclose(
+        by @ [1e-3, 2e-4], amplitude_phase(LADDER, 2.0, 1e-3, quadratic=2e-4), rtol=1e-14, atol=1e-18
+    )
 
 
 @pytest.mark.parametrize("quadratic", [False, True])
@@ -93,7 +95,7 @@ def test_claimed_uncertainty_is_scatter_and_the_test_alarms_as_often_as_it_says(
 
 def test_a_bend_fails_the_line_and_the_quadratic_term_finds_it():
     rng = np.random.default_rng(12)
-    phase = 1.0 + amplitude_phase(LADDER, 2.0, 2e-3, 5e-4) + 1e-4 * rng.standard_normal(13)
+    phase = 1.0 + amplitude_phase(LADDER, 2.0, 2e-3, quadratic=5e-4) + 1e-4 * rng.standard_normal(13)
     line = fit_amplitude_phase(LADDER, phase, 1e-4, reference_amplitude=2.0)
     assert line.suffices() is False
     assert line.curvature > 5.0  # with its sign

@@ -107,7 +107,7 @@ def test_a_share_within_the_limit_keeps_ten_micrometres_and_ten_percent_more_doe
 
 def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
     reflectance = float(largest_share(10e-6, WAVELENGTH)) / (0.25 * 0.6 * 0.9)
-    assert float(share_a_pass(reflectance, 0.25, 0.6, 0.9)) == pytest.approx(6.289e-4, rel=1e-3)
+    assert float(share_a_pass(reflectance, 0.25, 0.6, mirrors=0.9)) == pytest.approx(6.289e-4, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,12 @@ def flat(value):
 def test_its_speed_agrees_with_the_other_formula_within_what_both_claim():
     """[CRAMER93] claims 300 ppm; `real_gas` is another derivation from other measurements."""
     t, p, h = np.meshgrid([0.0, 10.0, 20.0, 30.0], [800.0, 930.0, 1013.0], [0.0, 50.0, 100.0])
-    apart = sound_speed(t, p, h, 450.0) / sound(t, p, h, model="real_gas", co2_ppm=450.0).speed - 1.0
+    apart = sound_speed(t, p, h, co2_ppm=450.0) / sound(t, p, h, model="real_gas", co2_ppm=450.0).speed - 1.0
     assert np.abs(apart).max() < 300e-6
 
 
 def test_uniform_air_takes_length_over_speed_with_and_against_the_wind():
-    c = sound_speed(12.0, 930.0, 70.0, 450.0)
+    c = sound_speed(12.0, 930.0, 70.0, co2_ppm=450.0)
     path = SoundPath(100.0, flat(12.0), flat(5.0), flat(3.0), pressure_hpa=930.0, humidity_percent=70.0)
     ahead = np.sqrt(c**2 - 9.0)
     assert path.travel_times() == pytest.approx((100.0 / (ahead + 5.0), 100.0 / (ahead - 5.0)), rel=1e-14)
@@ -35,7 +35,7 @@ def test_the_integral_is_that_of_scipy():
     )  # fmt: skip
 
     def slowness(share):
-        c = sound_speed(path.temperature_c(share), 933.0, 50.0, 450.0) * (1 + 60e-6)
+        c = sound_speed(path.temperature_c(share), 933.0, 50.0, co2_ppm=450.0) * (1 + 60e-6)
         return 1.0 / (np.sqrt(c**2 - path.wind_across(share) ** 2) + path.wind_along(share))
 
     assert path.travel_times()[0] == pytest.approx(80.0 * quad(slowness, 0.0, 1.0, epsabs=1e-14)[0], rel=1e-12)

@@ -284,7 +284,7 @@ def test_a_perfect_dish_is_found_exactly_where_the_posture_put_it():
 def test_a_head_that_warms_up_comes_nearer_to_its_rest_by_e_in_five_minutes():
     seconds = np.array([0.0, 300.0, 600.0, 3.6e4])
     alone = Planted(ignore=[effect for effect in EFFECTS if effect != "warm_up"])
-    phases = [electronic_phase(SimpleNamespace(ranger=f"ZY{n}"), seconds, Streams(3), alone) for n in range(60)]
+    phases = [electronic_phase(SimpleNamespace(ranger=f"ZY{n}"), seconds, Streams(3), planted=alone) for n in range(60)]
     rises = np.array([phase - phase[-1] for phase in phases])
     warm = np.abs(rises[:, 0]) > 1e-9
     assert 10 <= warm.sum() <= 30  # every third of 60

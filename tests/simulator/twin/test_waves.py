@@ -42,7 +42,7 @@ def test_correlated_noise_forgets_exponentially(lag, correlation):
 
 def test_a_band_keeps_to_its_frequencies():
     rng = np.random.default_rng(3)
-    waves = band(rng, 2.0, 0.8, 1.2, channels=CHANNELS)
+    waves = band(rng, 2.0, 0.8, high=1.2, channels=CHANNELS)
     values = waves(np.linspace(0.0, 50.0, 11))
     assert np.var(values) == pytest.approx(4.0, rel=0.05)
     rate = (waves([7.0 + 1e-4]) - waves([7.0 - 1e-4])) / 2e-4

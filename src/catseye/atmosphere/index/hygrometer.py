@@ -84,7 +84,7 @@ class VapourReading(NamedTuple):
 
 
 def of_relative_humidity(
-    temperature_c, pressure_hpa, humidity_percent, formula="buck", *, over_ice=False
+    temperature_c, pressure_hpa, humidity_percent, *, formula="buck", over_ice=False
 ) -> VapourReading:
     """Vapour pressure from relative humidity, over liquid water unless ice is asked for.
 
@@ -142,7 +142,7 @@ def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> Vapour
     return VapourReading(at.pressure_hpa, np.zeros_like(at.pressure_hpa), at.per_hpa, at.per_c, u)
 
 
-def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, formula="buck", *, over_ice=False) -> VapourReading:
+def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, *, formula="buck", over_ice=False) -> VapourReading:
     """Vapour pressure from a ventilated psychrometer; limits and errors of `vapour_pressure_of_wet_bulb_hpa`.
 
     temperature_c   dry bulb, °C, which is the air's temperature

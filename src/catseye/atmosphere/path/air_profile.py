@@ -211,4 +211,4 @@ def _weighed(warmth: Profile, damp: Profile, seconds, pressure_hpa, z_from, z_to
     half = np.broadcast_to(0.5 * (np.asarray(z_from) + np.asarray(z_to)), np.shape(pressure_hpa))
     temperature = warmth.at(seconds, half)
     e = vapour_pressure_hpa(temperature, pressure_hpa, np.clip(damp.at(seconds, half), 0.0, 100.0))
-    return hydrostatic_pressure_hpa(pressure_hpa, temperature, z_from, z_to, vapour_pressure_hpa=e)
+    return hydrostatic_pressure_hpa(pressure_hpa, temperature, z_from, z_to=z_to, vapour_pressure_hpa=e)

@@ -29,7 +29,7 @@ def pressure_at(pressure_hpa, z_from, z_to, *, lapse_hpa_per_m=LAPSE_HPA_PER_M):
 
 
 def hydrostatic_pressure_hpa(
-    pressure_hpa, temperature_c, z_from, z_to, *, vapour_pressure_hpa=0.0, gravity=STANDARD_GRAVITY
+    pressure_hpa, temperature_c, z_from, *, z_to, vapour_pressure_hpa=0.0, gravity=STANDARD_GRAVITY
 ):
     """Pressure at another height, the air between being at rest and at one temperature, in hPa.
 
@@ -53,7 +53,7 @@ def hydrostatic_pressure_hpa(
     return p * np.exp(-gravity * DRY_AIR_KG_PER_MOL * lightness * rise / (GAS_CONSTANT * kelvin))
 
 
-def interpolate_height(z, z1, v1, z2, v2):
+def interpolate_height(z, z1, v1, *, z2, v2):
     """Value at a height on the straight line through two stations' values; beyond them it extrapolates.
 
     z    height wanted, m

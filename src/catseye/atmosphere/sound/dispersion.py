@@ -63,7 +63,7 @@ def relaxation_hz(temperature_c, pressure_hpa, vapour_pressure_hpa):
     return oxygen, nitrogen
 
 
-def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, frequency_hz) -> SoundDispersion:
+def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, *, frequency_hz) -> SoundDispersion:
     """What a frequency adds to the speed of sound at zero frequency, phase and group, as shares.
 
     temperature_c         air temperature, -40 to 50 °C

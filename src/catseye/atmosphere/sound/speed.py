@@ -153,7 +153,15 @@ def temperature_of_speed_c(
     """
     return _refused_outside(
         model_named(model),
-        temperatures_c(speed, pressure_hpa, humidity_percent, None, model, co2_ppm, frequency_hz),
+        temperatures_c(
+            speed,
+            pressure_hpa,
+            humidity_percent,
+            vapour_pressure_hpa=None,
+            model=model,
+            co2_ppm=co2_ppm,
+            frequency_hz=frequency_hz,
+        ),
         speed,
     )
 
@@ -172,12 +180,20 @@ def temperature_of_speed_of_vapour_c(
     """
     return _refused_outside(
         model_named(model),
-        temperatures_c(speed, pressure_hpa, None, vapour_pressure_hpa, model, co2_ppm, frequency_hz),
+        temperatures_c(
+            speed,
+            pressure_hpa,
+            None,
+            vapour_pressure_hpa=vapour_pressure_hpa,
+            model=model,
+            co2_ppm=co2_ppm,
+            frequency_hz=frequency_hz,
+        ),
         speed,
     )
 
 
-def temperatures_c(speed, pressure_hpa, humidity_percent, vapour_pressure_hpa, model, co2_ppm, frequency_hz):
+def temperatures_c(speed, pressure_hpa, humidity_percent, *, vapour_pressure_hpa, model, co2_ppm, frequency_hz):
     """Temperatures from speeds, relative humidity or vapour pressure given; nan where the air would be outside the
     model's limits, or the speed is no number: for batches, whose rows fail one by one. Weather itself is refused."""
     chosen = model_named(model)
@@ -201,7 +217,7 @@ def temperatures_c(speed, pressure_hpa, humidity_percent, vapour_pressure_hpa, m
         else:
             e = moist
             slope = chosen.partials(t, p, e, co2).temperature_c
-        wanted = speed / (1.0 + dispersion(t, p, e, f).of_a_pulse()[0])
+        wanted = speed / (1.0 + dispersion(t, p, e, frequency_hz=f).of_a_pulse()[0])
         step = (wanted - chosen.speed(t, p, e, co2)) / slope
         if not np.any(np.abs(step) > CLOSE_ENOUGH_C):
             break

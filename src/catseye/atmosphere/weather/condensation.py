@@ -74,7 +74,7 @@ class CondensationSpread:
 EXACT = CondensationSpread()
 
 
-def condensation(surface_c, temperature_c, pressure_hpa, humidity_percent, *, u=EXACT, formula="buck") -> Condensation:
+def condensation(surface_c, temperature_c, pressure_hpa, *, humidity_percent, u=EXACT, formula="buck") -> Condensation:
     """Margin of surfaces to the dew or frost point of the air around them, and the probability of a deposit.
 
     surface_c            temperature of the surface, -100 to 100 °C

@@ -217,7 +217,7 @@ def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="
     return saturated.pressure_hpa * np.asarray(humidity_percent, float) / 100.0
 
 
-def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, formula="buck", *, over_ice=False):
+def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, *, formula="buck", over_ice=False):
     """Relative humidity of air with this vapour, over liquid water unless ice is asked for, in %.
 
     vapour_pressure_hpa   partial pressure of water vapour, 0 to 1400 hPa; above saturation the answer is above 100 %

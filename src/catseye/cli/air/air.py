@@ -27,7 +27,7 @@ CarbonDioxide = Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide,
     "Example: catseye air --temperature-c 20 --wet-bulb-c 14 --barometer-mmhg 700 --mercury-c 20 "
     "--latitude-deg 38.45 --elevation-m 797.3 --model rueger1990"
 )
-def air(
+def air(  # noqa: PLR0913 - its options are its command line
     temperature_c: Temperature,
     pressure_hpa: Annotated[float | None, typer.Option("--pressure-hpa", help="Total pressure, hPa.")] = None,
     humidity_percent: Annotated[

@@ -27,7 +27,7 @@ def _within(low: float, high: float, unit: str) -> Callable[[float | None], floa
     epilog="\b\nExample: catseye refractometer examples/refractometer/path-a.csv --out path-a\n"
     "         catseye refractometer NIGHT.csv --path-length-m 100.02 --u-path-length-mm 5 --json"
 )
-def refractometer(
+def refractometer(  # noqa: PLR0913 - its options are its command line
     readings: Annotated[
         Path, typer.Argument(metavar="FILE.csv", help="Phases with their weather: docs/formats/refractometer.md.")
     ],

@@ -15,7 +15,7 @@ U = {"callback": uncertainty}
     epilog="\b\nExample: catseye sound --temperature-c 20 --pressure-hpa 933 --humidity-percent 50\n"
     "Example: catseye sound --temperature-c=-10 --pressure-hpa 933 --humidity-percent 80 --model real_gas"
 )
-def sound(
+def sound(  # noqa: PLR0913 - its options are its command line
     temperature_c: Annotated[float, typer.Option("--temperature-c", help="Air temperature, °C.")],
     pressure_hpa: Annotated[float, typer.Option("--pressure-hpa", help="Total pressure, hPa.")],
     humidity_percent: Annotated[
@@ -45,7 +45,7 @@ def sound(
     weather = (temperature_c, pressure_hpa, humidity_percent)
     state = sound_of(*weather, model=model, co2_ppm=co2_ppm)
     u = float(state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm))
-    answer = sound_object(state, weather, co2_ppm, u)
+    answer = sound_object(state, weather, co2_ppm, u=u)
     if json:
         say(json_line(answer))
         return

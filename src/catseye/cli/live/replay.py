@@ -39,7 +39,7 @@ def replay(
 
     progress = ProgressLine(quiet)
     try:
-        outcome = replayed(journal, run_of(run), calibrations, progress)
+        outcome = replayed(journal, run_of(run), calibrations, progress=progress)
     finally:
         progress.clear()
     if json:

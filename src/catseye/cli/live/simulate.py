@@ -41,7 +41,7 @@ UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from
     epilog="\b\nExample: catseye simulate gbt\n"
     'With a fault: catseye simulate gbt --minutes 2 --fault "lying-station WX2 30 90 5"'
 )
-def simulate(
+def simulate(  # noqa: PLR0913 - its options are its command line
     site: Site = "gbt",
     minutes: Annotated[
         float, typer.Option("--minutes", callback=within(0, 1e6, ""), help="Of measuring; 0: until Ctrl-C.")

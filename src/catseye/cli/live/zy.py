@@ -49,7 +49,7 @@ def _pair(text: str) -> tuple[int, int]:
     "A real one: catseye zy sites/ours ZY101 --head our.heads:card --host 0.0.0.0 --ports 5240,5241"
 )
 @grouped
-def zy(
+def zy(  # noqa: PLR0913 - its options are its command line
     *,
     site: Site,
     rangers: Annotated[list[str] | None, typer.Argument(metavar="[RANGER ...]", help="Which; all if none.")] = None,

@@ -32,7 +32,7 @@ def glass(
     from catseye.gateways.optics.glass_objects import glass_object, glass_rows, table_object, table_rows
     from catseye.gateways.writers.objects import json_line
 
-    answer = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm)
+    answer = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm=height_mm)
     if json:
         say(json_line(answer))
         return

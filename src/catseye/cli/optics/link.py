@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @app.command(epilog="\b\nExample: catseye link --distance 120 --incidence-deg 20 --measured-volt 4.5")
-def link(
+def link(  # noqa: PLR0913 - its options are its command line
     distance: Annotated[float, typer.Option("--distance", help="Ranger to retroreflector, m.")],
     incidence_deg: Annotated[float, typer.Option("--incidence-deg", help="On the reflector's face, degrees.")] = 0.0,
     offset_mm: Annotated[float, typer.Option("--offset-mm", help="Beam's axis off the reflector, mm.")] = 0.0,

@@ -13,7 +13,7 @@ from catseye.cli.vocabularies import EDITIONS, one_of
     epilog="\b\nExample: catseye safety --power-mw 10 --wavelength-um 0.780 --diameter-mm 20 --divergence-mrad 0.05 "
     "--scan-rad-per-s 0.5\nA warning for planning, never a certificate: docs/safety.md says what is left out."
 )
-def safety(
+def safety(  # noqa: PLR0913 - its options are its command line
     power_mw: Annotated[float, typer.Option("--power-mw", help="Of the beam, mW, continuous.")],
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="0.4 to 1.4 µm.")],
     diameter_mm: Annotated[float, typer.Option("--diameter-mm", help="At 1/e² where the beam leaves, mm.")],

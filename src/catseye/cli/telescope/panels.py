@@ -24,7 +24,7 @@ def _focal(value: float) -> float:
     "--layout gbt\n         --survey examples/panels/survey.csv --as-left examples/panels/as-left.csv --out panels\n"
     "Layouts of all files: docs/formats/panels.md"
 )
-def panels(
+def panels(  # noqa: PLR0913 - its options are its command line
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Placements of the tool, as found.")],
     instrument: Annotated[Path, typer.Option("--instrument", metavar="SHEET.toml", help="Data sheet of the tool.")],
     layout: Annotated[

@@ -62,7 +62,7 @@ def _elevation(value: float) -> float:
     epilog="\b\nExample: catseye pointing fit examples/pointing/stars.dat --against published --out pointing-report\n"
     "Layout of STARS.dat: docs/formats/star-offsets.md; POSE.json: catseye pose --pointing prime --out"
 )
-def fit(
+def fit(  # noqa: PLR0913 - its options are its command line
     files: Annotated[
         list[Path], typer.Argument(metavar="STARS.dat | POSE.json ...", help="A TPOINT file, or poses with pointing.")
     ],
@@ -109,7 +109,7 @@ def fit(
     if out is not None:
         asked = {"terms": chosen, "u_arcsec": u_arcsec, "reject": reject, "against": against}
         with whole_directory(out, files[0]) as directory:
-            write_fit(pointing_fit, observed, compared, directory, asked)
+            write_fit(pointing_fit, observed, compared, directory=directory, settings=asked)
     if write is not None:
         write_model(pointing_fit, write)
     if write_stars is not None and observed.stars is not None:
@@ -260,7 +260,7 @@ def track(
         np.array([p.azimuth for p in tilts_of_poses]),
         np.array([p.turn for p in tilts_of_poses]).reshape(-1, 2),
         np.array([p.covariance for p in tilts_of_poses]).reshape(-1, 2, 2),
-        readings,
+        tilts=readings,
         harmonics=harmonics,
         names=[str(p) for p in poses or []],
     )

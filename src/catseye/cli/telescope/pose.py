@@ -54,7 +54,7 @@ def _tilt(text: str | None) -> str | None:
     epilog="\b\nExample: catseye pose night-01-report --site examples/night-01 --group dish --frame reflector\n"
     "         catseye pose late-report early-report --site examples/night-01 --pointing prime --out pose-report"
 )
-def pose(
+def pose(  # noqa: PLR0913 - its options are its command line
     epoch: Annotated[
         Path, typer.Argument(metavar="EPOCH", help="What catseye reduce --out wrote, or its coordinates.json.")
     ],
@@ -164,7 +164,7 @@ def pose(
 
             asked = {"group": wanted.group, "points": points, "frame": wanted.frame, "pivot": pivot, "robust": robust}
             with whole_directory(out, epoch) as directory:
-                write_pose(result, directory, inputs, {**asked, "pointing": pointing, "tilt": tilt})
+                write_pose(result, directory, inputs, settings={**asked, "pointing": pointing, "tilt": tilt})
     finally:
         progress.clear()
     _tell(result, json, quiet, out)
@@ -256,5 +256,5 @@ def _result(
     if optics is None:
         return PoseResult(group_pose, None)
     carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=wanted.robust)
-    cross = cross_covariance(carried, group_pose, site, before)
+    cross = cross_covariance(carried, group_pose, site, earlier=before)
     return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))

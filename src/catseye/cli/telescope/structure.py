@@ -34,7 +34,7 @@ def _pivot(text: str | None) -> str | None:
     "         catseye structure --epochs epochs.csv --points 'ZEG*' --harmonics 2 --hysteresis --out feed-arm\n"
     "         catseye structure --vibration night.db --points ZEG41040L --out shaking"
 )
-def structure(
+def structure(  # noqa: PLR0913 - its options are its command line
     sources: Annotated[
         list[Path] | None,
         typer.Argument(metavar="[REDUCTION]...", help="Directories of `catseye reduce`, or one that holds them."),
@@ -191,7 +191,7 @@ def _structure(
         e = np.array(asked["elevation_deg"]) * DEGREE
         predicted = fit.predict(e, temperature_c=asked["temperature_c"], way=asked["way"])
         notes += predicted.outside
-    answer = structure_object(fit, check, predicted, asked, notes)
+    answer = structure_object(fit, check, predicted, asked=asked, notes=notes)
     if to.out is not None:
         from catseye.gateways.structure.files import write_structure
         from catseye.gateways.writers.output import whole_directory

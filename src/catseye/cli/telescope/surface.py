@@ -186,7 +186,7 @@ def surface(
             from catseye.gateways.writers.output import whole_directory
 
             with whole_directory(out, inputs[0]) as directory:
-                write_surface(result, directory, hashes, progress)
+                write_surface(result, directory, hashes, progress=progress)
                 _keep(result, wanted.actuators)  # no directory without the table that was asked for, too
         else:
             _keep(result, wanted.actuators)
@@ -230,7 +230,7 @@ def _result(
             shapes.append(shape_of(prisms, aperture, settings))
         except EstimationError as problem:
             raise EstimationError(f"{prisms.source}: {problem}") from problem
-    change = change_between(epochs[0], epochs[1], aperture, settings) if len(epochs) == 2 else None
+    change = change_between(epochs[0], epochs[1], aperture, settings=settings) if len(epochs) == 2 else None
     lookup = lookup_of(shapes) if len(epochs) >= 3 else None
     table = None
     if wanted.actuators is not None:

@@ -147,7 +147,9 @@ class SafetyGuard:
         """
         alarms: list[Alarm] = []
         for name in sorted(counts):
-            alarms += parked_alarms(self.keep_clear, self.vantages[name], counts[name], now_ticks, self._posture)
+            alarms += parked_alarms(
+                self.keep_clear, self.vantages[name], counts[name], now=now_ticks, posture=self._posture
+            )
             for each in self.interlocks:
                 within = self._opens(each, name, now_ticks, AHEAD)
                 if within is not None and "shine" in each.forbids and self._memory[name].shining:

@@ -34,7 +34,7 @@ class Alarm:
 
 
 def parked_alarms(
-    keep_clear: KeepClear, vantage: Vantage, counts: tuple[float, float], now: int, posture: LivePosture | None
+    keep_clear: KeepClear, vantage: Vantage, counts: tuple[float, float], *, now: int, posture: LivePosture | None
 ) -> list[Alarm]:
     """Alarms of a beam that rests at counts, from a time (ticks) on; none of a carried one without a posture.
 

@@ -18,7 +18,7 @@ from catseye.coordinator.parts import Clock, ticks_now
 OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
 
 
-def begin(place: JournalAddress, run: Run, clock: Clock, buffers: bool) -> int:
+def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> int:
     """The tables where there are none, the run's row and its files, in one transaction; the run's number.
 
     buffers   whether samples will be kept

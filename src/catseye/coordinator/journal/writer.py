@@ -142,7 +142,7 @@ class Journal:
         refuse_foreign(place, fresh=True)
         lock = WriterLock(place)
         try:
-            number = begin(place, run, clock, settings.keep_buffers)
+            number = begin(place, run, clock, buffers=settings.keep_buffers)
             engine = writing_engine(place)
         except SQLAlchemyError as problem:
             lock.release()

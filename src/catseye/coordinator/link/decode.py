@@ -87,7 +87,7 @@ def measurement_of(reply: Reply) -> Measurement:
 
 
 def shot_of(
-    ranger: str, target: str, measured: Measurement, buffer: BufferRead | None, usual: SamplingSettings
+    ranger: str, target: str, measured: Measurement, *, buffer: BufferRead | None, usual: SamplingSettings
 ) -> LiveShot:
     """A shot from its two replies; `usual` is how it was taken where the buffer itself did not come."""
     sampling = usual if buffer is None else buffer.sampling

@@ -106,7 +106,7 @@ class Shooter:
                 measurement = self._own(await self._next("CMEAS", planned.duration), planned)
                 read = self._buffer(await self._next("BUF", 0.0), measurement.ticks, measurement.cube)
                 came += 1
-                yield shot_of(link.ranger, planned.target, measurement, read, link.sampling)
+                yield shot_of(link.ranger, planned.target, measurement, buffer=read, usual=link.sampling)
         finally:
             self._stream = None
             if came < count and link.connected:
@@ -178,7 +178,7 @@ class Shooter:
             raise Refused("late", f"its turn came {late:.1f} s late (limit {settings.latest:g} s)")
         self.aimed = None
         more = settings.slack + (count - 1) * (planned.duration + GAP)
-        request = track(planned, number, begin, more)
+        request = track(planned, number, begin, more=more)
         self._pointed(await link.sure(request, settings.probe_timeout + settings.buffer_timeout))
         late = (ticks_now(self._clock) - begin) / TICKS_PER_SECOND
         if late > settings.slack:  # the track would be over before the buffer is: nothing would return
@@ -226,7 +226,7 @@ class Shooter:
         measurement = self._own(reply, planned)
         buffer = link.send(Request("BUF")) if trigger.buffer is None else trigger.buffer
         read = self._buffer(await link.reply_of("BUF", buffer, limit), measurement.ticks, measurement.cube)
-        return shot_of(link.ranger, planned.target, measurement, read, link.sampling)
+        return shot_of(link.ranger, planned.target, measurement, buffer=read, usual=link.sampling)
 
     def _buffer(self, reply: Reply, ticks: int, cube: int) -> BufferRead | None:
         """The samples; None where they did not come, and then the ranger's own amplitude and phase count.
@@ -245,7 +245,7 @@ class Shooter:
         return read
 
 
-def track(planned: PlannedShot, number: int, begin: int, more: float) -> Request:
+def track(planned: PlannedShot, number: int, begin: int, *, more: float) -> Request:
     """TRK of a cube on its planned line from `begin` (ticks) on, and `more` s behind the shot's end."""
     rate = (planned.at_end - planned.at_begin) / planned.duration
     end = begin + round((planned.duration + more) * TICKS_PER_SECOND)

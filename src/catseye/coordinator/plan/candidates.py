@@ -54,7 +54,7 @@ class ShotCandidates:
 
 
 def candidates(
-    names: tuple[str, ...], looks: Array, units: Array, start: tuple[float, float], around: Surroundings
+    names: tuple[str, ...], looks: Array, units: Array, *, start: tuple[float, float], around: Surroundings
 ) -> tuple[ShotCandidates, dict[str, str]]:
     """The table, and why names were left out of it.
 

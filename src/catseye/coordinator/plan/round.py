@@ -198,7 +198,7 @@ class RoundPlanner:
         s = self.settings
         looks, units = places.looks(vantage, names)
         start = state.counts.get(vantage.name, vantage.reference)
-        table, why = candidates(names, looks, units, start, around)
+        table, why = candidates(names, looks, units, start=start, around=around)
         points = np.array([know.at.get(n, -1) for n in table.names])
         own = state.u.get(vantage.name)
         variance = np.full(len(points), s.sigma**2)

@@ -80,7 +80,7 @@ class VisibleSights:
             np.array([to_ground[r.frame].directions(r.axis) for r in retros.values()]),
         )
         scan_points = {name: to_ground[v.frame].points(v.station.scan_point) for name, v in vantages.items()}
-        visible = visibility(scan_points, table, self.solids, to_ground, limits=self.limits)
+        visible = visibility(scan_points, table, self.solids, frames=to_ground, limits=self.limits)
         return Seen(
             {name: _names(visible, i) for i, name in enumerate(vantages)}, _reasons(visible, posture is not None)
         )

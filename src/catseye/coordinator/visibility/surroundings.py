@@ -42,7 +42,7 @@ class Spheres:
 
     def inside(self, vantage: Vantage, low: Array, high: Array) -> NDArray[np.bool_]:
         """Whether (..., k) a beam within rectangles of counts (..., 2) may come into each."""
-        return np.asarray(nearest(vantage.station, low, high, self.middles) <= self.limits)
+        return np.asarray(nearest(vantage.station, low, high, directions=self.middles) <= self.limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,9 @@ class Surroundings:
         """Angle (...), rad, left between the Sun's cone and a beam that stays within rectangles of counts (..., 2)."""
         if len(self.suns) == 0:
             return np.full(np.shape(low)[:-1], np.inf)
-        return np.asarray(np.min(nearest(self.vantage.station, low, high, self.suns), axis=-1) - self.sun_limit)
+        return np.asarray(
+            np.min(nearest(self.vantage.station, low, high, directions=self.suns), axis=-1) - self.sun_limit
+        )
 
     def near_boxes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
         """Whether (...) a beam within rectangles of counts (..., 2) may come near a box."""

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
 
 
-def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, directions: ArrayLike) -> Array:
+def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, *, directions: ArrayLike) -> Array:
     """Least angle (..., k), rad, between the beam and directions while the counts stay within rectangles.
 
     station       one ranger, in the frame of the directions

@@ -101,8 +101,8 @@ def locate(
     start: np.ndarray,
     prior_covariance: np.ndarray,
     stations: np.ndarray,
-    lengths: np.ndarray,
     *,
+    lengths: np.ndarray,
     period: np.ndarray | float,
     covariance: np.ndarray,
     station_covariance: np.ndarray | None = None,
@@ -149,8 +149,8 @@ def locate_all(
     start: np.ndarray,
     prior_covariance: np.ndarray,
     stations: np.ndarray,
-    lengths: np.ndarray,
     *,
+    lengths: np.ndarray,
     period: np.ndarray | float,
     covariance: np.ndarray,
     seen: np.ndarray | None = None,
@@ -186,7 +186,7 @@ def locate_all(
                 start[i],
                 prior[i],
                 stations[used],
-                lengths[i, used],
+                lengths=lengths[i, used],
                 period=periods[i, used],
                 covariance=own,
                 limits=limits,
@@ -258,7 +258,7 @@ def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation]
     """The searches with all ranges and, if they may be wrong, without each; None where one gave up."""
     everything = np.arange(len(ranged.lengths))
     base = trunk(ranged, everything, most)
-    candidates = None if base is None else grown(ranged, everything, base, most)
+    candidates = None if base is None else grown(ranged, everything, base, most=most)
     if base is None or candidates is None:
         return None
     explanations = [_Explanation(-1, 0.0, candidates)]
@@ -266,7 +266,7 @@ def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation]
     for i in everything if wrong > 0.0 and len(everything) > 1 else ():
         rows = np.delete(everything, i)
         own = trunk(ranged, rows, most) if i in base.rows else base
-        candidates = None if own is None else grown(ranged, rows, own, most)
+        candidates = None if own is None else grown(ranged, rows, own, most=most)
         if candidates is None:
             return None
         odds = (1.0 - wrong) / wrong * ranged.periods[i] / (np.sqrt(2.0 * np.pi) * u[i])

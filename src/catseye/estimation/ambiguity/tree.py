@@ -96,7 +96,7 @@ def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
     return Trunk(first, cycles[inside], x[inside], information[inside], square[inside])
 
 
-def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, most: int) -> CycleCandidates | None:
+def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, *, most: int) -> CycleCandidates | None:
     """Every set of whole cycles of some ranges that grows from a trunk; None where that would be more than `most`.
 
     ranged   the problem

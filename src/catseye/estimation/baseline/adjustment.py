@@ -293,14 +293,14 @@ def _parts(model: BaselineModel, noise: Claim, normal: Normal) -> dict[str, np.n
 
 
 def separation(
-    sights: BaselineSights, solution: BaselineSolution, extra: Extra, known: KnownPlaces | None, scale: bool
+    sights: BaselineSights, solution: BaselineSolution, extra: Extra, *, known: KnownPlaces | None, scale: bool
 ) -> float:
     """How well further terms are told from the others: least singular value, columns weighed and of length 1."""
     model = BaselineModel(sights, solution.x, solution.y, known, scale, extra, 2e-4)
     return model.step(np.zeros(len(model.names)), solution.noise)[1].separation
 
 
-def places_in_line(start: Sequence[int], end: Sequence[int], distance, count: int) -> np.ndarray:
+def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count: int) -> np.ndarray:
     """Approximate places (count,) of pillars along a line from distances between them, m; the lower number left.
 
     start, end   (m,) numbers of pillars

@@ -46,7 +46,7 @@ class Outcome:
     lower: float = 0.0
 
 
-def full_test(start, end, distance, order, sigma=None) -> FullTest:
+def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
     """Places of points on a line and the zero of an instrument, by least squares.
 
     start, end   (m,) numbers of the points of each distance, 0 to p - 1
@@ -111,7 +111,7 @@ def within_claim(variance_factor: float, degrees_of_freedom: int, level: float =
     return Outcome(variance_factor, limit, variance_factor <= limit)
 
 
-def same_precision(s: float, degrees_of_freedom: int, s_before: float, before: int, level: float = 0.05) -> Outcome:
+def same_precision(s: float, degrees_of_freedom: int, s_before: float, *, before: int, level: float = 0.05) -> Outcome:
     """Question b): do two experimental standard deviations belong to one population? Two-sided.
 
     s, degrees_of_freedom   of this sample, any unit
@@ -132,7 +132,7 @@ def same_precision(s: float, degrees_of_freedom: int, s_before: float, before: i
     return Outcome(ratio, limit, lower <= ratio <= limit, lower)
 
 
-def is_nothing(value: float, u: float, degrees_of_freedom: float, level: float = 0.05) -> Outcome:
+def is_nothing(value: float, u: float, degrees_of_freedom: float, *, level: float = 0.05) -> Outcome:
     """Question c): is a value, such as the zero, zero? Two-sided.
 
     value                any unit

@@ -212,7 +212,7 @@ class Differences:
             raise EstimationError(
                 f"{int(stable.sum())} stable points do not hold a {self.datum} datum; more are needed"
             )
-        moved, t = to_datum(self.d, np.zeros(len(rows)), self.motions, conditions)
+        moved, t = to_datum(self.d, np.zeros(len(rows)), self.motions, conditions=conditions)
         s = np.eye(len(rows)) - t @ conditions
         return self.d + moved, s @ self.q @ s.T
 

@@ -51,7 +51,7 @@ def _floating(solution: NetworkSolution) -> Floating:
     rows, x = _rows(solution)
     held = np.array([p.sigma == 0.0 for p in solution.network.parameters], dtype=bool)
     free = np.concatenate([np.ones(solution.x.size, dtype=bool), ~held])
-    return floating_motions(rows, x, solution.x, free)
+    return floating_motions(rows, x, solution.x, free=free)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +243,7 @@ def _released(q: Covariance, floating: Floating, columns: np.ndarray) -> Covaria
             f"the points compared do not hold {floating.words()}, which the epoch's held coordinates do; compare more"
         )
     zero = np.zeros(len(floating.motions))
-    return transformed(q, to_datum(zero, zero, floating.motions, conditions)[1], conditions)
+    return transformed(q, to_datum(zero, zero, floating.motions, conditions=conditions)[1], conditions)
 
 
 def _follow(solution: NetworkSolution, columns: np.ndarray, held: np.ndarray) -> np.ndarray:

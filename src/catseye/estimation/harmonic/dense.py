@@ -54,7 +54,7 @@ def solved_together(y: Array, seen: Array, r: Array, *, body: Array, own: Array,
         normal += white[:, :-1].T @ white[:, :-1]
         right += white[:, :-1].T @ white[:, -1]
         pvv += float(white[:, -1] @ white[:, -1])
-    whole = inverse_of(normal, np.sqrt(np.diag(normal)), k, m)
+    whole = inverse_of(normal, np.sqrt(np.diag(normal)), k, m=m)
     x = whole @ right
     c, a = x[: 6 * k], x[6 * k :].reshape(n, m, 3)
     at_own = 6 * k + np.arange(3 * m) + 3 * m * np.arange(n)[:, None]
@@ -86,7 +86,7 @@ def design_of(r: Array, body: Array, own: Array) -> Array:
     return np.concatenate([by_body, by_own], axis=1)
 
 
-def inverse_of(normal: Array, size: Array, k: int, m: int) -> Array:
+def inverse_of(normal: Array, size: Array, k: int, *, m: int) -> Array:
     """The inverse of a normal matrix scaled by `size`, or EstimationError with the unknowns that float."""
     if np.any(size == 0.0):
         raise EstimationError(f"{_label(int(np.argmin(size)), k, m)} floats: no measurement depends on it")

@@ -176,7 +176,7 @@ def _inverses(blocks: Array, m: int) -> Array:
 def _core(big: Array, size: Array, k: int, m: int) -> Array:
     """Inverse of the matrix of what is left; `size` is of its diagonal before elimination, so that noise is seen."""
     if len(big) <= 6 * k:
-        return inverse_of(big, size, k, m) if len(big) else big
+        return inverse_of(big, size, k, m=m) if len(big) else big
     from scipy.linalg import cho_factor, cho_solve
 
     if np.any(size == 0.0):

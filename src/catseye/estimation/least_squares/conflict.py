@@ -81,6 +81,7 @@ def search(
     columns: np.ndarray,
     groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
+    *,
     removable: Sequence[np.ndarray],
     solution: LeastSquaresSolution,
     advice: Sequence[ObservationGroup] = (),
@@ -90,7 +91,7 @@ def search(
     A wrong range of half a metre carries its point so far that slopes taken there explain nothing to 25 um.
     """
     for _ in range(SEARCHES):
-        local = at_point(columns, groups, jacobians, removable, solution, advice, slack=SLACK)
+        local = at_point(columns, groups, jacobians, removable=removable, solution=solution, advice=advice, slack=SLACK)
         if not 2 <= len(local.rows) <= LARGEST_SEARCH:
             return local, None
         wrong = local.smallest_conflict()
@@ -108,10 +109,10 @@ def at_point(
     columns: np.ndarray,
     groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
+    *,
     removable: Sequence[np.ndarray],
     solution: LeastSquaresSolution,
     advice: Sequence[ObservationGroup] = (),
-    *,
     slack: float,
 ) -> LocalConflict:
     """What meets in a point: removable observations that depend on it; others, and advice, that depend on it alone."""
@@ -155,6 +156,7 @@ def touched(
     points: Sequence[np.ndarray],
     groups: Sequence[ObservationGroup],
     jacobians: Sequence[np.ndarray],
+    *,
     chosen: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
     """The points that the chosen observations depend on."""

@@ -144,8 +144,10 @@ def _without_undecided(
     checked = [_checked(f) for f in solution.fits]
     jacobians = [g.predict(solution.x)[1] for g in groups]
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
-    for columns in touched(outliers.points, groups, jacobians, rejected):
-        local = at_point(columns, groups, jacobians, removable, solution, outliers.advice, slack=1.0)
+    for columns in touched(outliers.points, groups, jacobians, chosen=rejected):
+        local = at_point(
+            columns, groups, jacobians, removable=removable, solution=solution, advice=outliers.advice, slack=1.0
+        )
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
         grave = [
             index
@@ -211,8 +213,10 @@ def _searched(
     if not solution.solved:
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     jacobians = [g.predict(solution.x)[1] for g in groups]
-    for columns in touched(outliers.points, groups, jacobians, suspects) if suspects else ():
-        local, wrong = search(columns, groups, jacobians, removable, solution, outliers.advice)
+    for columns in touched(outliers.points, groups, jacobians, chosen=suspects) if suspects else ():
+        local, wrong = search(
+            columns, groups, jacobians, removable=removable, solution=solution, advice=outliers.advice
+        )
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong

@@ -252,11 +252,11 @@ class _Problem:
             settled = not len(conditions)
             if not solution.solved or settled:
                 break
-            floating = floating_motions(rows, x, x[:n].reshape(-1, 3), self.free)
+            floating = floating_motions(rows, x, x[:n].reshape(-1, 3), free=self.free)
             if floating.motions.shape[1] != len(conditions):  # told wrongly from a poor start: once more from here
                 continue
             conditions, _ = datum_conditions(floating, datum, points.xyz)
-            moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions)
+            moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions=conditions)
             x = x + moved
             u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
             settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), u))
@@ -279,7 +279,7 @@ class _Problem:
     def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
         """Motions at x that nothing holds; none where the start is too poor to tell them."""
         try:
-            return floating_motions(rows, x, x[: 3 * len(self.network.points.names)].reshape(-1, 3), self.free)
+            return floating_motions(rows, x, x[: 3 * len(self.network.points.names)].reshape(-1, 3), free=self.free)
         except np.linalg.LinAlgError:
             return Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
 

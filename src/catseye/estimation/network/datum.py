@@ -53,7 +53,7 @@ def _largest(kinds: np.ndarray, first: int) -> list[str]:
     return [MOTIONS[first + i] for i in sorted(np.argsort(-share, kind="stable")[:count])]
 
 
-def floating_motions(rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray, free: np.ndarray) -> Floating:
+def floating_motions(rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray, *, free: np.ndarray) -> Floating:
     """The motions of the network that no observation, prior or held coordinate holds.
 
     rows   groups of observations, priors among them
@@ -130,7 +130,7 @@ def minimal_coordinates(conditions: np.ndarray) -> np.ndarray:
 
 
 def to_datum(
-    x: np.ndarray, reference: np.ndarray, floating: np.ndarray, conditions: np.ndarray
+    x: np.ndarray, reference: np.ndarray, floating: np.ndarray, *, conditions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The floating motion (n,) that carries x where G (x - reference) = 0, to first order, and T = H (G H)^-1 (n, d).
 

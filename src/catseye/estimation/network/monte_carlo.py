@@ -56,7 +56,7 @@ class MonteCarloScatter:
 
 
 def measured(
-    network: ObservationNetwork, truth: np.ndarray, generator: np.random.Generator, disturbance: Disturbance
+    network: ObservationNetwork, truth: np.ndarray, generator: np.random.Generator, *, disturbance: Disturbance
 ) -> tuple[ObservationNetwork, list[np.ndarray]]:
     """The network with observations drawn about a truth, and which of them (m,) bool a group are blunders.
 
@@ -119,7 +119,9 @@ def scatter(
         if progress is not None:
             progress("measuring on paper", run, runs)
         values = starts + sigma * generator.standard_normal(len(starts))
-        drawn, wrong = measured(network, np.concatenate([network.points.xyz.ravel(), values]), generator, given)
+        drawn, wrong = measured(
+            network, np.concatenate([network.points.xyz.ravel(), values]), generator, disturbance=given
+        )
         solution = solve(drawn)
         if not solution.status.startswith(CONVERGED):
             status = solution.status

@@ -53,7 +53,7 @@ class HorizontalAngles(ObservationKind):
         >>> a.predict(np.array([0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 2.0, 0.0, 0.0]))[0] == np.pi / 2
         array([ True])
         """
-        back, by_back = bearing(sight(x, self.at, self.backsight, self.backsight_shift))
-        fore, by_fore = bearing(sight(x, self.at, self.foresight, self.foresight_shift))
+        back, by_back = bearing(sight(x, self.at, self.backsight, shift=self.backsight_shift))
+        fore, by_fore = bearing(sight(x, self.at, self.foresight, shift=self.foresight_shift))
         jacobian = np.concatenate([by_back - by_fore, -by_back, by_fore], axis=1)
         return nearest_turn(fore - back, self.observed), jacobian

@@ -48,5 +48,5 @@ class Azimuths(ObservationKind):
         >>> a.predict(np.array([0.0, 0.0, 0.0, -7.0, 0.0, 1.0]))[0] == 1.5 * np.pi
         array([ True])
         """
-        azimuth, slope = bearing(sight(x, self.origin, self.target, self.shift))
+        azimuth, slope = bearing(sight(x, self.origin, self.target, shift=self.shift))
         return nearest_turn(azimuth, self.observed), both(slope)

@@ -53,6 +53,6 @@ class Directions(ObservationKind):
         >>> d.predict(np.array([0.0, 0.0, 0.0, 5.0, 5.0, 1.0, 0.25]))[0].round(6)
         array([0.535398])
         """
-        azimuth, slope = bearing(sight(x, self.origin, self.target, self.shift))
+        azimuth, slope = bearing(sight(x, self.origin, self.target, shift=self.shift))
         jacobian = np.concatenate([both(slope), np.where(self.orientation < 0, 0.0, -1.0)[:, None]], axis=1)
         return nearest_turn(azimuth - value(x, self.orientation), self.observed), jacobian

@@ -27,5 +27,5 @@ class Distances(LengthsBetweenPoints):
         >>> d.predict(np.array([0.0, 0.0, 0.0, 3.0, 4.0, 12.0]))[0]
         array([13.])
         """
-        size, unit = length(sight(x, self.origin, self.target, self.shift))
-        return reading(self, x, size, both(unit))
+        size, unit = length(sight(x, self.origin, self.target, shift=self.shift))
+        return reading(self, x, size, slope=both(unit))

@@ -61,6 +61,6 @@ class DistanceDifferences(ObservationKind):
         >>> d.predict(np.array([0.0, 0.0, 0.0, 3.0, 4.0, 12.0, 0.0, 3.0, 4.0]))[0]
         array([8.])
         """
-        first, unit = length(sight(x, self.origin, self.target, self.shift))
-        second, unit_2 = length(sight(x, self.origin_2, self.target_2, self.shift_2))
-        return reading(self, x, first - second, np.concatenate([both(unit), -both(unit_2)], axis=1))
+        first, unit = length(sight(x, self.origin, self.target, shift=self.shift))
+        second, unit_2 = length(sight(x, self.origin_2, self.target_2, shift=self.shift_2))
+        return reading(self, x, first - second, slope=np.concatenate([both(unit), -both(unit_2)], axis=1))

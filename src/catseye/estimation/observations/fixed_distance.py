@@ -59,5 +59,5 @@ class FixedDistances(ObservationKind):
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (m,) and Jacobian (m, 6) at the parameters x; nan where two points coincide."""
-        size, unit = length(sight(x, self.origin, self.target, self.shift))
+        size, unit = length(sight(x, self.origin, self.target, shift=self.shift))
         return size, both(unit)

@@ -48,5 +48,5 @@ class HeightDifferences(ObservationKind):
         >>> h.predict(np.array([0.0, 0.0, 1.0, 3.0, 4.0, 1.5]))[0]
         array([0.5])
         """
-        up = sight(x, self.origin, self.target, self.shift)[:, 2]
+        up = sight(x, self.origin, self.target, shift=self.shift)[:, 2]
         return up, np.broadcast_to(np.array([-1.0, 1.0]), (len(up), 2))

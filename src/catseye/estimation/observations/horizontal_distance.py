@@ -28,5 +28,5 @@ class HorizontalDistances(LengthsBetweenPoints):
         >>> d.predict(np.array([0.0, 0.0, 0.0, 3.0, 4.0, 12.0]))[0]
         array([5.])
         """
-        size, outward = level_length(sight(x, self.origin, self.target, self.shift))
-        return reading(self, x, size, both(outward))
+        size, outward = level_length(sight(x, self.origin, self.target, shift=self.shift))
+        return reading(self, x, size, slope=both(outward))

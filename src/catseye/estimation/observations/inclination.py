@@ -52,6 +52,6 @@ class Inclinations(ObservationKind):
         array([ True])
         """
         zero = self.columns[:, 6:]
-        above, slope = elevation(sight(x, self.origin, self.target, self.shift))
+        above, slope = elevation(sight(x, self.origin, self.target, shift=self.shift))
         jacobian = np.concatenate([both(slope), np.where(zero < 0, 0.0, 1.0)], axis=1)
         return nearest_turn(above + value(x, zero[:, 0]), self.observed), jacobian

@@ -56,4 +56,4 @@ class MovingDistances(BetweenPoints, ObservationKind):
         size, unit = length(b - a)
         by_origin = -np.einsum("mij,mi->mj", self.origin_turn, unit)
         by_target = np.einsum("mij,mi->mj", self.target_turn, unit)
-        return reading(self, x, size, np.concatenate([by_origin, by_target], axis=1))
+        return reading(self, x, size, slope=np.concatenate([by_origin, by_target], axis=1))

@@ -33,7 +33,7 @@ def reading_columns(group: Scaled) -> tuple[np.ndarray, np.ndarray]:
     return first, second
 
 
-def reading(group: Scaled, x: np.ndarray, length: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reading(group: Scaled, x: np.ndarray, length: np.ndarray, *, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values (m,) and Jacobian (m, w + q + s) of (scale + sum c x[scaling]) length + offset + sum c x[nuisance].
 
     group    its scale, offset, nuisance (m, q), scaling (m, s) and their coefficients

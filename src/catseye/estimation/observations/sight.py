@@ -19,7 +19,7 @@ def triples(first: np.ndarray) -> np.ndarray:
     return first[:, None] + XYZ
 
 
-def sight(x: np.ndarray, origin: np.ndarray, target: np.ndarray, shift: np.ndarray | None) -> np.ndarray:
+def sight(x: np.ndarray, origin: np.ndarray, target: np.ndarray, *, shift: np.ndarray | None) -> np.ndarray:
     """Target minus origin (m, 3), plus the shift that instrument and target heights make.
 
     x        parameters

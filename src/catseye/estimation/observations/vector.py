@@ -53,5 +53,5 @@ class Vectors(ObservationKind):
         >>> v.predict(np.array([1.0, 0.0, 0.0, 3.0, 4.0, 12.0]))[0]
         array([ 2.,  4., 12.])
         """
-        values = sight(x, self.origin, self.target, self.shift).ravel()
+        values = sight(x, self.origin, self.target, shift=self.shift).ravel()
         return values, np.broadcast_to(np.array([-1.0, 1.0]), (len(values), 2))

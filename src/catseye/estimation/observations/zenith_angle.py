@@ -66,7 +66,7 @@ class ZenithAngles(ObservationKind):
         >>> z.predict(np.array([0.0, 0.0, 0.0, 0.0, 3.0, 3.0]))[0] == np.pi / 4
         array([ True])
         """
-        along = sight(x, self.origin, self.target, self.shift)
+        along = sight(x, self.origin, self.target, shift=self.shift)
         above, slope = elevation(along)
         far, outward = level_length(along)
         bend = (float(self.curved) - self.refraction - value(x, self.columns[:, 6])) / (2.0 * self.radius)

@@ -198,7 +198,7 @@ def numerical_sensitivity(model: Model, inputs: Sequence[Input]) -> np.ndarray:
 
 
 def draw_inputs(
-    inputs: Sequence[Input], generator: np.random.Generator, draws: int, correlation: np.ndarray | None = None
+    inputs: Sequence[Input], generator: np.random.Generator, draws: int, *, correlation: np.ndarray | None = None
 ) -> np.ndarray:
     """Values (draws, k) of the inputs, each from its distribution.
 

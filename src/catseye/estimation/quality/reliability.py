@@ -221,7 +221,7 @@ def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
     return np.where(checked, delta0 * np.sqrt(np.maximum(1.0 - r, 0.0) / np.where(checked, r, 1.0)), np.inf)
 
 
-def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray, bias: np.ndarray) -> np.ndarray:
+def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray, *, bias: np.ndarray) -> np.ndarray:
     """What an error of each observation alone does to the parameters: rows of (Q A' P) times the error.
 
     q            (n, n) covariance of the parameters

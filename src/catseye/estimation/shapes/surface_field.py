@@ -59,7 +59,7 @@ class Foretold:
     roughness: Roughness
 
 
-def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, trend: np.ndarray) -> Roughness:
+def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, *, trend: np.ndarray) -> Roughness:
     """Smooth part, length and own part by restricted maximum likelihood.
 
     places   (k, 2) m

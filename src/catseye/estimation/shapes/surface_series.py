@@ -54,8 +54,8 @@ def fit_series(
     points: np.ndarray,
     variance: np.ndarray,
     nominal: Transform,
-    focal_length: float,
     *,
+    focal_length: float,
     free: Sequence[str] = POSE,
     weights: np.ndarray | None = None,
     measure: Measure = "normal",
@@ -120,7 +120,13 @@ def _plainly(
         blocks = variance[epoch, seen, None, None] * np.eye(3)
         try:
             fit = fit_paraboloid(
-                local[epoch, seen], blocks, own, focal_length, free=free, weights=weights[seen], measure=measure
+                local[epoch, seen],
+                blocks,
+                own,
+                focal_length=focal_length,
+                free=free,
+                weights=weights[seen],
+                measure=measure,
             )
         except EstimationError as problem:
             text = str(problem)

@@ -335,4 +335,4 @@ def write_refractometer(
     }
     sheet = calibration.readings.sheet.model_dump(mode="json", exclude_none=True)
     provenance = {"format": FORMAT, "made_by": "catseye refractometer", "sheet": sheet}
-    write_files(files, directory, {**provenance, **origin(when, calibration.readings.hashes)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, calibration.readings.hashes)}, progress=progress)

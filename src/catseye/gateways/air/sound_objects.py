@@ -10,7 +10,7 @@ from catseye.errors import ValidityError
 FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give
 
 
-def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: float, u: float) -> dict[str, Any]:
+def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: float, *, u: float) -> dict[str, Any]:
     """Sound as `catseye sound --json` gives it.
 
     weather   temperature °C, pressure hPa, relative humidity %
@@ -101,7 +101,7 @@ def _speed_by(name: str, weather: tuple[float, float, float], co2_ppm: float) ->
 
 
 def _dispersed(state: Sound, weather: tuple[float, float, float], frequency: float) -> dict[str, float]:
-    share = dispersion(weather[0], weather[1], state.vapour_pressure_hpa, frequency)
+    share = dispersion(weather[0], weather[1], state.vapour_pressure_hpa, frequency_hz=frequency)
     return {
         "frequency_hz": frequency,
         "phase_excess": float(share.phase * state.speed),

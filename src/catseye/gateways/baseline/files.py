@@ -22,7 +22,7 @@ MARK = f'format = "{FORMAT}"'
 
 
 def write_calibration(
-    calibration: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    calibration: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
@@ -42,7 +42,7 @@ def write_calibration(
         "report.html": lambda: baseline_report(calibration, when, inputs),
     }
     provenance = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(calibration.settings)}
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
 
 
 def write_record(

@@ -23,4 +23,4 @@ def write_reduction(reduction: Reduction, directory: Path, progress: Progress | 
         "pose.json": lambda: json_page(pose_object(reduction)),
         "report.html": lambda: report(reduction, when),
     }
-    write_files(files, directory, provenance_object(reduction, when), progress)
+    write_files(files, directory, provenance_object(reduction, when), progress=progress)

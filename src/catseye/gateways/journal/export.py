@@ -204,7 +204,7 @@ def export_tables(
             if progress is not None:
                 progress(f"writing {name}", done, len(TABLES))
             for form in forms:
-                rows = rows_of(reader, table, runs, span)
+                rows = rows_of(reader, table, runs, span=span)
                 writer = _csv if form == "csv" else _fits
                 counts[name] = writer(directory / f"{name}.{form}", name, table, rows)
         inputs = {f"run {run.run}: {path}": digest for run in stored for path, digest in run.hashes.items()}
@@ -214,7 +214,7 @@ def export_tables(
 
 
 def rows_of(
-    reader: JournalReader, table: ExportTable, runs: Sequence[int], span: tuple[int, int] | None
+    reader: JournalReader, table: ExportTable, runs: Sequence[int], *, span: tuple[int, int] | None
 ) -> Iterator[Cells]:
     """The rows of a quantity: run, seq, the stamp as text of eight decimals, then its own."""
     for run in runs:

@@ -178,7 +178,7 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
     longest = longest[np.isfinite(longest) & (longest > 0.0)]
     scale = nice(SHARE * size / float(np.max(longest))) if len(longest) else np.nan
     figure, ax = view_frame(0.5 * (low + high), high - low + (0.16 + 2.0 * SHARE) * size)
-    scale_bar(ax, nice(0.2 * size), scale, "displacements and ellipses")
+    scale_bar(ax, nice(0.2 * size), scale, what="displacements and ellipses")
     common = np.zeros(len(flat), dtype=bool)
     common[compared.rows] = True
     if not common.all():
@@ -227,8 +227,8 @@ def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarr
 
 def _labels(ax: Any, findings: Findings, bearing: float | None) -> None:
     if bearing is None:
-        file_ticks(ax.xaxis, findings, 0, "east", "west")
-        file_ticks(ax.yaxis, findings, 1, "north", "south")
+        file_ticks(ax.xaxis, findings, 0, word="east", opposite="west")
+        file_ticks(ax.yaxis, findings, 1, word="north", opposite="south")
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, findings, 2, "up", "down")
+        file_ticks(ax.yaxis, findings, 2, word="up", opposite="down")

@@ -98,12 +98,12 @@ def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     _marks(ax, findings, flat, loose)
     point_names(ax, findings, flat)
     if bearing is None:
-        file_ticks(ax.xaxis, findings, 0, "east", "west")
-        file_ticks(ax.yaxis, findings, 1, "north", "south")
+        file_ticks(ax.xaxis, findings, 0, word="east", opposite="west")
+        file_ticks(ax.yaxis, findings, 1, word="north", opposite="south")
         words = "Plan."
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, findings, 2, "up", "down")
+        file_ticks(ax.yaxis, findings, 2, word="up", opposite="down")
         words = f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
     figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
     return figure, " ".join([words, ellipses, lines])
@@ -123,7 +123,7 @@ def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
     return figure, ax
 
 
-def file_ticks(axis: Any, findings: Findings, k: int, word: str, opposite: str) -> None:
+def file_ticks(axis: Any, findings: Findings, k: int, *, word: str, opposite: str) -> None:
     """Ticks that read the file's own coordinate, whichever way it counts."""
     axes = findings.network.axes
     j = int(np.argmax(np.abs(axes[k])))
@@ -177,7 +177,7 @@ def thousands(value: float) -> str:
     return f"{value:,.0f}".replace(",", "\u2009")
 
 
-def scale_bar(ax: Any, length: float, scale: float, what: str = "ellipsoids") -> None:
+def scale_bar(ax: Any, length: float, scale: float, *, what: str = "ellipsoids") -> None:
     """A bar above the axes with its length on the ground and, in what is enlarged, as it was before."""
     left, right = ax.get_xlim()
     share = length / (right - left)

@@ -32,8 +32,8 @@ def write_network(
     findings: Findings,
     directory: Path,
     inputs: Mapping[str, str],
-    progress: Progress | None = None,
     *,
+    progress: Progress | None = None,
     treated: "AdjustedNetwork | None" = None,
 ) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others.
@@ -47,12 +47,15 @@ def write_network(
     when = datetime.now(UTC)
     provenance = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(findings)}
     write_files(
-        _files(findings, when, inputs, treated=treated), directory, {**provenance, **origin(when, inputs)}, progress
+        _files(findings, when, inputs, treated=treated),
+        directory,
+        {**provenance, **origin(when, inputs)},
+        progress=progress,
     )
 
 
 def write_comparison(
-    compared: ComparedEpochs, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    compared: ComparedEpochs, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
     """What moved, then the files of each epoch with its number before their names, last the provenance.
 
@@ -80,7 +83,7 @@ def write_comparison(
         "variance_factor": compared.variance_factor.value,
     }
     provenance = {"format": COMPARISON, "made_by": "catseye adjust", "settings": settings}
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
 
 
 def _settings(findings: Findings) -> dict[str, Any]:

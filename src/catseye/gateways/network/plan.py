@@ -337,6 +337,7 @@ def write_plan(
     plan_findings: PlanFindings,
     directory: Path,
     inputs: Mapping[str, str],
+    *,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> None:
     """Report, tables and object of a plan, and last the provenance with the hashes of the others."""
@@ -348,4 +349,4 @@ def write_plan(
         "plan.json": lambda: json_page(plan_object(plan_findings)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye plan"}
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)

@@ -24,7 +24,7 @@ AIR = (20.0, 933.0, 50.0)  # °C, hPa, %: of the notes' example, [PARKER04] eq. 
 OBLIQUE = 30.0 * DEGREE  # at which the prism's change is told
 
 
-def glass_object(name: str, wavelength_um: float, temperature_c: float, height_mm: float) -> dict[str, Any]:
+def glass_object(name: str, wavelength_um: float, temperature_c: float, *, height_mm: float) -> dict[str, Any]:
     """One glass as `catseye glass NAME --json` gives it.
 
     name            in GLASSES

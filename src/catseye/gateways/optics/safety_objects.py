@@ -57,8 +57,8 @@ def safety_object(asked: Question) -> dict[str, Any]:
     viewer = BINOCULARS if asked.aided else NAKED
     verdict = classify(beam, edition=asked.edition, subtense=asked.subtense)
     others = {name: classify(beam, edition=name, subtense=asked.subtense).laser_class for name in EDITIONS}
-    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, asked.edition)
-    governing = eye_mpe(beam.wavelength_um, seconds, asked.subtense, asked.edition)
+    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
+    governing = eye_mpe(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
     skin = skin_limit(beam.wavelength_um, seconds)
     known = factors(beam.wavelength_um, seconds, asked.subtense)
     return {
@@ -94,7 +94,7 @@ def safety_object(asked: Question) -> dict[str, Any]:
 def _what_if(asked: Question, seconds: float) -> dict[str, float]:
     """One duration of the table."""
     beam = asked.beam
-    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, asked.edition)
+    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
     skin = skin_limit(beam.wavelength_um, seconds)
     return {
         "duration": seconds,
@@ -129,7 +129,7 @@ def _returned(asked: Question) -> dict[str, Any] | None:
     def within(aperture: float) -> float:
         return returned_power(asked.beam, distance, aperture=aperture, **size)
 
-    limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, asked.edition)
+    limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, edition=asked.edition)
     times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda row: row[0])
     return {
         "distance": distance,

@@ -54,7 +54,7 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
         "report.html": lambda: panels_report(work, when),
     }
     provenance = {"format": FORMAT, "made_by": "catseye panels"}
-    write_files(files, directory, {**provenance, **origin(when, work.inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, work.inputs)}, progress=progress)
     join_tables(directory, frame="of each corner or panel: z the normal towards the focus")
 
 

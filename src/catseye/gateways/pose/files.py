@@ -34,7 +34,7 @@ HEADER = (
 )
 
 
-def write_pose(result: PoseResult, directory: Path, inputs: Mapping[str, str], settings: Mapping[str, Any]) -> None:
+def write_pose(result: PoseResult, directory: Path, inputs: Mapping[str, str], *, settings: Mapping[str, Any]) -> None:
     """Every file, and last the provenance.
 
     result      a pose

@@ -39,6 +39,7 @@ def write_fit(
     fit: PointingFit,
     observed: Observed,
     compared: SeriesComparison | None,
+    *,
     directory: Path,
     settings: Mapping[str, Any],
 ) -> None:
@@ -48,7 +49,7 @@ def write_fit(
         "observations.csv": lambda: observations_csv(fit, observed),
         "pointing.json": lambda: json_page(fit_object(fit, observed, compared)),
         "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {observed.where[0].split(' line ')[0]}")),
-        "report.html": lambda: fit_report(fit, observed, compared, when),
+        "report.html": lambda: fit_report(fit, observed, compared, when=when),
     }
     provenance = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
     write_files(files, directory, {**provenance, **origin(when, observed.hashes)})
@@ -86,7 +87,7 @@ def observations_csv(fit: PointingFit, observed: Observed) -> str:
     return csv_text(OBSERVATIONS, rows)
 
 
-def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, when: datetime) -> str:
+def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, *, when: datetime) -> str:
     """The whole page of a pointing model's fit, HTML."""
     from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
 

@@ -28,9 +28,9 @@ def sky_plot(
     monument: Path,
     mirror: Path,
     mjd: float,
+    *,
     way: tuple[tuple[float, float], tuple[float, float]] | None,
     keep_out: Path | None,
-    *,
     latitude_deg: float | None,
     longitude_deg: float | None,
 ) -> tuple[str, dict[str, Any]]:

@@ -20,7 +20,7 @@ MOST_LABELS = 60  # on an axis
 ELLIPSE = 3.0  # standard deviations drawn
 
 
-def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, limit: float = 1e-3) -> str:
+def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, limit: float = 1e-3) -> str:
     """SVG: how far the beams pass their targets, over the track; the worst pair, the median, and the limit.
 
     track     that was followed

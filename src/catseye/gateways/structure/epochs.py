@@ -56,7 +56,7 @@ def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpoc
     if listed is not None:
         try:
             raw = listed.read_bytes()
-            table = columns_of(raw.decode("utf-8"), str(listed), REQUIRED, OPTIONAL)
+            table = columns_of(raw.decode("utf-8"), str(listed), REQUIRED, optional=OPTIONAL)
         except OSError as problem:
             raise InputError(f"{listed}: {problem.strerror or problem}") from problem
         except UnicodeDecodeError as problem:

@@ -52,8 +52,8 @@ def write_structure(
         "made_by": "catseye structure",
         "model": vars(fit.model) | {"group": fit.series.group},
     }
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
-    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, asked))
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
+    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, asked=asked))
 
 
 def write_vibration(
@@ -72,7 +72,7 @@ def write_vibration(
         "report.html": lambda: _vibration_page(vibration),
     }
     provenance = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     join_samplers(directory, SAMPLERS, vibration_samplers(vibration, zero_mjd))
 
 

@@ -19,6 +19,7 @@ def structure_object(
     fit: StructureFit,
     check: LeaveOut | None,
     predicted: Prediction | None,
+    *,
     asked: dict[str, Any],
     notes: tuple[str, ...],
 ) -> dict[str, Any]:
@@ -93,7 +94,7 @@ def _prediction(predicted: Prediction, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def structure_samplers(
-    fit: StructureFit, check: LeaveOut | None, predicted: Prediction | None, asked: dict[str, Any]
+    fit: StructureFit, check: LeaveOut | None, predicted: Prediction | None, *, asked: dict[str, Any]
 ) -> dict[str, SamplerTable]:
     """The fit as FITS tables: residuals by epoch and point, coefficients, what was foretold."""
     series = fit.series

@@ -17,7 +17,7 @@ PANELS = 6  # terms of an elevation figure
 
 
 def surface_map(
-    local: np.ndarray, value: np.ndarray, aperture: LitAperture, label: str, names: tuple[str, ...] = ()
+    local: np.ndarray, value: np.ndarray, aperture: LitAperture, *, label: str, names: tuple[str, ...] = ()
 ) -> str:
     """Values at prisms, and between them by plain triangles.
 

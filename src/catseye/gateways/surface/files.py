@@ -40,7 +40,7 @@ def surface_object(result: SurfaceResult) -> dict[str, Any]:
 
 
 def write_surface(
-    result: SurfaceResult, directory: Path, inputs: Mapping[str, str], progress: Progress | None = None
+    result: SurfaceResult, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
@@ -67,7 +67,7 @@ def write_surface(
     files["report.html"] = lambda: surface_report(result, when, inputs)
     made: Files = files
     provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
-    write_files(made, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(made, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 

@@ -131,14 +131,14 @@ def _table(
     if dish and frame == "ground":
         raise refusal(source.name, "is in the dish's frame (expected --frame reflector)")
     if dish:
-        columns = columns_of(text, source.name, SURFACE, ("shots",))
+        columns = columns_of(text, source.name, SURFACE, optional=("shots",))
         points = np.column_stack([columns.numbers(f"{axis}_dish_m") for axis in AXES])
         u = _spread(columns, "u_deviation_mm")
         covariance = (u**2)[:, None, None] * np.eye(3)
     else:
         single = "u_mm" in [cell.strip() for cell in text.partition("\n")[0].split(",")]
         needed = (*PLACES, "u_mm") if single else (*PLACES, *SPREADS)
-        columns = columns_of(text, source.name, needed, (*PAIRS, *OTHERS, *(SPREADS if single else ())))
+        columns = columns_of(text, source.name, needed, optional=(*PAIRS, *OTHERS, *(SPREADS if single else ())))
         if "kind" in columns.cells:
             columns = _of_kind(columns)
         points = np.column_stack([columns.numbers(f"{axis}_m") for axis in AXES])

@@ -84,7 +84,9 @@ def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
         _cards(shape.square, gains),
         _definitions(shape_passages(shape)),
         picture(
-            surface_map(local, shape.fit.half_path, shape.aperture, "half-path error (mm)", shape.prisms.names),
+            surface_map(
+                local, shape.fit.half_path, shape.aperture, label="half-path error (mm)", names=shape.prisms.names
+            ),
             f"Half-path errors off the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
             "prisms are plain interpolation in triangles. Dashed: the aperture.",
         ),
@@ -99,7 +101,9 @@ def _change(change: Change) -> str:
         _cards(change.square, []),
         _definitions(change_passages(change)),
         picture(
-            surface_map(change.local, change.half_path, change.aperture, "change of half path (mm)", change.names),
+            surface_map(
+                change.local, change.half_path, change.aperture, label="change of half path (mm)", names=change.names
+            ),
             "Second epoch less first, after the dish's motion as its prisms show it in all three coordinates.",
         ),
         *_terms(change.expansion, change.settings),

@@ -29,6 +29,7 @@ def write_triplets(
     units: Mapping[Path, TripletReduction],
     directory: Path,
     hashes: Mapping[Path, str],
+    *,
     progress: Progress | None = None,
 ) -> None:
     """NAME.txt, NAME.html, NAME.json for each sheet NAME.toml, triplets.csv, and the provenance with their hashes.
@@ -50,7 +51,7 @@ def write_triplets(
     files["triplets.csv"] = lambda: triplets_csv({path.name: reduction for path, reduction in units.items()})
     provenance = {"format": FORMAT, "made_by": "catseye triplet"}
     inputs = {path.name: hashes[path] for path in units}
-    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress)
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
 
 
 def _object_page(reduction: TripletReduction, name: str) -> str:

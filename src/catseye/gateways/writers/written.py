@@ -25,7 +25,9 @@ def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
     return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
 
 
-def write_files(files: Files, directory: Path, provenance: Mapping[str, Any], progress: Progress | None = None) -> None:
+def write_files(
+    files: Files, directory: Path, provenance: Mapping[str, Any], *, progress: Progress | None = None
+) -> None:
     """Each file as text or piece by piece, so that a large one needs no more memory than its columns.
 
     files        name -> what gives its text, in the order of writing

@@ -232,7 +232,7 @@ def servo_margin(counts: ArrayLike) -> float:
 
 
 def clearances(
-    zones: Sequence[Zone], origin: ArrayLike, direction: ArrayLike, exact_below: float = np.inf
+    zones: Sequence[Zone], origin: ArrayLike, direction: ArrayLike, *, exact_below: float = np.inf
 ) -> NDArray[np.float64]:
     """Clearance of beams (..., zones), rad, at the start of their paths; see `ConeZone` and `BoxZone`.
 
@@ -252,8 +252,8 @@ def first_entry(
     station: MirrorStation,
     slews: MirrorSlew,
     zones: Sequence[Zone],
-    margin: float = 0.0,
     *,
+    margin: float = 0.0,
     compiled: bool | None = None,
 ) -> Entries:
     """When paths of one mirror first come into a zone, with nothing between two looks unseen.
@@ -272,7 +272,7 @@ def first_entry(
     if station.shape != () or len(slews.shape) > 1:
         raise ValidityError(f"stations {station.shape} with moves {slews.shape}: expected one ranger and moves (n,)")
     if slews.shape == ():
-        only = first_entry(station, slews[None], zones, margin, compiled=compiled)
+        only = first_entry(station, slews[None], zones, margin=margin, compiled=compiled)
         return Entries(only.status[0], only.time[0], only.zone[0], only.looks[0])
     if zones and (slews.shape[0] >= COMPILED_FROM if compiled is None else compiled):
         return _compiled_entries(station, slews, zones, margin)

@@ -37,7 +37,7 @@ from catseye.geometry.mirror.mount import lambda_
 Array = NDArray[np.float64]
 
 
-def face_normal(theta: ArrayLike, shaft: ArrayLike, face_tilt: ArrayLike = 0.0, axis_tilt: ArrayLike = 0.0) -> Array:
+def face_normal(theta: ArrayLike, shaft: ArrayLike, face_tilt: ArrayLike = 0.0, *, axis_tilt: ArrayLike = 0.0) -> Array:
     """Unit normal (..., 3) of the mirror's face in mirror axes.
 
     theta       (...), rad: the mount's azimuth Theta'
@@ -105,7 +105,7 @@ def mirror_reading(normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0
 
 
 def flat_reading(
-    normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0.0, 0.0, 0.0), flat: ArrayLike = (0.0, 0.0)
+    normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0.0, 0.0, 0.0), *, flat: ArrayLike = (0.0, 0.0)
 ) -> Array:
     """What it reads (..., 2), rad of the beam, off a flat that stands on the x^ axis, by way of the mirror.
 

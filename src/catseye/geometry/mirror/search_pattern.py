@@ -98,7 +98,7 @@ def spiral_offsets(radius: float, reach: float) -> Array:
 
 
 def raster(
-    centre: ArrayLike, zeros: ArrayLike, half_width: ArrayLike, reach: float, limits: tuple[float, float]
+    centre: ArrayLike, zeros: ArrayLike, half_width: ArrayLike, *, reach: float, limits: tuple[float, float]
 ) -> Pattern:
     """Rows of whole counts, there and back, that cover a rectangle.
 
@@ -142,7 +142,7 @@ def raster(
     return _within_stops(counts, middle, zero, limits)
 
 
-def spiral(centre: ArrayLike, zeros: ArrayLike, radius: float, reach: float, limits: tuple[float, float]) -> Pattern:
+def spiral(centre: ArrayLike, zeros: ArrayLike, radius: float, *, reach: float, limits: tuple[float, float]) -> Pattern:
     """A spiral from the centre outwards, in whole counts, that covers a disc.
 
     centre    (2,) counts (Na, Ne), real, direct or prime

@@ -102,8 +102,8 @@ def apparent_motion(
     mirror_from_ground: ArrayLike,
     relative: ArrayLike,
     velocity: ArrayLike,
-    acceleration: ArrayLike,
     *,
+    acceleration: ArrayLike,
     spin: ArrayLike = (0.0, 0.0, 0.0),
     spin_rate: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array, Array]:
@@ -174,7 +174,7 @@ def line_estimate(curvature: ArrayLike, interval: ArrayLike) -> Array:
 
 
 def line_bound(
-    vector: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, interval: ArrayLike
+    vector: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, *, interval: ArrayLike
 ) -> tuple[Array, Array, Array]:
     """What the line cannot exceed over an interval: off by counts (..., 2), by an angle (...) rad, by a way (...) m.
 
@@ -248,7 +248,7 @@ def longest_interval(
             raise ValidityError(f"{name} = {value} is not above 0 and finite")
 
     def held(h: Array) -> NDArray[np.bool_]:
-        counts, angle, _ = line_bound(vector, speed, acceleration, h)
+        counts, angle, _ = line_bound(vector, speed, acceleration, interval=h)
         off = np.max(counts, axis=-1) if limit_angle is None else angle
         return np.asarray(off <= limit)
 

@@ -184,10 +184,12 @@ def classify(
     base = LONG_TIME_BASE if long_viewing else TIME_BASE
     visible = beam.wavelength_um < 0.7
     aided, naked = beam.power_within(0.050, 2.0), beam.power_within(PUPIL, 0.1)
-    limits = {"1": class_limit("1", beam.wavelength_um, base, subtense, edition)}
+    limits = {"1": class_limit("1", beam.wavelength_um, base, subtense=subtense, edition=edition)}
     if visible:
-        limits["2"] = class_limit("2", beam.wavelength_um, AVERSION, subtense, edition)
-    limits["3R"] = class_limit("3R", beam.wavelength_um, AVERSION if visible else base, subtense, edition)
+        limits["2"] = class_limit("2", beam.wavelength_um, AVERSION, subtense=subtense, edition=edition)
+    limits["3R"] = class_limit(
+        "3R", beam.wavelength_um, AVERSION if visible else base, subtense=subtense, edition=edition
+    )
     limits["3B"] = CLASS_3B
     reasons = []
     for name in ("1", "1M", "2", "2M", "3R", "3B"):

@@ -93,7 +93,7 @@ def factors(wavelength_um: float, duration: float = 100.0, subtense: float = ALP
 
 
 def eye_limits(
-    wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014"
+    wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, *, edition: str = "iec2014"
 ) -> tuple[ExposureLimit, ...]:
     """Every limit that the eye's exposure must keep; all of them count.
 
@@ -121,7 +121,7 @@ def eye_limits(
 
 
 def eye_mpe(
-    wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014"
+    wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, *, edition: str = "iec2014"
 ) -> ExposureLimit:
     """Maximum permissible exposure of the eye: the lowest of `eye_limits`.
 
@@ -132,7 +132,7 @@ def eye_mpe(
     >>> round(eye_mpe(0.6328, 0.25).irradiance, 1), eye_mpe(0.6328, 100.0).irradiance
     (25.5, 10.0)
     """
-    return min(eye_limits(wavelength_um, duration, subtense, edition), key=lambda limit: limit.irradiance)
+    return min(eye_limits(wavelength_um, duration, subtense, edition=edition), key=lambda limit: limit.irradiance)
 
 
 def skin_limit(wavelength_um: float, duration: float) -> ExposureLimit:
@@ -153,7 +153,7 @@ def skin_limit(wavelength_um: float, duration: float) -> ExposureLimit:
 
 
 def class_limit(
-    laser_class: str, wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, edition: str = "iec2014"
+    laser_class: str, wavelength_um: float, duration: float, *, subtense: float = ALPHA_MIN, edition: str = "iec2014"
 ) -> float:
     """Accessible emission limit of a class, W.
 
@@ -182,7 +182,7 @@ def class_limit(
 
 def _class_1(wavelength_um: float, duration: float, subtense: float, edition: str) -> float:
     if edition == "ansi2014":
-        return min(limit.power for limit in eye_limits(wavelength_um, duration, subtense, edition))
+        return min(limit.power for limit in eye_limits(wavelength_um, duration, subtense, edition=edition))
     f, nm = factors(wavelength_um, duration, subtense), _nanometres(wavelength_um)
     point, tall = subtense <= ALPHA_MIN, nm >= 1050
     if duration < f.t_i:

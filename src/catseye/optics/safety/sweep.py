@@ -49,7 +49,7 @@ def sweep_pulse(
     return energy, 2.0 * half / speed
 
 
-def repetition_factor(count: float, duration: float, subtense: float, wavelength_um: float, total: float) -> float:
+def repetition_factor(count: float, duration: float, subtense: float, *, wavelength_um: float, total: float) -> float:
     """By how much the limit of one pulse shrinks where many follow: C_5 of IEC, C_P of others; 1 down to 0.2.
 
     count           pulses within `total` or T_2, whichever is shorter
@@ -106,7 +106,7 @@ def sweep_ratio(
     if duration > TIME_BASE:
         given: dict[str, Any] = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
         ratios.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))
-    for limit in eye_limits(beam.wavelength_um, duration, subtense, edition):
+    for limit in eye_limits(beam.wavelength_um, duration, subtense, edition=edition):
         aperture = viewer.collecting(limit.aperture)
         standing = viewer.transmission * beam.power_within(aperture, distance) / limit.power
         energy, pulse = sweep_pulse(beam, distance, rate, aperture=aperture, transmission=viewer.transmission)
@@ -119,8 +119,8 @@ def sweep_ratio(
         if limit.name == "chemistry on the retina":  # a dose: only the sum counts
             continue
         short = max(pulse, SHORTEST)
-        once = {m.name: m.power * short for m in eye_limits(beam.wavelength_um, short, subtense, edition)}
-        shrunk = repetition_factor(train, short, subtense, beam.wavelength_um, duration)
+        once = {m.name: m.power * short for m in eye_limits(beam.wavelength_um, short, subtense, edition=edition)}
+        shrunk = repetition_factor(train, short, subtense, wavelength_um=beam.wavelength_um, total=duration)
         ratios.append(min(standing, energy / (once[limit.name] * shrunk)))
     return max(ratios)
 
@@ -143,7 +143,7 @@ def sweep_hazard_distance(
     75.8
     """
     _refuse_sweep(rate, period)
-    far = hazard_zone(beam, eye_limits(beam.wavelength_um, duration, subtense, edition), viewer)[1]
+    far = hazard_zone(beam, eye_limits(beam.wavelength_um, duration, subtense, edition=edition), viewer)[1]
     if far <= NEAREST:
         return 0.0
     from scipy.optimize import brentq

@@ -61,7 +61,7 @@ def start_moves(z: RangerState, targets: dict[int, int]) -> None:
 
 
 def _wai(z: RangerState, _: int, axis: int) -> Work:
-    yield from wait_until(z, lambda: not z.head.moving(axis), MOVE_TIME, f"axis {axis} has not arrived")
+    yield from wait_until(z, lambda: not z.head.moving(axis), MOVE_TIME, what=f"axis {axis} has not arrived")
     refuse_motors_off(z, (axis,))
     return str(axis), str(z.head.actual(axis))
 
@@ -75,7 +75,7 @@ def refuse_motors_off(z: RangerState, axes: tuple[int, ...]) -> None:
 
 
 def wait_until(
-    z: RangerState, done: Callable[[], bool], seconds: float, what: str, *, earliest: float | None = None
+    z: RangerState, done: Callable[[], bool], seconds: float, *, what: str, earliest: float | None = None
 ) -> Generator[int | None, None, None]:
     """Give the turn back until it is done, `earliest` in so many s; InputError after `seconds`."""
     begin = z.now_ns()
@@ -142,7 +142,7 @@ def _fhm(z: RangerState, _: int, axis: int) -> Work:
     z.aimed = None
     z.head.find_home(axis)
     text = f"the index of axis {axis} is not found"
-    yield from wait_until(z, lambda: z.head.homing(axis) != "searching", HOMING_TIME, text)
+    yield from wait_until(z, lambda: z.head.homing(axis) != "searching", HOMING_TIME, what=text)
     if z.head.homing(axis) != "home":
         raise InputError(text)
     return (str(axis),)

@@ -101,7 +101,7 @@ def illuminate(z: RangerState, cube: Cube, counts: tuple[float, float]) -> Gener
     def arrived() -> bool:
         return not (z.head.moving(0) or z.head.moving(1))
 
-    yield from wait_until(z, arrived, MOVE_TIME, f"cube {cube.name}: axes have not arrived")
+    yield from wait_until(z, arrived, MOVE_TIME, what=f"cube {cube.name}: axes have not arrived")
     refuse_motors_off(z, (0, 1))
     yield from settle(z, counts)
     z.aimed = cube.number
@@ -132,7 +132,7 @@ def _trk(z: RangerState, _: int, key: Value, t0: int, *rest: float) -> Work:
         if not all(z.head.enabled(axis) for axis in (0, 1)):
             raise InputError("axes do not follow (expected both amplifiers on: AXIS n, 1)")
         free = "the axes are not free"
-        yield from wait_until(z, lambda: not (z.head.moving(0) or z.head.moving(1)), MOVE_TIME, free)
+        yield from wait_until(z, lambda: not (z.head.moving(0) or z.head.moving(1)), MOVE_TIME, what=free)
         if t1 <= z.now_ticks():
             raise InputError(f"t1 {stamp(t1)} was over before the axes were free (expected it to come)")
         z.refuse_sun(n0)

@@ -52,7 +52,9 @@ def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
     """The buffer that was fired for, when it is whole."""
     seconds, buffer_now = z.sampling.duration, z.head.buffer
 
-    yield from wait_until(z, lambda: buffer_now() is not None, seconds + SLACK, "no buffer has come", earliest=seconds)
+    yield from wait_until(
+        z, lambda: buffer_now() is not None, seconds + SLACK, what="no buffer has come", earliest=seconds
+    )
     buffer = buffer_now()
     if buffer is None:
         raise InputError("no buffer has come")

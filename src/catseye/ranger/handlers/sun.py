@@ -34,7 +34,7 @@ def watch_sun(z: RangerState) -> list[str]:
         return []
     z.next_sun_ns = now + SUN_NS
     station, suns, begun = z.cubes.station, z.suns(), not z.in_sun
-    least = nearest_sun(station, z.here, z.here, suns, exact=True)
+    least = nearest_sun(station, z.here, z.here, suns=suns, exact=True)
     z.in_sun = least < HALF_ANGLE
     if not z.in_sun:
         return []
@@ -47,12 +47,12 @@ def watch_sun(z: RangerState) -> list[str]:
 def _leave_sun(z: RangerState, suns: list[ArrayLike]) -> str:
     """Drive away where a way is free; what is done, in words."""
     station, moving = z.cubes.station, any(z.head.moving(axis) for axis in (0, 1))
-    if moving and z.heading and nearest_sun(station, z.here, z.heading, suns, exact=True) >= HALF_ANGLE:
+    if moving and z.heading and nearest_sun(station, z.here, z.heading, suns=suns, exact=True) >= HALF_ANGLE:
         return "the move that is under way leads out"
     z.head.stop()
     if not (z.head.enabled(0) and z.head.enabled(1)):
         return "amplifiers are off: cover the mirror"
-    end = way_out(station, z.here, suns, z.limits)
+    end = way_out(station, z.here, suns, limits=z.limits)
     if end is None:
         return "no way out is free: cover the mirror"
     z.aimed, z.heading = None, end

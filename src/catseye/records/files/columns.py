@@ -66,7 +66,7 @@ class TextColumns:
         return tuple(map("line {}".format, self.lines))
 
 
-def columns_of(text: str, file: str, required: Sequence[str], optional: Sequence[str] = ()) -> TextColumns:
+def columns_of(text: str, file: str, required: Sequence[str], *, optional: Sequence[str] = ()) -> TextColumns:
     """The columns of a CSV text with a header, in any order.
 
     text       the whole file

@@ -160,7 +160,7 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     folder = Folder(path.parent)
     text = folder.text(path.name)
     optional = {**layout.optional, TIME: Within(EARLIEST_MJD, LATEST_MJD), LEFT_OUT: TEXT}
-    table = columns_of(text, path.name, list(layout.required), list(optional))
+    table = columns_of(text, path.name, list(layout.required), optional=list(optional))
     limits = {**optional, **layout.required}
     numbers, words = {}, {}
     for name, cells in table.cells.items():

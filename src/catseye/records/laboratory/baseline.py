@@ -94,7 +94,7 @@ def read_observations(path: Path) -> BaselineShots:
     Raises InputError in one line for what cannot be used.
     """
     folder, file = Folder(path.parent), path.name
-    table = columns_of(folder.text(file), str(path), REQUIRED, (DIRECTION,))
+    table = columns_of(folder.text(file), str(path), REQUIRED, optional=(DIRECTION,))
     return BaselineShots(table, folder.hashes[file])
 
 

@@ -31,7 +31,7 @@ def read_network_folder(path: Path) -> ObservationNetwork:
     path   a folder with points.csv and ranges.csv
     """
     folder = Folder(path)
-    points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, ("role", *U_COLUMNS))
+    points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=("role", *U_COLUMNS))
     ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", RANGE_COLUMNS)
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)

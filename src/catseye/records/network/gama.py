@@ -130,7 +130,7 @@ class _Reader:
         return self.draft.refuse(element.place, f"{element.tag}: {problem}")
 
     def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
-        return number_of(self.draft.file, element, name, default)
+        return number_of(self.draft.file, element, name, default=default)
 
     def note_point(self, element: XmlElement, *, observed: bool) -> None:
         """Coordinates and status of a point; a point may be told in parts, but nothing twice."""

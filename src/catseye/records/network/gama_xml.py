@@ -145,7 +145,7 @@ def _check(parent: XmlElement, element: XmlElement, refuse: Callable[[str], Inpu
 
 
 def number_of(
-    file: str, element: XmlElement, name: str, default: float | None = None, *, word: str | None = None
+    file: str, element: XmlElement, name: str, *, default: float | None = None, word: str | None = None
 ) -> float:
     """An attribute as a number; the default where it is not there.
 

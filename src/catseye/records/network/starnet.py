@@ -189,7 +189,7 @@ class _Reader:
         value = (
             number_of(line, word, self.refuse) * self.settings.length
             if length
-            else angle_of(line, word, self.settings, self.refuse, bearing=kind == "azimuth")
+            else angle_of(line, word, self.settings, refuse=self.refuse, bearing=kind == "azimuth")
         )
         if kind == "zenith_angle" and value > np.pi:
             value = 2.0 * np.pi - value  # the second face

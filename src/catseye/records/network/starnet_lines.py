@@ -114,7 +114,7 @@ def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:
 
 
 def angle_of(
-    line: StarnetLine, word: str, settings: StarnetSettings, refuse: Refuse, *, bearing: bool = False
+    line: StarnetLine, word: str, settings: StarnetSettings, *, refuse: Refuse, bearing: bool = False
 ) -> float:
     """A word as an angle in rad: gon, decimal degrees, or ddd-mm-ss.s; bearings also N34-23-45.7E.
 
@@ -125,7 +125,7 @@ def angle_of(
     bearing    whether a quadrant may be given
     """
     if bearing and (parts := QUADRANT.fullmatch(word)):
-        acute = angle_of(line, parts[2], settings, refuse)
+        acute = angle_of(line, parts[2], settings, refuse=refuse)
         if not 0.0 <= acute <= 90.0 * DEGREE * (1.0 + 1e-12):
             raise refuse(line, f"{line.code}: bearing {shown(word)} (expected a quadrant of 0 to 90 degrees)")
         south, west = parts[1].upper() == "S", parts[3].upper() == "W"

@@ -120,7 +120,7 @@ class _Reader:
         common = {key: value for key, value in compact.values.items() if key not in ("columns", "rows", "file")}
         if "file" in compact.values:
             file = compact.text("file")
-            table = columns_of(self.folder.text(file), file, (), _AnyColumn())
+            table = columns_of(self.folder.text(file), file, (), optional=_AnyColumn())
             return _rows_of(table, common)
         columns = compact.take("columns", list, "names of columns, or file")
         fields = []

@@ -77,7 +77,7 @@ def read_campaign(directory: Path | str) -> Campaign:
 def refuse_strangers(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
     known, rangers = set(campaign.target_names), set(campaign.rangers)
     for row, shot in enumerate(shots, start=1):
-        refuse_stranger("shots.csv", row, shot, known, rangers)
+        refuse_stranger("shots.csv", row, shot, known=known, rangers=rangers)
 
 
 def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> None:
@@ -117,7 +117,7 @@ def refuse_path_temperatures(campaign: Campaign, lines: Sequence[PathTemperature
     first, last = float(campaign.shots.mjd_utc.min()), float(campaign.shots.mjd_utc.max())
     seen: dict[tuple[frozenset[str], float], int] = {}
     for row, line in enumerate(lines, start=1):
-        refuse_stranger(PATH_TEMPERATURES, row, line, known, rangers)
+        refuse_stranger(PATH_TEMPERATURES, row, line, known=known, rangers=rangers)
         if not first - SOUND_MARGIN <= line.mjd_utc <= last + SOUND_MARGIN:
             span = f"the shots cover {first!r} to {last!r}; expected within 1 h"
             raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r} is outside the campaign ({span})")

@@ -262,7 +262,7 @@ def read_recording(path: Path | str, sheet: AcousticSheet) -> Recording | Travel
                 f"line 1, {shown(','.join(header))} is neither a WAVE file nor a table (expected the columns "
                 f"{','.join(TIMES)} of travel times, or {','.join(CHANNELS)} of samples)",
             )
-        table = columns_of(text, path.name, (), CHANNELS)
+        table = columns_of(text, path.name, (), optional=CHANNELS)
         samples: dict[str, np.ndarray] = {name: table.numbers(name) for name in table.cells}
         recording = Recording(path.name, samples, None, None, digest)
     if not set(recording.samples) & {"ab", "ba"}:
@@ -352,7 +352,7 @@ def _codes(body: bytes, kind: int, bits: int, file: str) -> tuple[np.ndarray, fl
 
 
 def _travel_times(text: str, file: str, digest: str) -> TravelTimes:
-    table = columns_of(text, file, TIMES[:2], (TIMES[2], *BESIDES))
+    table = columns_of(text, file, TIMES[:2], optional=(TIMES[2], *BESIDES))
     mjd = table.numbers("mjd_utc")
     table.check("mjd_utc", (mjd >= EARLIEST_MJD) & (mjd <= LATEST_MJD), f"{EARLIEST_MJD:g} to {LATEST_MJD:g}")
     values = {}

@@ -63,7 +63,7 @@ def read_panel_readings(path: Path, layout: PanelLayout, sheet: PanelInstrument)
     sheet    whose travel and lean limits hold
     """
     folder = Folder(path.parent)
-    table = columns_of(folder.text(path.name), path.name, REQUIRED, OPTIONAL)
+    table = columns_of(folder.text(path.name), path.name, REQUIRED, optional=OPTIONAL)
     number = {name: k for k, name in enumerate(layout.corners)} | {FLAT: -1}
     names = table.cells["corner"]
     table.check("corner", np.array([n in number for n in names]), f"a corner of the layout, or {FLAT}")

@@ -175,7 +175,7 @@ def refuse_mirrors(site: SiteFolder) -> None:
 def refuse_benchmarks(site: SiteFolder) -> None:
     known, rangers = set(site.target_names) - {REFERENCE}, set(site.rangers)
     for row, benchmark in enumerate(site.benchmarks, start=1):
-        refuse_stranger("benchmarks.csv", row, benchmark, known, rangers)
+        refuse_stranger("benchmarks.csv", row, benchmark, known=known, rangers=rangers)
 
 
 class SiteLine(Protocol):
@@ -187,7 +187,7 @@ class SiteLine(Protocol):
     def target(self) -> str: ...
 
 
-def refuse_stranger(file: str, row: int, line: SiteLine, known: set[str], rangers: set[str]) -> None:
+def refuse_stranger(file: str, row: int, line: SiteLine, *, known: set[str], rangers: set[str]) -> None:
     """A row's ranger and target are known, and two."""
     if line.ranger not in rangers:
         raise in_row(file, row, f"ranger = {shown(line.ranger)} is not in monuments/ or feedarm.toml")

@@ -161,7 +161,17 @@ def path_temperatures(
     if back is None:
         along = along.less_wind(wind)
     straight = _StraightSpeed.of(along, line, wind)
-    t = np.atleast_1d(temperatures_c(straight.speed, p, h, None, line.model, station.co2_ppm, line.frequency_hz))
+    t = np.atleast_1d(
+        temperatures_c(
+            straight.speed,
+            p,
+            h,
+            vapour_pressure_hpa=None,
+            model=line.model,
+            co2_ppm=station.co2_ppm,
+            frequency_hz=line.frequency_hz,
+        )
+    )
     calm = ~(np.abs(along.wind) > WIND.upper)
     status = np.where(~good, NO_TIME, np.where(~calm, NO_WIND, np.where(np.isfinite(t), USED, OUTSIDE)))
     t = np.where(calm, t, np.nan)
@@ -170,7 +180,7 @@ def path_temperatures(
     at = np.where(good, t, 20.0)  # only so that slopes exist everywhere; nan again below
     slope = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm).sensitivity
     e = humidity.vapour_pressure_hpa(at, p, h, MODELS[line.model].vapour_formula)
-    lag = dispersion(at, p, e, line.frequency_hz).of_a_pulse()[1]
+    lag = dispersion(at, p, e, frequency_hz=line.frequency_hz).of_a_pulse()[1]
     per_speed = np.where(good, 1.0 / slope.temperature_c, np.nan)
     noise = per_speed * np.sqrt((along.per_forth * u_time[0]) ** 2 + (along.per_back * u_time[1]) ** 2)
     common = _common_parts(straight, per_speed, slope, lag, line, station)

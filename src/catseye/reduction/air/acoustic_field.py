@@ -299,12 +299,18 @@ class _Paths:
             heard = at + (speed - state.speed) * per_speed
             outside = np.abs(speed - state.speed) > WINDIEST
         else:
-            heard = np.atleast_1d(temperatures_c(speed, p, h, None, model, co2_ppm, frequency_hz))
+            heard = np.atleast_1d(
+                temperatures_c(
+                    speed, p, h, vapour_pressure_hpa=None, model=model, co2_ppm=co2_ppm, frequency_hz=frequency_hz
+                )
+            )
             outside = np.isnan(heard)
             at = np.where(outside, at, heard)
             state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
             per_speed = 1.0 / state.sensitivity.temperature_c
-        late = dispersion(at, p, state.vapour_pressure_hpa, frequency_hz).of_a_pulse()[1]  # its u, relative
+        late = dispersion(at, p, state.vapour_pressure_hpa, frequency_hz=frequency_hz).of_a_pulse()[
+            1
+        ]  # its u, relative
         by_along = per_speed * (self.speed - along) / speed
         by_length = (by_along / self.time)[:, None] * lines.directions
         rows = np.arange(len(self.time))

@@ -148,7 +148,7 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     Raises InputError in one line: file, line, value, what was expected.
     """
     folder, file = Folder(path.parent), path.name
-    table = columns_of(folder.text(file), str(path), REQUIRED, OPTIONAL)
+    table = columns_of(folder.text(file), str(path), REQUIRED, optional=OPTIONAL)
     if sheet is None:
         raise refusal(str(path), f"has no sheet {path.with_suffix('.toml').name} beside it and no path length is given")
     if sheet.air_model not in MODELS:

@@ -142,7 +142,7 @@ def air_by(
         by_c = slope._replace(temperature_c=slope.temperature_c + slope.pressure_hpa * at_per_c)
         whole = replace(state, sensitivity=by_c)
         return state, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
-    vapour = read(temperature_c, at, moisture, of.model)
+    vapour = read(temperature_c, at, moisture, model=of.model)
     state = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=of.modulation_hz, **light)
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
     by_p = partials.pressure_hpa + partials.vapour_pressure_hpa * vapour.per_pressure_hpa
@@ -176,7 +176,7 @@ def surface_of(
     >>> str(surface.deposit), round(float(surface.u_margin_k), 2)
     ('dew', 0.58)
     """
-    reading = read(state.temperature_c, state.pressure_hpa, moisture, state.model)
+    reading = read(state.temperature_c, state.pressure_hpa, moisture, model=state.model)
     u_vapour = reading.standard_uncertainty_hpa(
         moisture.u, u_temperature_c=u_temperature_c, u_pressure_hpa=u_pressure_hpa
     )
@@ -185,17 +185,19 @@ def surface_of(
     # the threshold hangs on the vapour alone: its uncertainty, as humidity at a temperature that is exact
     u_humidity = 100.0 * u_vapour / humidity.saturation(state.temperature_c, state.pressure_hpa).pressure_hpa
     u = CondensationSpread(surface_c=u_surface_c, humidity_percent=u_humidity)
-    return condensation(surface_c, state.temperature_c, state.pressure_hpa, relative, u=u)
+    return condensation(surface_c, state.temperature_c, state.pressure_hpa, humidity_percent=relative, u=u)
 
 
-def read(temperature_c: ArrayLike, pressure_hpa: ArrayLike, moisture: Moisture, model: str) -> hygrometer.VapourReading:
+def read(
+    temperature_c: ArrayLike, pressure_hpa: ArrayLike, moisture: Moisture, *, model: str
+) -> hygrometer.VapourReading:
     """Vapour pressure from an instrument, by the saturation formula that goes with the model where it has one.
 
     Over ice and in a psychrometer the formula is the notes', Buck's.
     """
     formula = MODELS[model].vapour_formula if model in MODELS else "buck"
     if moisture.kind == "humidity_percent":
-        return hygrometer.of_relative_humidity(temperature_c, pressure_hpa, moisture.value, formula)
+        return hygrometer.of_relative_humidity(temperature_c, pressure_hpa, moisture.value, formula=formula)
     if moisture.kind == "dew_point_c":
         return hygrometer.of_mirror(moisture.value, pressure_hpa, formula, deposit="dew")
     if moisture.kind == "frost_point_c":
@@ -222,9 +224,9 @@ def _carried(
     ABOVE.check(above)
     if np.all(np.asarray(above) == 0.0):
         return pressure_hpa, u_pressure_hpa, 0.0
-    e = read(temperature_c, pressure_hpa, moisture, model).vapour_pressure_hpa
+    e = read(temperature_c, pressure_hpa, moisture, model=model).vapour_pressure_hpa
     carried = barometer.carried_pressure(
-        pressure_hpa, temperature_c, 0.0, above, lapse_c_per_m=0.0, vapour_pressure_hpa=e
+        pressure_hpa, temperature_c, 0.0, z_to=above, lapse_c_per_m=0.0, vapour_pressure_hpa=e
     )
     u = carried.standard_uncertainty_hpa(u_pressure_hpa, u_lapse=U_LAPSE, u_gravity=U_STANDARD_GRAVITY)
     return carried.pressure_hpa, u, carried.per_temperature_c

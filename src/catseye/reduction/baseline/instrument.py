@@ -103,7 +103,7 @@ def _calibrated(
     names = _ordered(shots, heights, against)
     shots = _renumbered(shots, names)
     height, u_height, reference = _heights(shots, heights, against, settings, notes)
-    lengths = reduce_lengths(shots, height, u_height, reference or 0.0, settings)
+    lengths = reduce_lengths(shots, height, u_height, reference_height=reference or 0.0, settings=settings)
     if against is None and settings.u_scale_ppm > 0.0:
         by_scale = lengths.stretch**2 * lengths.distance * settings.u_scale_ppm * PPM
         columns = np.concatenate([lengths.systematic, by_scale[:, None]], axis=1)

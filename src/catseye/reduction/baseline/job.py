@@ -60,7 +60,7 @@ class BaselineJob:
         )
         if known is None:
             try:
-                self.x = places_in_line(shots.start.tolist(), shots.end.tolist(), lengths.distance, count)
+                self.x = places_in_line(shots.start.tolist(), shots.end.tolist(), lengths.distance, count=count)
             except EstimationError as problem:
                 raise EstimationError(named(str(problem), shots.names)) from problem
             self.y = np.zeros(count)
@@ -168,7 +168,7 @@ class BaselineJob:
             return solution, ()
         part = Extra(names, terms.columns[keep])
         try:
-            apart = separation(solution.used, solution, part, self.known, self.known is not None)
+            apart = separation(solution.used, solution, part, known=self.known, scale=self.known is not None)
         except EstimationError:
             apart = 0.0
         if apart < SEPARABLE:
@@ -190,7 +190,7 @@ class BaselineJob:
 
         def of(distance: np.ndarray, start: np.ndarray, end: np.ndarray, sigma: np.ndarray | None = None) -> FullTest:
             line = np.sqrt(distance**2 - (y[end] - y[start]) ** 2)
-            test = full_test(number[start], number[end], line, number[order], sigma)
+            test = full_test(number[start], number[end], line, order=number[order], sigma=sigma)
             places = np.full(len(y), np.nan)
             places[touched] = test.x
             return replace(test, x=places)

@@ -115,7 +115,12 @@ def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, 
 
 
 def reduce_lengths(
-    shots: BaselineShots, height: np.ndarray, u_height: np.ndarray, reference_height: float, settings: BaselineSettings
+    shots: BaselineShots,
+    height: np.ndarray,
+    u_height: np.ndarray,
+    *,
+    reference_height: float,
+    settings: BaselineSettings,
 ) -> Lengths:
     """Horizontal distances at one height, with what each common effect does to them.
 

@@ -131,14 +131,18 @@ def _standard(
     outcomes = [TestOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
     if against is not None and against.s_mm is not None and against.degrees_of_freedom:
         same = same_precision(
-            test.s / MILLIMETRE, test.degrees_of_freedom, against.s_mm, against.degrees_of_freedom, settings.level
+            test.s / MILLIMETRE,
+            test.degrees_of_freedom,
+            against.s_mm,
+            before=against.degrees_of_freedom,
+            level=settings.level,
         )
         text = (
             f"s {test.s / MILLIMETRE:.3f} mm here, {against.s_mm:.3f} mm at the known baseline; "
             f"the ratio of squares must be {same.lower:.3g} at least, too"
         )
         outcomes.append(TestOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
-    zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, settings.level)
+    zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, level=settings.level)
     text = f"zero {test.zero / MILLIMETRE:+.3f} ± {test.u_zero / MILLIMETRE:.3f} mm is "
     text += "not significant" if zero.passed else "significant: correct for it"
     return [*outcomes, TestOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
@@ -169,7 +173,7 @@ def _weather(weather: tuple[float, float], freedom: int, level: float) -> TestOu
     share, u = weather
     if not np.isfinite(share):
         return TestOutcome(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
-    one = is_nothing(share - 1.0, u, max(freedom - 1, 1), level)
+    one = is_nothing(share - 1.0, u, max(freedom - 1, 1), level=level)
     text = f"lengths followed {share:.2f} ± {u:.2f} of the changes of index that the sensors say (1 expected)"
     if not one.passed and abs(share) < abs(share - 1.0):
         text += ": as if corrected in the field already, or thermometers not in the air of the path"
@@ -181,7 +185,7 @@ def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: 
     outcomes = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)
-        test = is_nothing(value, u, solution.freedom_of(key), level)
+        test = is_nothing(value, u, solution.freedom_of(key), level=level)
         text = f"{key} {value / scale:+.3f} ± {u / scale:.3f} {unit} against the known pillars"
         outcomes.append(TestOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
     freedom = agreement.freedom_sets

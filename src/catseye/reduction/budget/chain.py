@@ -67,7 +67,7 @@ def drawing(scene: ShotScene, items: tuple[Item, ...]) -> Draw:
     walk = next(k for k, item in enumerate(items) if item.key == "walk")
 
     def draw(generator: np.random.Generator, n: int) -> np.ndarray:
-        x = draw_inputs(inputs, generator, n, correlation)
+        x = draw_inputs(inputs, generator, n, correlation=correlation)
         x[:, walk] = inputs[walk].value + _walked(scene, generator, n)
         return x
 

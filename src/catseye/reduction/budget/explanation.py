@@ -143,7 +143,7 @@ def explain_shot(
     ends, place = _places(campaign, row, reduction)
     try:
         scene = scene_of(
-            campaign, phases, wrong, row, ends=ends, place=place, settings=settings, assumptions=assumptions
+            campaign, phases, wrong, row=row, ends=ends, place=place, settings=settings, assumptions=assumptions
         )
     except InputError as problem:
         return replace(known, notes=(*known.notes, str(problem)))
@@ -160,7 +160,7 @@ def budget_of(scene: ShotScene, items: tuple[Item, ...]) -> Budget:
     )
 
 
-def scatter_of(scene: ShotScene, items: tuple[Item, ...], draws: int, seed: int) -> Scattered:
+def scatter_of(scene: ShotScene, items: tuple[Item, ...], draws: int, *, seed: int) -> Scattered:
     """The Monte Carlo of a scene's range."""
     generator = np.random.default_rng(seed)
     scattered = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
@@ -183,7 +183,7 @@ def _budgeted(known: Explanation, scene: ShotScene, draws: int, seed: int, progr
         budget=budget,
         cycles=cycles,
         coarse=coarse,
-        scattered=scatter_of(scene, items, draws, seed) if draws else None,
+        scattered=scatter_of(scene, items, draws, seed=seed) if draws else None,
         notes=(*known.notes, *_unsaid(scene.mirror, known.ranger in scene.campaign.monuments)),
         references=tuple((int(shots.shot[k]), float(after), float(weight)) for k, after, weight in neighbours),
     )

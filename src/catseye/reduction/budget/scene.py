@@ -153,8 +153,8 @@ def scene_of(
     campaign: Campaign,
     phases: Phases,
     wrong: Mapping[int, str],
-    row: int,
     *,
+    row: int,
     ends: tuple[np.ndarray, np.ndarray],
     place: RangedPoint,
     settings: ReductionSettings,
@@ -173,7 +173,7 @@ def scene_of(
     ranger, target = shots.ranger[row], shots.target[row]
     a, b = ends
     mirror = campaign.mirror_of(ranger)
-    references = references_of(campaign, phases, wrong, row)
+    references = references_of(campaign, phases, wrong, row=row)
     field = AirField.of(campaign, settings).on_lines(shots.mjd_utc[[row]], [frozenset((ranger, target))])
     path = field.along(shots.mjd_utc[[row]], a[None], b[None], np.zeros(len(field.names)))
     distance = float(np.linalg.norm(a - b))
@@ -224,7 +224,7 @@ def _obliquity(campaign: Campaign, place: RangedPoint, cosine: float) -> tuple[f
     return float(np.arccos(cosine)), float(obliquity_correction(place.height, ratio, cosine, phase=bends))
 
 
-def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], row: int) -> References:
+def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], *, row: int) -> References:
     """The good reference shots of a shot's ranger, and how the electronics' phase at the shot follows from them.
 
     Raises InputError where the ranger has none.
@@ -245,9 +245,9 @@ def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], 
     walk = walk_of(campaign)
     variance = phases.u_phase[rows] ** 2
     unwrapped = np.unwrap(np.angle(phases.phasor[rows]))
-    phase, covariance = drift_at(seconds, unwrapped, variance, when, random_walk=walk)
+    phase, covariance = drift_at(seconds, unwrapped, variance, time=when, random_walk=walk)
     unit = np.eye(len(rows))
-    weight = np.array([drift_at(seconds, each, variance, when, random_walk=walk)[0][0] for each in unit])
+    weight = np.array([drift_at(seconds, each, variance, time=when, random_walk=walk)[0][0] for each in unit])
     level = np.array([np.interp(when[0], seconds, each) for each in unit])
     return References(
         shots=rows,

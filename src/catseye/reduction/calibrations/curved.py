@@ -88,8 +88,8 @@ def fit_curved(
     observed: np.ndarray,
     predict: Callable[[np.ndarray], np.ndarray],
     parameters: Sequence[ModelParameter],
-    scatter: ObservedScatter,
     *,
+    scatter: ObservedScatter,
     options: FitOptions = EVERY_VALUE,
 ) -> CurvedFit:
     """The parameters that fit readings best, where these depend on them by a curve.

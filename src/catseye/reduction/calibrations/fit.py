@@ -222,7 +222,7 @@ def _fitted(
             observed[on],
             design[on],
             [matrix[block] for matrix in scatter.unknown.values()],
-            (scatter.claimed + shared)[block],
+            claimed=(scatter.claimed + shared)[block],
             size=scatter.size,
         )
         components = {name: float(np.sqrt(v)) for name, v in zip(scatter.unknown, variances, strict=True)}

@@ -91,7 +91,7 @@ def residuals_by_number(fit: CalibrationFit, scale: float) -> dict[str, tuple[np
     }
 
 
-def scatter_notes(fit: CalibrationFit, unit: str, scale: float, sought: int | None = None) -> tuple[str, ...]:
+def scatter_notes(fit: CalibrationFit, unit: str, scale: float, *, sought: int | None = None) -> tuple[str, ...]:
     """How the readings scatter and from how many degrees of freedom, in a unit of `scale` SI units.
 
     sought   how many of the first parameters are of interest; all if None

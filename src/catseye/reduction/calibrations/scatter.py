@@ -16,8 +16,8 @@ def restricted_likelihood(
     observed: np.ndarray,
     design: np.ndarray,
     components: Sequence[np.ndarray],
-    claimed: np.ndarray,
     *,
+    claimed: np.ndarray,
     size: float = 0.0,
 ) -> np.ndarray:
     """Variance factors (k,) of the components of a covariance, none below zero.

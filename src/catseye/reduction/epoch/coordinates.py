@@ -145,6 +145,7 @@ def adjust_coordinates(
     campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
+    *,
     settings: ReductionSettings,
     progress: Progress | None = None,
 ) -> AdjustedCoordinates:
@@ -158,13 +159,13 @@ def adjust_coordinates(
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
     """
-    resolved = resolve_cycles(campaign, phases, electronics, settings, progress)
-    network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings)
+    resolved = resolve_cycles(campaign, phases, electronics, settings=settings, progress=progress)
+    network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings=settings)
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
     solution, shots = settle_network(network, resolved.starts, progress)
-    return coordinates_of(network, solution, shots, resolved)
+    return coordinates_of(network, solution, shots, resolved=resolved)
 
 
 def settle_network(
@@ -257,6 +258,7 @@ def coordinates_of(
     network: CampaignNetwork,
     solution: LeastSquaresSolution,
     shots: list[tuple[ShotGroup, ShotParts]],
+    *,
     resolved: Resolved,
 ) -> AdjustedCoordinates:
     """What an adjusted network says of points, ranges, heads and air.
@@ -338,7 +340,7 @@ def _ranges(
         range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
         u_range.append(fit.sigma / n)
         detectable.append(fit.detectable_error / n)
-        error, u = line_errors(group, part.target, fit, solution)
+        error, u = line_errors(group, part.target, fit, solution=solution)
         thin.append(np.abs(error) + KEPT * u >= quarter)
     join = np.concatenate
     return RangeShots(

@@ -98,7 +98,7 @@ class _Problem:
             self.start,
             self.prior,
             self.stations[chosen],
-            self.lengths[chosen],
+            lengths=self.lengths[chosen],
             period=self.periods[chosen],
             covariance=covariance[np.ix_(chosen, chosen)],
             limits=AmbiguityLimits(wrong=0.0 if wider else WRONG),
@@ -124,7 +124,7 @@ def _problem(scene: CycleScene, name: str, rows: list[tuple[int, int]], x: np.nd
         start = end
     covariance = noise / np.outer(n, n) + slopes @ solution.covariance @ slopes.T
     misses = np.concatenate([(scene.groups[i].observed - scene.groups[i].predict(x)[0])[at[i]] for i in groups]) / n
-    stations = np.array([other_ends(scene.groups[i], r, int(own[0]), x) for i, r in order])
+    stations = np.array([other_ends(scene.groups[i], r, int(own[0]), x=x) for i, r in order])
     distance = np.linalg.norm(stations - x[own], axis=1)
     prior = spread(scene, name)
     u_place = float(np.sqrt(np.linalg.eigvalsh(prior)[-1]))

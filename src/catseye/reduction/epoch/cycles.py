@@ -50,9 +50,9 @@ def resolve_cycles(
     campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
+    *,
     settings: ReductionSettings,
     progress: Progress | None = None,
-    *,
     motion: CarriedMotion | None = None,
 ) -> Resolved:
     """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
@@ -65,7 +65,7 @@ def resolve_cycles(
 
     Source: the law of `signal.cycles.whole`; search by [TEUNISSEN95], see `estimation.ambiguity.search`.
     """
-    network = build_network(campaign, phases, electronics, settings, motion=motion)
+    network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
     doubtful = doubtful_points(network)
     ends = {int(k): {name, campaign.shots.target[k]} for name, e in electronics.items() for k in e.shots}
     waiting = {k for k, both in ends.items() if both & doubtful}
@@ -141,7 +141,7 @@ def without_shots(electronics: dict[str, ElectronicsPhase], out: set[int]) -> di
 
 
 def line_errors(
-    group: ShotGroup, targets: tuple[str, ...], fit: GroupFit, solution: LeastSquaresSolution
+    group: ShotGroup, targets: tuple[str, ...], fit: GroupFit, *, solution: LeastSquaresSolution
 ) -> tuple[np.ndarray, np.ndarray]:
     """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
 
@@ -173,7 +173,9 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
     """The network adjusted without the shots that wait, wrong ones left out; all parameters with covariance."""
     electronics = without_shots(network.electronics, waiting)
     used: set[int] = set()
-    part = build_network(network.campaign, network.phases, electronics, network.settings, motion=network.motion)
+    part = build_network(
+        network.campaign, network.phases, electronics, settings=network.settings, motion=network.motion
+    )
     if part.rangers:
         column = {parameter: i for i, parameter in enumerate(network.layout.parameters)}
         at = np.array([column[parameter] for parameter in part.layout.parameters])

@@ -126,7 +126,7 @@ def dew_risk(
         np.where(known, temperature, weather.temperature_c),
         weather.temperature_c,
         weather.pressure_hpa,
-        weather.humidity_percent,
+        humidity_percent=weather.humidity_percent,
         u=CondensationSpread(
             surface_c=u_surface_c,
             temperature_c=u_temperature_c,

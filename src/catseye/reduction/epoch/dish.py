@@ -45,7 +45,9 @@ def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray)
         if count < FEWEST:
             return []
         try:
-            fit = fit_paraboloid(x[columns[known]], np.zeros((3 * count, 3 * count)), nominal, focal_length)
+            fit = fit_paraboloid(
+                x[columns[known]], np.zeros((3 * count, 3 * count)), nominal, focal_length=focal_length
+            )
         except EstimationError:
             return []
         off = np.abs(fit.deviation - np.median(fit.deviation))

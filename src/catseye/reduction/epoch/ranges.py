@@ -137,7 +137,12 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
                 progress("samples to phases", done, n)
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
     return judged_phases(
-        detected, shots.cycles, shots.samples_per_cycle, mirrors, settings, lambda a: _usual_amplitude(campaign, a)
+        detected,
+        shots.cycles,
+        shots.samples_per_cycle,
+        mirrors=mirrors,
+        settings=settings,
+        usual_of=lambda a: _usual_amplitude(campaign, a),
     )
 
 
@@ -228,6 +233,7 @@ def judged_phases(
     detected: Detections,
     cycles: np.ndarray,
     samples_per_cycle: np.ndarray,
+    *,
     mirrors: Sequence[Mirror],
     settings: ReductionSettings,
     usual_of: Callable[[np.ndarray], np.ndarray],
@@ -339,7 +345,7 @@ def follow_electronics(campaign: ObservedSite, phases: Phases) -> tuple[dict[str
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))
         phase, covariance = drift_at(
-            seconds[references], unwrapped, variance[references], seconds[lit], random_walk=walk
+            seconds[references], unwrapped, variance[references], time=seconds[lit], random_walk=walk
         )
         level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
         electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))

@@ -222,7 +222,7 @@ def _nuisance(
     return np.concatenate(columns, axis=1), np.concatenate(slopes, axis=1)
 
 
-def other_ends(group: ShotGroup, row: int, own: int, x: np.ndarray) -> np.ndarray:
+def other_ends(group: ShotGroup, row: int, own: int, *, x: np.ndarray) -> np.ndarray:
     """(3,) m, ground: from where a shot's other end looks at the point whose x is in column `own`, that point standing.
 
     A moving point stands, and what it is ranged from moves the other way: |B p + b - a| = |p - B'(a - b)|.

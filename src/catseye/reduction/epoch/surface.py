@@ -89,7 +89,7 @@ def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tup
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
     rows = [coordinates.index(n) for n in names]
     try:
-        fit = fit_paraboloid(coordinates.x[rows], coordinates.block(names), nominal, focal_length)
+        fit = fit_paraboloid(coordinates.x[rows], coordinates.block(names), nominal, focal_length=focal_length)
     except EstimationError as problem:
         return None, f"no paraboloid: {problem}"
     return DishFit(names, fit, focal_length, nominal.translation), ""

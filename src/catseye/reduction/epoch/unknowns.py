@@ -105,8 +105,8 @@ def build_network(
     campaign: ObservedSite,
     phases: Phases,
     electronics: dict[str, ElectronicsPhase],
-    settings: ReductionSettings,
     *,
+    settings: ReductionSettings,
     motion: CarriedMotion | None = None,
     also: Collection[str] = (),
 ) -> CampaignNetwork:

@@ -101,8 +101,8 @@ def solve_epoch(
     observed: ObservedSite,
     rows: Sequence[PhasedShot],
     motion: CarriedMotion,
-    settings: ReductionSettings,
     *,
+    settings: ReductionSettings,
     carried: Carried | None,
     lasting: Sequence[str],
     ticks: int,
@@ -125,16 +125,16 @@ def solve_epoch(
     reasons |= wrong
     resolved = Resolved({}, {}, ())
     if carried is None:
-        resolved = resolve_cycles(observed, phases, electronics, settings, motion=motion)
+        resolved = resolve_cycles(observed, phases, electronics, settings=settings, motion=motion)
         electronics = without_shots(electronics, set(resolved.rejected))
-    network = build_network(observed, phases, electronics, settings, motion=motion, also=lasting)
+    network = build_network(observed, phases, electronics, settings=settings, motion=motion, also=lasting)
     if not network.rangers:
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
     frames = frames_at(network, motion)
     if carried is not None:
         network = _with_carried(network, carried, frames)
     solution, shots = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
-    coordinates = coordinates_of(network, solution, shots, resolved)
+    coordinates = coordinates_of(network, solution, shots, resolved=resolved)
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
@@ -144,7 +144,7 @@ def solve_epoch(
         tuple(layout.parameters[i] for i in lasts),
         solution.x[lasts],
         solution.covariance[np.ix_(lasts, lasts)],
-        frames,
+        frames=frames,
         ticks=ticks,
         elevation=float(motion.track.at(motion.epoch)[1]),
     )

@@ -146,7 +146,7 @@ class EpochJob:
         with threadpool_limits(limits=1, user_api="blas"):
             try:
                 site = self.motion.site
-                rows = joined_repeats(self.rows, self._lengths, site.site.ranging.modulation_hz, self.index)
+                rows = joined_repeats(self.rows, self._lengths, site.site.ranging.modulation_hz, index=self.index)
                 observed = observed_site(
                     site, rows, self.weather, azimuth=self.azimuth, elevation=self.elevation, mjd=self.motion.epoch
                 )
@@ -154,7 +154,7 @@ class EpochJob:
                     observed,
                     rows,
                     self.motion,
-                    self.rules,
+                    settings=self.rules,
                     carried=self.carried,
                     lasting=self.lasting,
                     ticks=self.ticks,
@@ -219,7 +219,7 @@ class Live:
             shot,
             mirror,
             adc,
-            rules,
+            settings=rules,
             usual=median(usual) if usual else math.nan,
             run=run if abs(run) < 0.5 * math.pi else 0.0,
         )
@@ -418,7 +418,16 @@ class Live:
         rules = self.settings.reduction
         profile = rules.u_gradient_c_per_m if GRADIENT in carried.parameters else rules.u_profile_c
         path = self.settings.lasting_path * self.site.site.ranging.path_index_fluctuation_ppm
-        return carried_on(carried, ticks, seconds, elevation, self.bodies, self.settings.loosening, profile, path)
+        return carried_on(
+            carried,
+            ticks,
+            seconds,
+            elevation=elevation,
+            bodies=self.bodies,
+            rule=self.settings.loosening,
+            profile_sigma=profile,
+            path_sigma_ppm=path,
+        )
 
     def _moving(self) -> list[str]:
         known = self.carried.points() if self.carried is not None else {}

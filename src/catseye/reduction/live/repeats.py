@@ -25,7 +25,7 @@ OFF_SIGMAS, OFF_WAY = 6.0, 1.0 * MILLIMETRE  # from the median, both: a repeat t
 
 
 def joined_repeats(
-    rows: Sequence[PhasedShot], lengths: Lengths, modulation_hz: float, index: float
+    rows: Sequence[PhasedShot], lengths: Lengths, modulation_hz: float, *, index: float
 ) -> list[PhasedShot]:
     """The rows of an epoch with repeats joined, in order of time; `numbers` says what each stands for.
 

@@ -109,7 +109,7 @@ class RangerNow:
 
 
 def phased(
-    shot: LiveShot, mirror: Mirror, adc: Adc, settings: ReductionSettings, *, usual: float, run: float = 0.0
+    shot: LiveShot, mirror: Mirror, adc: Adc, *, settings: ReductionSettings, usual: float, run: float = 0.0
 ) -> PhasedShot:
     """The phase of one shot, judged as `catseye reduce` judges it.
 
@@ -128,7 +128,7 @@ def phased(
     if shot.samples is None:
         across = U_UNSEEN_VOLT
     elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer tell too little of one quadrature's own scatter
-        across = math.sqrt(variance_across(buffer.total, buffer.between, shot.cycles, phasor))
+        across = math.sqrt(variance_across(buffer.total, buffer.between, shot.cycles, phasor=phasor))
     phase = ShotPhase(
         phasor, buffer.u_phasor, across, buffer.offset, buffer.harmonics, buffer.largest, buffer.wrong or reason
     )

@@ -122,8 +122,8 @@ def from_ground(
     parameters: tuple[Parameter, ...],
     x: Array,
     covariance: Array,
-    frames: Mapping[str, Transform],
     *,
+    frames: Mapping[str, Transform],
     ticks: int,
     elevation: float,
 ) -> Carried:
@@ -187,6 +187,7 @@ def carried_on(
     carried: Carried,
     ticks: int,
     seconds: float,
+    *,
     elevation: float,
     bodies: Mapping[str, str],
     rule: Loosening,

@@ -169,9 +169,9 @@ def _image_effects(train: BeamTrain, image: BeamPlace) -> dict[str, float]:
     middle, off = "image in the middle of the detector, against its rim", "image off the middle"
     if not math.isfinite(spot):
         return {middle: math.nan, off: math.nan}
-    centre = float(detector.spot_range(0.0, spot, diode, train.modulation_hz))
+    centre = float(detector.spot_range(0.0, spot, diode, modulation_hz=train.modulation_hz))
     wandering = math.hypot(spot, 2.0 * plate.u_offset_um * MICROMETRE)  # a place that is not certain widens the mean
-    here = float(detector.spot_range(plate.offset_um * MICROMETRE, wandering, diode, train.modulation_hz))
+    here = float(detector.spot_range(plate.offset_um * MICROMETRE, wandering, diode, modulation_hz=train.modulation_hz))
     return {middle: centre, off: here - centre}
 
 

@@ -307,7 +307,7 @@ def _heights(
     corners = _corner_heights(layout, model, solution, departure, times)
     goal, pitch = sheet.goal_um * 1e-6, sheet.screw.pitch_mm * MILLIMETRE
     sense = 1.0 if sheet.screw.clockwise == "raises" else -1.0
-    fit, u_fit = panel_fits(layout, solution, departure, model.u_target)
+    fit, u_fit = panel_fits(layout, solution, departure, u_target=model.u_target)
     factor, degrees = solution.variance_factor([f.name for f in solution.fits[: len(model.blocks)]])
     return PanelHeights(
         layout=layout,
@@ -349,7 +349,7 @@ def conformity(value: np.ndarray, u: np.ndarray, goal: float) -> np.ndarray:
 
 
 def panel_fits(
-    layout: PanelLayout, solution: LeastSquaresSolution, departure: np.ndarray, u_target: np.ndarray
+    layout: PanelLayout, solution: LeastSquaresSolution, departure: np.ndarray, *, u_target: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Piston and slopes (p, 3) of the plane through each panel's four corners, and their u; m and rad."""
     place = corner_places(layout)

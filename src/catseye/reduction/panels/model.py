@@ -130,7 +130,7 @@ def tips_of(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument
     return Tips(row, gauge, corner, panel, share, tool, place, at, rise)
 
 
-def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, tips: Tips) -> np.ndarray:
+def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, *, tips: Tips) -> np.ndarray:
     """(n,) m, readings without what the sheet knows of the gauges.
 
     r + linearity, over 1 + scale, less zero per °C; a tip sags by sag · cos(slope) on the dish and by sag on the flat,
@@ -222,7 +222,7 @@ def panel_model(
     places = corner_places(layout)
     shape, between = _mapped(layout, tips, places, maps or {})
     mapped = np.array([name in (maps or {}) for name in layout.panels])
-    observed = corrected(readings, layout, sheet, tips) - tips.rise - between
+    observed = corrected(readings, layout, sheet, tips=tips) - tips.rise - between
     lean = readings.lean[tips.row]
     read = np.isfinite(lean[:, 0])
     observed = observed - np.sum(np.nan_to_num(lean) * tips.tool, axis=1)

@@ -142,7 +142,9 @@ def _cross_with_dish(carried: Pose, dish: Pose, mixed: np.ndarray) -> np.ndarray
     return np.asarray(mixed - pivot_change(carried.pivot - dish.pivot, dish.motion.matrix) @ dish.covariance)
 
 
-def cross_covariance(carried: GroupPose, dish: GroupPose, site: SiteFolder, earlier: SolvedPoints | None) -> np.ndarray:
+def cross_covariance(
+    carried: GroupPose, dish: GroupPose, site: SiteFolder, *, earlier: SolvedPoints | None
+) -> np.ndarray:
     """(6, 6) of the carried six numbers (rows) with the dish's, from the coordinates' covariance of both epochs.
 
     carried, dish   poses in the reflector frame

@@ -96,8 +96,8 @@ def track_profile(
     azimuth: np.ndarray,
     turn: np.ndarray,
     covariance: np.ndarray,
-    tilts: TiltReadings | None = None,
     *,
+    tilts: TiltReadings | None = None,
     harmonics: int = 2,
     names: Sequence[str] | None = None,
 ) -> TrackProfile:
@@ -158,7 +158,7 @@ def track_profile(
 
 
 def joined_tilt(
-    rotation: np.ndarray, covariance: np.ndarray, tilt: np.ndarray, u: float
+    rotation: np.ndarray, covariance: np.ndarray, tilt: np.ndarray, *, u: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Six numbers of an alidade's pose (6,) with an inclinometer's reading joined, and their covariance (6, 6).
 
@@ -189,6 +189,6 @@ def pose_with_tilt(group_pose: GroupPose, tilt: np.ndarray, u: float) -> GroupPo
     if pose.frame != "alidade":
         raise FrameError(f"pose in the frame '{pose.frame}', expected 'alidade', in which the inclinometer turns")
     six = np.concatenate([motion.translation, motion.rotation])
-    six, covariance = joined_tilt(six, motion.covariance, tilt, u)
+    six, covariance = joined_tilt(six, motion.covariance, tilt, u=u)
     joined = replace(motion, translation=six[:3], matrix=from_vector(six[3:]), covariance=covariance)
     return replace(group_pose, pose=replace(pose, motion=joined))

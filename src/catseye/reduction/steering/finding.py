@@ -79,7 +79,7 @@ def find(
         return looked[tuple(at)]
 
     within = max(float(reach(head.radius, 0.5)), LEAST_REACH)
-    pattern = spiral(predicted, head.zeros, search_radius, within, head.azimuth_limits)
+    pattern = spiral(predicted, head.zeros, search_radius, reach=within, limits=head.azimuth_limits)
     spot, light = Spot(""), None
     for at in pattern.counts:
         before = tuple(at) in looked  # by a scan of light that was no spot
@@ -108,9 +108,9 @@ def _centred(
     spot = Spot("")
     for _ in range(RECENTRED):
         try:
-            scan = raster(centre, head.zeros, (half, half), fine, head.azimuth_limits)
+            scan = raster(centre, head.zeros, (half, half), reach=fine, limits=head.azimuth_limits)
         except ValidityError:  # the azimuth axis lies within the scan: a raster has no rows there
-            scan = spiral(centre, head.zeros, half, max(fine, LEAST_REACH), head.azimuth_limits)
+            scan = spiral(centre, head.zeros, half, reach=max(fine, LEAST_REACH), limits=head.azimuth_limits)
         for at in scan.counts:
             look(at)
         places, values = np.array(list(looked)), np.array(list(looked.values()))
@@ -125,7 +125,7 @@ def _centred(
 
 
 def found_point(
-    station: MirrorStation, spot: Spot, distance: float, u_distance: float, *, of_station: ArrayLike | None = None
+    station: MirrorStation, spot: Spot, distance: float, *, u_distance: float, of_station: ArrayLike | None = None
 ) -> tuple[Array, Array]:
     """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
 

@@ -134,7 +134,7 @@ class Guard:
         """Angle (..., 1 + boxes), rad, from directions (..., 3), unit, ground, to the Sun's cone and the boxes."""
         days = np.asarray(mjd, dtype=float)
         zones: list[Zone] = [self._cone(days, np.zeros(days.shape)), *self.boxes]
-        return clearances(zones, self.station.scan_point, direction, exact_below)
+        return clearances(zones, self.station.scan_point, direction, exact_below=exact_below)
 
     def entries(
         self, mjd: ArrayLike, slews: MirrorSlew, *, widened: float = 0.0, compiled: bool | None = None
@@ -147,7 +147,7 @@ class Guard:
         start = np.broadcast_to(np.asarray(mjd, dtype=float), slews.shape)
         sun = self._cone(start, slews.total)
         sun = replace(sun, half_angle=sun.half_angle + widened)
-        return first_entry(self.station, slews, (sun, *self.boxes), self.margin, compiled=compiled)
+        return first_entry(self.station, slews, (sun, *self.boxes), margin=self.margin, compiled=compiled)
 
     def pointing(self, mjd: float, counts: ArrayLike) -> GuardAnswer:
         """Whether the mirror may stand at counts (2,) at a time, and if not for the Sun, when it may."""

@@ -138,6 +138,6 @@ def seen_from(
         {name: station.scan_point},
         Retroreflectors(("",) * len(to), (kind,) * len(to), to, np.broadcast_to(axis, to.shape)),
         solids,
-        frames_at(*(posture or (0.0, 0.0))),
+        frames=frames_at(*(posture or (0.0, 0.0))),
         reachable=None if reachable is None else reachable[None],
     )

@@ -259,7 +259,7 @@ def _frames_of(antenna: Antenna, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def predicted_points(
-    antenna: Antenna, measured: MeasuredPosture, added: Added, places: Mapping[str, np.ndarray] | None = None
+    antenna: Antenna, measured: MeasuredPosture, added: Added, *, places: Mapping[str, np.ndarray] | None = None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Coordinates (n, 3) of the targets, and derivatives (3n, 6) by the shift and turn of each frame and group."""
     n = len(measured.names)
@@ -274,7 +274,7 @@ def predicted_points(
         at = antenna.in_frame(group, measured.posture, added=added)[rows]
         if places is not None:
             at = at + np.array([places[measured.names[i]] for i in targets])
-        predicted[targets] = ground_from_group(antenna, measured, group, added).points(at)
+        predicted[targets] = ground_from_group(antenna, measured, group, added=added).points(at)
         slopes = antenna.derivatives(points.frame, at, measured.posture, added=added, subreflector=commanded)
         if group in antenna.motions:
             by_name = antenna.group_derivatives(group, measured.posture, added=added, subreflector=commanded)
@@ -284,6 +284,6 @@ def predicted_points(
     return predicted, {frame: slope.reshape(3 * n, 6) for frame, slope in by_frame.items()}
 
 
-def ground_from_group(antenna: Antenna, measured: MeasuredPosture, group: str, added: Added) -> Transforms:
+def ground_from_group(antenna: Antenna, measured: MeasuredPosture, group: str, *, added: Added) -> Transforms:
     frame = antenna.groups[group].frame
     return antenna.ground_from(frame, measured.posture, added=added, subreflector=measured.subreflector)

@@ -206,7 +206,7 @@ def _rows(
         six[COMPONENTS.index(component)] += row_of[name] @ change[first : first + k]
         first += k
     places = {name: place[3 * i : 3 * i + 3] for i, name in enumerate(targets)}
-    predicted, slopes = predicted_points(antenna, epoch, added, places)
+    predicted, slopes = predicted_points(antenna, epoch, added, places=places)
     rows = 3 * len(epoch.names)
     columns = [
         np.outer(slopes[name][:, COMPONENTS.index(c)], row_of[name])
@@ -216,7 +216,7 @@ def _rows(
     ]
     by_place = np.zeros((rows, 3 * len(targets)))
     owners = [group_of(antenna, name) for name in epoch.names]
-    out = {group: ground_from_group(antenna, epoch, group, added).rotation for group in set(owners)}
+    out = {group: ground_from_group(antenna, epoch, group, added=added).rotation for group in set(owners)}
     spread = epoch.covariance.copy()
     for i, (name, group) in enumerate(zip(epoch.names, owners, strict=True)):
         at, column = slice(3 * i, 3 * i + 3), 3 * targets.index(name)

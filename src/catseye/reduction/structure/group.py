@@ -105,7 +105,7 @@ def group_series(
     for t, epoch in enumerate(kept):
         own = [i for i, name in enumerate(epoch.names) if name in names]
         at = np.array([names.index(epoch.names[i]) for i in own])
-        carrier = carrier_of(frame, epoch.azimuth, epoch.elevation, nominal or Nominal())
+        carrier = carrier_of(frame, epoch.azimuth, epoch.elevation, nominal=nominal or Nominal())
         places[t, at] = (epoch.coordinates[own] - carrier.translation) @ carrier.rotation
         rows = (3 * np.array(own)[:, None] + np.arange(3)).ravel()
         into = (3 * at[:, None] + np.arange(3)).ravel()
@@ -127,7 +127,7 @@ def group_series(
     return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, sorted_labels)
 
 
-def carrier_of(frame: str, azimuth: float, elevation: float, nominal: Nominal) -> Transforms:
+def carrier_of(frame: str, azimuth: float, elevation: float, *, nominal: Nominal) -> Transforms:
     """Points of a frame into the ground, at one posture of the rigid telescope.
 
     frame                "ground", "alidade" or "reflector"

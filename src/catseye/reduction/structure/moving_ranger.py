@@ -115,7 +115,7 @@ class MovingRanger:
 
 
 def tracked(
-    antenna: Antenna, target: str, coordinates: ArrayLike, covariance: ArrayLike, posture: TelescopePosture
+    antenna: Antenna, target: str, coordinates: ArrayLike, *, covariance: ArrayLike, posture: TelescopePosture
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacements (N, 3), m, of a target in its frame's axes and their covariances: samples for the vibration filter.
 
@@ -187,9 +187,9 @@ def moving_ranger(
     ranger: FeedArmRanger,
     mirror: MirrorGeometry,
     antenna: Antenna,
+    *,
     drive: Driven,
     times: ArrayLike,
-    *,
     u_mount: float,
     u_position: float = 0.010,
     known: tuple[FrameCorrections, ...] = (),
@@ -238,8 +238,8 @@ def projected(
     antenna: Antenna,
     group: str,
     drive: Driven,
-    times: ArrayLike,
     *,
+    times: ArrayLike,
     known: tuple[FrameCorrections, ...] = (),
     subreflector: SubreflectorPosition | None = None,
 ) -> Placed:

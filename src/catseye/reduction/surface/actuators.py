@@ -99,7 +99,7 @@ def corrections(
     local, wanted = shape.fit.local[:, :2], places[:, :2]
     trend, wanted_trend = _trend(shape, local, wanted)
     values, noise = shape.fit.deviation, shape.fit.along
-    rough = roughness or find_roughness(local, values, noise, trend)
+    rough = roughness or find_roughness(local, values, noise, trend=trend)
     nominal_design = _parameter_rows(shape, wanted)
     foretold: Foretold = foretell(
         MeasuredField(local, values, noise, trend),

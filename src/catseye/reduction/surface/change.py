@@ -65,7 +65,7 @@ class Change:
     gains: tuple[Gain, ...]
 
 
-def change_between(first: Prisms, second: Prisms, aperture: LitAperture, settings: ShapeSettings) -> Change:
+def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, settings: ShapeSettings) -> Change:
     """What the surface did between two epochs, each in its own nominal posture.
 
     first, second   at least six prisms of the same names
@@ -126,7 +126,7 @@ def change_between(first: Prisms, second: Prisms, aperture: LitAperture, setting
         places,
         expansion,
         square,
-        gains_of(half, weights, square, settings.frequencies),
+        gains_of(half, weights, square, frequencies=settings.frequencies),
     )
 
 

@@ -186,7 +186,7 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
         prisms.points,
         prisms.covariance,
         prisms.nominal,
-        aperture.focal_length,
+        focal_length=aperture.focal_length,
         free=settings.free,
         weights=weights,
         measure="half-path",
@@ -202,7 +202,7 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
         settings=settings,
     )
     square = mean_square(fit.half_path, fit.half_path_covariance, weights)
-    gains = gains_of(fit.half_path, weights, square, settings.frequencies)
+    gains = gains_of(fit.half_path, weights, square, frequencies=settings.frequencies)
     return SurfaceShape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
 
 
@@ -308,7 +308,7 @@ def mean_square(error: np.ndarray, covariance: np.ndarray, weights: np.ndarray) 
 
 
 def gains_of(
-    error: np.ndarray, weights: np.ndarray, square: MeanSquare, frequencies: tuple[float, ...]
+    error: np.ndarray, weights: np.ndarray, square: MeanSquare, *, frequencies: tuple[float, ...]
 ) -> tuple[Gain, ...]:
     """The gain at each frequency (Hz), by Ruze and by the aperture's own integral."""
     made = []

@@ -40,7 +40,7 @@ class MemoNumbers:
     h_corr_by_int: Array
 
 
-def median_series(d_1: Array, d_2: Array, d_12: Array, delta: Array) -> Array:
+def median_series(d_1: Array, d_2: Array, d_12: Array, *, delta: Array) -> Array:
     """Distance to the mid-point of the prisms by the memo's series, m.
 
     d_1, d_2    m, to the prisms
@@ -81,7 +81,7 @@ def memo_numbers(r: TripletReadings, cycles: TripletCycles, lengths: TripletLeng
     middle = 0.5 * (r.l_1 - r.hrp_1 + r.l_2 - r.hrp_2)
 
     def reduced(d_1: Array, d_2: Array, d_bcfp: Array, n: Array, sine: Array) -> tuple[Array, Array, Array]:
-        d_mp = median_series(d_1, d_2, r.d_12, n * half)
+        d_mp = median_series(d_1, d_2, r.d_12, delta=n * half)
         delta_range = (d_mp - d_bcfp) / np.sqrt(1.0 - sine**2)
         return d_mp, delta_range, 2.0 * r.l_post - 2.0 * middle - delta_range
 

@@ -160,7 +160,11 @@ def refractivity_slopes(
 
 
 def refractivity_change(
-    temperature_c: ArrayLike, pressure_hpa: ArrayLike, humidity_percent: ArrayLike, slopes: RefractivitySlopes = SLOPES
+    temperature_c: ArrayLike,
+    pressure_hpa: ArrayLike,
+    humidity_percent: ArrayLike,
+    *,
+    slopes: RefractivitySlopes = SLOPES,
 ) -> Array:
     """Change of air's group refractivity for moderate changes of the weather, linear.
 

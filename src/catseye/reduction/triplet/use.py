@@ -180,7 +180,7 @@ def ball_distance_memo(d_mp: ArrayLike, sight: ArrayLike, offset: ArrayLike) -> 
 
 
 def ball_ranges(
-    units: Sequence[MountedTriplet], scan_points: ArrayLike, ranges: ArrayLike, covariance: ArrayLike
+    units: Sequence[MountedTriplet], scan_points: ArrayLike, ranges: ArrayLike, *, covariance: ArrayLike
 ) -> BallRanges:
     """Distances to the balls with their full covariance.
 

@@ -65,7 +65,7 @@ def modulation_set(
     u = checked_u_phase(u_phase, f) * half / TWO_PI
     if not np.isfinite(u).all():
         raise ValidityError(f"u_phase {u_phase!r} rad is not finite")
-    candidates = cycle_sets(np.zeros((1, len(f))), half, 1.0 / u[None] ** 2, (0.0, span * group_index))
+    candidates = cycle_sets(np.zeros((1, len(f))), half, 1.0 / u[None] ** 2, limits=(0.0, span * group_index))
     other = np.any(candidates.cycles[0] != 0, axis=-1) & candidates.inside[0]
     lengths, square = candidates.length[0, other] / group_index, candidates.misfit[0, other]
     u_length = float(np.sum(u**-2.0) ** -0.5) / group_index

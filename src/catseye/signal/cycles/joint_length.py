@@ -140,7 +140,7 @@ class _Answer:
         """The best and the next set of some shots; u are the phases' standard uncertainties as lengths."""
         low, high = within
         sets = cycle_sets(
-            phase, half, u**-2.0, (min(low * n.min(), low * n.max()), max(high * n.min(), high * n.max()))
+            phase, half, u**-2.0, limits=(min(low * n.min(), low * n.max()), max(high * n.min(), high * n.max()))
         )
         u_length = np.sum(u**-2.0, axis=1) ** -0.5
         slack = SURE * u_length[:, None]

@@ -22,7 +22,7 @@ class CycleSets:
 
 
 def cycle_sets(
-    phase: NDArray[np.float64], half: NDArray[np.float64], weight: NDArray[np.float64], limits: tuple[float, float]
+    phase: NDArray[np.float64], half: NDArray[np.float64], weight: NDArray[np.float64], *, limits: tuple[float, float]
 ) -> CycleSets:
     """All sets for shots (s, k) between two optical lengths; lengths are optical, misfits chi-square."""
     u_length = float(np.max(np.sum(weight, axis=1) ** -0.5))

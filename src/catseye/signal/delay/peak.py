@@ -75,7 +75,7 @@ def find(
     spectrum, scale = transformed(piece, search)
     cross, weight = cross_spectrum(spectrum, search)
     correlation = windowed(cross, low, search)
-    measures = measured(spectrum, cross, weight, correlation, low, search, scale)
+    measures = measured(spectrum, cross, weight, correlation=correlation, low=low, search=search, scale=scale)
     return judged(measures, damage, search.least_snr)
 
 
@@ -92,6 +92,7 @@ def measured(
     spectrum: NDArray,
     cross: NDArray,
     weight: NDArray,
+    *,
     correlation: NDArray,
     low: NDArray,
     search: PeakSearch,

@@ -85,7 +85,7 @@ def colour_limit(cycles: int) -> float:
     return float(fdtri(BATCHES - 1, cycles - BATCHES, 1.0 - ALARM)) if cycles >= FEWEST_FOR_BATCHES else math.inf
 
 
-def variance_across(total: Sequence[float], between: Sequence[float], cycles: int, phasor: complex) -> float:
+def variance_across(total: Sequence[float], between: Sequence[float], cycles: int, *, phasor: complex) -> float:
     """V^2, of one buffer's mean across its phasor: `CycleScatter.variance` without arrays.
 
     total, between   (3) V^2, as there

@@ -11,8 +11,8 @@ def drift_at(
     reference_time: np.ndarray,
     reference_phase: np.ndarray,
     reference_variance: np.ndarray,
-    time: np.ndarray,
     *,
+    time: np.ndarray,
     random_walk: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phase of the electronics at given times, and its full covariance, from reference shots of a random walk.
@@ -61,8 +61,8 @@ def drift_along(
     reference_time: np.ndarray,
     reference_phase: np.ndarray,
     reference_variance: np.ndarray,
-    time: np.ndarray,
     *,
+    time: np.ndarray,
     random_walk: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phase of the electronics at given times, and its standard uncertainty alone: (m,) rad each.

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def amplitude_phase(
-    amplitude: ArrayLike, reference_amplitude: ArrayLike, coefficient: ArrayLike, quadratic: ArrayLike = 0.0
+    amplitude: ArrayLike, reference_amplitude: ArrayLike, coefficient: ArrayLike, *, quadratic: ArrayLike = 0.0
 ) -> Array:
     """Radians that the electronics add to the measured phase: coefficient ln(a) + quadratic ln(a)^2.
 
@@ -42,6 +42,7 @@ def remove_amplitude_phase(
     phase: ArrayLike,
     amplitude: ArrayLike,
     reference_amplitude: ArrayLike,
+    *,
     coefficient: ArrayLike,
     quadratic: ArrayLike = 0.0,
 ) -> Array:
@@ -52,7 +53,7 @@ def remove_amplitude_phase(
     >>> round(float(remove_amplitude_phase(1.0, np.e, 1.0, 1e-3)), 12)
     0.999
     """
-    added = amplitude_phase(amplitude, reference_amplitude, coefficient, quadratic)
+    added = amplitude_phase(amplitude, reference_amplitude, coefficient, quadratic=quadratic)
     return np.asarray(phase, dtype=float) - added
 
 

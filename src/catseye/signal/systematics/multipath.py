@@ -103,7 +103,7 @@ def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, beyond: flo
 
 
 def share_a_pass(
-    detector_reflectance: ArrayLike, recollected: ArrayLike, two_way: ArrayLike, mirrors: ArrayLike = 1.0
+    detector_reflectance: ArrayLike, recollected: ArrayLike, two_way: ArrayLike, *, mirrors: ArrayLike = 1.0
 ) -> Array:
     """Share of a return that comes back once more: what the detector reflects, the lens takes up, the target returns.
 

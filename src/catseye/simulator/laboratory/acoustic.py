@@ -18,7 +18,7 @@ A = (331.5024, 0.603055, -0.000528, 51.471935, 0.1495874, -0.000782, -1.82e-7, 3
 Profile = Callable[[NDArray], NDArray]
 
 
-def sound_speed(temperature_c, pressure_hpa, humidity_percent, co2_ppm=450.0):
+def sound_speed(temperature_c, pressure_hpa, humidity_percent, *, co2_ppm=450.0):
     """Speed of sound in moist air, m/s.
 
     temperature_c      0 to 30 °C
@@ -67,7 +67,7 @@ class SoundPath:
     def travel_times(self) -> tuple[float, float]:
         """Travel times from A to B and from B to A, s, by Gauss-Legendre quadrature."""
         share = 0.5 * (NODES + 1.0)
-        c = sound_speed(self.temperature_c(share), self.pressure_hpa, self.humidity_percent, self.co2_ppm)
+        c = sound_speed(self.temperature_c(share), self.pressure_hpa, self.humidity_percent, co2_ppm=self.co2_ppm)
         c = c * (1.0 + 1e-6 * self.dispersion_ppm)
         ahead, along = np.sqrt(c**2 - self.wind_across(share) ** 2), self.wind_along(share)
         half = 0.5 * self.length * WEIGHTS

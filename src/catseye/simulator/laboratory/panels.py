@@ -193,8 +193,8 @@ def panel_readings(
     solid: SolidPanels,
     sheet: PanelInstrument,
     crew: Crew,
-    tour: CornerTour | None = None,
     *,
+    tour: CornerTour | None = None,
     shafts: np.ndarray | None = None,
 ) -> tuple[list[str], np.ndarray]:
     """Rows of READINGS.csv with its header, and the heights (c,) of all shafts, m.

@@ -46,7 +46,7 @@ def glass_delay(target: TrueTarget, towards_ranger, *, obliquity: float):
     return straight + obliquity * (slanted - straight)
 
 
-def electronic_phase(head: TrueHead, seconds, streams: Streams, planted: Planted):
+def electronic_phase(head: TrueHead, seconds, streams: Streams, *, planted: Planted):
     """Phase of the electronics at the times of the shots (ascending): a random walk; every third head warms up."""
     rng = streams(f"electronics/{head.ranger}")
     start, warms, rise = rng.uniform(0.0, TWO_PI), rng.uniform() < 1.0 / 3.0, rng.uniform(0.010, 0.030)
@@ -97,7 +97,7 @@ def returns_of_ranger(
 ) -> list[Return]:
     """What comes back to one ranger, shot by shot."""
     seconds = np.array([s.seconds for s in shots])
-    phase_e = electronic_phase(head, seconds, streams, planted)
+    phase_e = electronic_phase(head, seconds, streams, planted=planted)
     rng = streams(f"returns/{head.ranger}")
     paths = {name: streams(f"air/{head.ranger}/{name}").normal() for name in targets}
     fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
@@ -135,7 +135,7 @@ def returns_of_ranger(
     return returns
 
 
-def sampled_frames(head: TrueHead, returns: list[Return], streams: Streams, planted: Planted) -> np.ndarray:
+def sampled_frames(head: TrueHead, returns: list[Return], streams: Streams, *, planted: Planted) -> np.ndarray:
     """Converter codes of every shot of one head, int16, (shots, samples): harmonics, offset, noise, rounding, ends."""
     rng = streams(f"samples/{head.ranger}")
     offset, spread = rng.uniform(-0.25, 0.25), rng.uniform(0.165, 0.245)  # V

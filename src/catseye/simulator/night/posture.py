@@ -62,7 +62,7 @@ class TruePosture:
         return self.dish(bent)
 
 
-def posture(azimuth_deg: float, elevation_deg: float, streams: Streams, planted: Planted) -> TruePosture:
+def posture(azimuth_deg: float, elevation_deg: float, streams: Streams, *, planted: Planted) -> TruePosture:
     """The posture of the night: some millimetres and arc seconds from nominal, the feed arm more.
 
     The magnitudes are chosen; two sigma is the most.

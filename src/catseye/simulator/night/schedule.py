@@ -82,7 +82,9 @@ def ground_targets(
     return lists
 
 
-def feed_arm_targets(ranger: str, rule: Schedule, telescope: Structure, faults: Faults, streams: Streams) -> list[str]:
+def feed_arm_targets(
+    ranger: str, rule: Schedule, telescope: Structure, *, faults: Faults, streams: Streams
+) -> list[str]:
     """What a ranger of the feed arm shoots once: its fellows, the triplets' prisms, nearly all dish prisms."""
     others = [r for r in FEED_ARM_RANGERS if r != ranger]
     prisms = [t.name for unit_ in telescope.triplets for t in unit_.targets if t.kind == "prism"]

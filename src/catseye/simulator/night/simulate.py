@@ -139,7 +139,7 @@ def simulate_night(
     site = _site(stands, faults, planted, streams)
     air = TrueAir(conditions, planted.gain("stratification"))
     returns = _returns(site, rule, _air_of_rangers(site, air, warmth), faults, planted, streams)
-    ordered, frames = in_time(site.heads, returns, streams, planted)
+    ordered, frames = in_time(site.heads, returns, streams, planted=planted)
     until_s = ordered[-1].shot.seconds
     weather, offsets = weather_readings(air, streams=streams, faults=faults, planted=planted, until_s=until_s)
     truth = truth_of(
@@ -168,16 +168,16 @@ def simulate_night(
         shots=[r.shot for r in ordered],
         frames=frames,
         truth=truth,
-        sounded=soundings(air, warmth, site.points, streams, until_s),
+        sounded=soundings(air, warmth, site.points, streams=streams, until_s=until_s),
     )
 
 
 def _site(stands: SimulatedTelescope, faults: Faults, planted: Planted, streams: Streams) -> NightSite:
     """Rangers, benchmarks and telescope, drawn. Raises InputError: an error planted on a stranger."""
     heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
-    monuments = {r: monument(r, heads[r], streams, planted) for r in GROUND_RANGERS}
+    monuments = {r: monument(r, heads[r], streams, planted=planted) for r in GROUND_RANGERS}
     marks = benchmarks(monuments, streams, planted)
-    pose = posture(stands.azimuth_deg, stands.elevation_deg, streams, planted)
+    pose = posture(stands.azimuth_deg, stands.elevation_deg, streams, planted=planted)
     telescope = structure(
         pose,
         dish_count=stands.dish_prisms,
@@ -217,7 +217,7 @@ def _returns(
     telescope = site.telescope
     lists = ground_targets(
         rule, monuments=site.monuments, telescope=telescope, marks=site.marks, pose=site.pose, streams=streams
-    ) | {r: feed_arm_targets(r, rule, telescope, faults, streams) for r in FEED_ARM_RANGERS}
+    ) | {r: feed_arm_targets(r, rule, telescope, faults=faults, streams=streams) for r in FEED_ARM_RANGERS}
     plan = plan_shots(rule, lists, streams)
     targets = site.targets
     return {
@@ -236,7 +236,7 @@ def _returns(
 
 
 def soundings(
-    air: TrueAir, warmth: LineWarmth, points: Mapping[str, np.ndarray], streams: Streams, until_s: float
+    air: TrueAir, warmth: LineWarmth, points: Mapping[str, np.ndarray], *, streams: Streams, until_s: float
 ) -> tuple[Sounding, ...]:
     """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
     u_sound_c = warmth.u_sound_c
@@ -270,10 +270,10 @@ def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.nda
 
 
 def in_time(
-    heads: dict[str, TrueHead], returns: dict[str, list[Return]], streams: Streams, planted: Planted
+    heads: dict[str, TrueHead], returns: dict[str, list[Return]], streams: Streams, *, planted: Planted
 ) -> tuple[list[Return], np.ndarray]:
     """All returns in the order of their triggers, with their frames."""
     every = [r for ranger in heads for r in returns[ranger]]
     order = np.argsort([r.shot.seconds for r in every], kind="stable")
-    frames = np.concatenate([sampled_frames(heads[z], returns[z], streams, planted) for z in heads])
+    frames = np.concatenate([sampled_frames(heads[z], returns[z], streams, planted=planted) for z in heads])
     return [every[i] for i in order], frames[order]

@@ -96,7 +96,7 @@ def typed_mm(point):
     return np.round(point / MILLIMETRE, 1)
 
 
-def surface_deviations(xy, streams: Streams, planted: Planted, rms_mm: float = 0.3):
+def surface_deviations(xy, streams: Streams, planted: Planted, *, rms_mm: float = 0.3):
     """Normal deviations of dish prisms (m, towards the focus): low orders of the aperture and a random part."""
     rng = streams("surface")
     x, y = ((xy - APERTURE_CENTRE) / APERTURE_RADIUS).T
@@ -112,7 +112,7 @@ def height_above_vertex(xy):
     return np.sum(xy**2, axis=-1) / (4.0 * FOCAL_LENGTH)
 
 
-def dish_prisms(count: int, pose: TruePosture, streams: Streams, planted: Planted) -> list[TrueTarget]:
+def dish_prisms(count: int, pose: TruePosture, streams: Streams, *, planted: Planted) -> list[TrueTarget]:
     """Prisms strewn over the aperture like sunflower seeds, on wedges that aim them roughly at the feed arm."""
     if count == 0:
         return []
@@ -153,7 +153,7 @@ def dish_prisms(count: int, pose: TruePosture, streams: Streams, planted: Plante
     ]
 
 
-def triplet(number: int, count: int, pose: TruePosture, streams: Streams, planted: Planted) -> TrueTriplet:
+def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, planted: Planted) -> TrueTriplet:
     """One triplet at the rim, its plate looking at the aim point, its ball the other way."""
     rng = streams(f"triplet/{number}")
     calibration = planted.gain("calibration")
@@ -223,8 +223,8 @@ def structure(
         for i, name in enumerate(FEED_ARM_RANGERS)
     }
     aim_mm = typed_mm(AIM_POINT_DESIGN + typing_error(planted, rng))
-    dish = dish_prisms(dish_count, pose, streams, planted)
-    units = [triplet(i + 1, triplet_count, pose, streams, planted) for i in range(triplet_count)]
+    dish = dish_prisms(dish_count, pose, streams, planted=planted)
+    units = [triplet(i + 1, triplet_count, pose, streams=streams, planted=planted) for i in range(triplet_count)]
     fixed, design = structural_targets(pose, streams, planted)
     design |= {f"{t.name}-B": pose.nominal(t.design) for t in units}
     dish, fixed, units, wrong = mistype(dish, fixed, units, wrong_mm=faults.wrong_position_mm, streams=streams)

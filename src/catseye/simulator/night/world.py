@@ -95,7 +95,7 @@ def head(ranger: str, streams: Streams, planted: Planted) -> TrueHead:
     )
 
 
-def monument(ranger: str, head: TrueHead, streams: Streams, planted: Planted) -> TrueMonument:
+def monument(ranger: str, head: TrueHead, streams: Streams, *, planted: Planted) -> TrueMonument:
     """A monument some 120 m from the pintle bearing, pointing at it, with the true scan point of its head."""
     rng = streams(f"monument/{ranger}")
     bearing = (12.0 + 30.0 * GROUND_RANGERS.index(ranger) + rng.uniform(-5.0, 5.0)) * DEGREE

@@ -79,7 +79,7 @@ class Twin:
         self._streams, self._planted = drawn["streams"], drawn["planted"]
         self._start_ns = round(start_mjd * PER_DAY)
         self.air = LivingAir.of(site, conditions, start_mjd, **drawn)
-        self.telescope = telescope(site, motion, start_mjd, self.air, **drawn)
+        self.telescope = telescope(site, motion, start_mjd, air=self.air, **drawn)
         self.telescope.angles(np.zeros(1))  # a motion that cannot be is refused here
         self.scene = TwinPlaces(site, **drawn)
         self.returns = Returns(self.scene, self.air, site.site.ranging, faults=self.faults, **drawn)

@@ -156,7 +156,7 @@ class Telescope:
 
 
 def telescope(
-    site: SiteFolder, motion: AxisMotion, start_mjd: float, air: LivingAir, *, streams: Streams, planted: Planted
+    site: SiteFolder, motion: AxisMotion, start_mjd: float, *, air: LivingAir, streams: Streams, planted: Planted
 ) -> Telescope:
     """The telescope of a site, drawn."""
     rest = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)
@@ -191,12 +191,12 @@ def telescope(
 def _sway(wind_m_s: float, streams: Streams, planted: Planted) -> Waves:
     """Shift of the arm's tip (6 channels): wind along x, y, z, then vibration; along the arm a tenth."""
     stiff = np.array([1.0, 1.0, 0.1])
-    wind = band(streams("wind"), WIND_TIP * (wind_m_s / 5.0) ** 2, 0.1, 0.3, channels=3).scaled(stiff)
+    wind = band(streams("wind"), WIND_TIP * (wind_m_s / 5.0) ** 2, 0.1, high=0.3, channels=3).scaled(stiff)
     rng = streams("vibration")
     parts = []
     for hertz in MODES_HZ:
         size, way = MODE_TIP * rng.uniform(0.4, 2.0), rng.normal(size=3) * stiff
-        mode = band(rng, size / np.sqrt(2.0), 0.985 * hertz, 1.015 * hertz)  # amplitude sqrt(2) times the rms
+        mode = band(rng, size / np.sqrt(2.0), 0.985 * hertz, high=1.015 * hertz)  # amplitude sqrt(2) times the rms
         way /= np.linalg.norm(way)
         parts.append(Waves(mode.omega, mode.cosine * way, mode.sine * way, np.zeros(3)))
     shaken = Waves(

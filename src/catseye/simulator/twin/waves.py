@@ -88,7 +88,7 @@ def correlated(rng: np.random.Generator, sigma: float, correlation: float, *, ch
     return _drawn(edges, sigma**2 * np.diff(below), channels, rng)
 
 
-def band(rng: np.random.Generator, sigma: float, low: float, high: float, *, channels: int = 1) -> Waves:
+def band(rng: np.random.Generator, sigma: float, low: float, *, high: float, channels: int = 1) -> Waves:
     """Noise of standard deviation sigma, even between two frequencies, Hz; it breathes in 1 / (high - low)."""
     edges = np.linspace(low, high, MODE_WAVES + 1)
     return _drawn(edges, np.full(MODE_WAVES, sigma**2 / MODE_WAVES), channels, rng)

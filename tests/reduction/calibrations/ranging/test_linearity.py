@@ -185,11 +185,11 @@ def test_the_spectrum_takes_a_claimed_drift_for_no_line():
     lower = np.linalg.cholesky(walk)
     alarms = 0
     for _ in range(runs):
-        chance = spectrum(position, lower @ rng.standard_normal(60), walk, HALF)[2]
+        chance = spectrum(position, lower @ rng.standard_normal(60), walk, half=HALF)[2]
         alarms += chance.min() < 0.05
     assert alarms / runs < 0.05 + 4 * np.sqrt(0.05 / runs)
     assert alarms > 0
-    blind = [spectrum(position, lower @ rng.standard_normal(60), np.eye(60), HALF)[2].min() for _ in range(20)]
+    blind = [spectrum(position, lower @ rng.standard_normal(60), np.eye(60), half=HALF)[2].min() for _ in range(20)]
     assert np.mean(np.array(blind) < 0.05) > 0.9
 
 

@@ -120,7 +120,7 @@ class RangeRows:
     length: np.ndarray
 
 
-def linearise(problem: Problem, state: IterationState, rows: np.ndarray, root: np.ndarray) -> RangeRows:
+def linearise(problem: Problem, state: IterationState, rows: np.ndarray, *, root: np.ndarray) -> RangeRows:
     """The ranges `rows` at a state, whitened with root (k,)."""
     station, target = problem.station[rows], problem.target[rows]
     along = state.targets[target] - state.stations[station]
@@ -198,7 +198,7 @@ class NumpyBlocks:
         inverse, own, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
         cost = gain = moment = 0.0
         for part, rows in self._chunks():
-            linear = linearise(problem, state, rows, problem.root[rows])
+            linear = linearise(problem, state, rows, root=problem.root[rows])
             v, b = self._targets(linear, part, state)
             inverse[part], condition[part] = invert_targets(v, problem.free_targets[part])
             own[part] = np.einsum("tij,tj->ti", inverse[part], b)
@@ -219,7 +219,7 @@ class NumpyBlocks:
         """The right side and cost at a state close to that of `old`, whose matrices are kept."""
         right, own, cost, gain, moment = np.zeros(self._size), np.empty_like(old.own), 0.0, 0.0, 0.0
         for part, rows in self._chunks():
-            linear = linearise(self.problem, state, rows, self.problem.root[rows])
+            linear = linearise(self.problem, state, rows, root=self.problem.root[rows])
             b = self._targets(linear, part, state)[1]
             own[part] = np.einsum("tij,tj->ti", old.inverse[part], b)
             short = linear.misclosure - np.einsum("ki,ki->k", linear.a, own[linear.target])
@@ -235,7 +235,7 @@ class NumpyBlocks:
         f = own.shape[2]
         out = np.zeros((self._stations, self.problem.width, f))
         for _, rows in self._chunks():
-            linear = linearise(self.problem, at, rows, self.problem.root[rows])
+            linear = linearise(self.problem, at, rows, root=self.problem.root[rows])
             along = np.einsum("ki,kif->kf", linear.a, own[linear.target])
             for i in range(self.problem.width):
                 for j in range(f):
@@ -271,7 +271,7 @@ class NumpyBlocks:
         moved = np.empty_like(reduced.own)
         by_station = step.reshape(self._stations, -1)
         for part, rows in self._chunks():
-            linear = linearise(self.problem, state, rows, self.problem.root[rows])
+            linear = linearise(self.problem, state, rows, root=self.problem.root[rows])
             along = np.einsum("ij,ij->i", linear.g, by_station[linear.station])
             at, n = linear.target - part.start, part.stop - part.start
             total = np.stack([np.bincount(at, linear.a[:, i] * along, n) for i in range(3)], axis=1)
@@ -287,8 +287,8 @@ class NumpyBlocks:
         covariance, h, misclosure = np.empty_like(inverse), np.empty(m), np.empty(m)
         blocks = q.reshape(self._stations, problem.width, self._stations, problem.width)
         for part, rows in self._chunks():
-            used = linearise(problem, at, rows, problem.root[rows])
-            linear = linearise(problem, at, rows, 1.0 / problem.sigma[rows])
+            used = linearise(problem, at, rows, root=problem.root[rows])
+            linear = linearise(problem, at, rows, root=1.0 / problem.sigma[rows])
             y = -self._coupling(used, part) @ inverse[part]  # dx_target = y' dx_stations + ..., (t, n, 3)
             cross = q @ y
             covariance[part] = inverse[part] + y.transpose(0, 2, 1) @ cross
@@ -297,7 +297,7 @@ class NumpyBlocks:
             h[rows] = np.einsum("ki,kij,kj->k", linear.g, blocks[s, :, s, :], linear.g)
             h[rows] += 2.0 * np.einsum("ki,kij,kj->k", linear.g, between, linear.a)
             h[rows] += np.einsum("ki,kij,kj->k", linear.a, covariance[linear.target], linear.a)
-            misclosure[rows] = linearise(problem, answer, rows, 1.0 / problem.sigma[rows]).misclosure
+            misclosure[rows] = linearise(problem, answer, rows, root=1.0 / problem.sigma[rows]).misclosure
         return Statistics(covariance, *judged(problem, h, misclosure))
 
 

@@ -251,7 +251,7 @@ class _Iteration:
         bad = np.flatnonzero(~fine & needed)
         if not len(bad):
             return None
-        return status_of.floating_targets(self.problem, self.state, self.setup.names, bad)
+        return status_of.floating_targets(self.problem, self.state, self.setup.names, floating=bad)
 
     def _null(self, motions: np.ndarray, state: IterationState) -> np.ndarray:
         """What the free motions do to the stations' parameters: (n, f)."""
@@ -291,7 +291,7 @@ class _Iteration:
         full[self.free] = part
         between = self.setup.terms.between
         joined = (between.first, between.second) if between is not None else (self.free[:0], self.free[:0])
-        return status_of.floating_network(self.problem, self.setup.names, joined, full)
+        return status_of.floating_network(self.problem, self.setup.names, joined, part=full)
 
     def _conditions(self, motions: np.ndarray, state: IterationState) -> InnerConstraints | str:
         """Inner constraints at a state, or why they do not hold the free motions."""
@@ -331,7 +331,7 @@ class _Iteration:
         count = problem.used + self.setup.terms.count()
         degrees = count - free + conditions
         if status == CONVERGED and degrees > 0 and pvv > status_of.BELIEVABLE**2 * degrees:
-            status = status_of.contradiction(problem, state, self.setup.names, known) or status
+            status = status_of.contradiction(problem, state, self.setup.names, statistics=known) or status
         return RangingSolution(
             network,
             state.stations + self.setup.origin,

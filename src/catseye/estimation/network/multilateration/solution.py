@@ -97,7 +97,7 @@ class RangingSolution:
         """(m,) m, observed minus predicted, of ranges left out as well."""
         problem = self._setup.problem
         rows = np.arange(len(problem.distance))
-        return linearise(problem, self._answer, rows, np.ones(len(rows))).misclosure
+        return linearise(problem, self._answer, rows, root=np.ones(len(rows))).misclosure
 
     @cached_property
     def estimated_error(self) -> np.ndarray:
@@ -134,7 +134,7 @@ class RangingSolution:
         place = np.full(len(self.targets), -1)
         place[targets] = np.arange(len(targets))
         rows = np.flatnonzero(place[problem.target] >= 0)
-        linear = linearise(problem, self._at, rows, problem.root[rows])
+        linear = linearise(problem, self._at, rows, root=problem.root[rows])
         y = np.zeros((len(targets), len(self.stations), self.width, 3))
         np.add.at(y, (place[linear.target], linear.station), -linear.g[:, :, None] * linear.a[:, None, :])
         return self._inverse[targets] @ y.reshape(len(targets), len(self.covariance), 3).transpose(0, 2, 1)

@@ -54,7 +54,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def floating_targets(problem: Problem, state: IterationState, names: Names, floating: np.ndarray) -> str:
+def floating_targets(problem: Problem, state: IterationState, names: Names, *, floating: np.ndarray) -> str:
     """Why the targets `floating` (indices, worst first) cannot be placed by their stations."""
     worst = int(floating[0])
     rows = np.flatnonzero((problem.target == worst) & (problem.root > 0.0))
@@ -65,7 +65,7 @@ def floating_targets(problem: Problem, state: IterationState, names: Names, floa
     elif stations < needed:
         why = f"is seen from {stations} station{'s' * (stations != 1)} only and has {needed} free coordinates"
     else:
-        a = linearise(problem, state, rows, problem.root[rows]).a[:, problem.free_targets[worst]]
+        a = linearise(problem, state, rows, root=problem.root[rows]).a[:, problem.free_targets[worst]]
         values = np.linalg.svd(a, compute_uv=False)
         line = len(values) > 1 and values[1] < 1e-6 * values[0]
         why = f"lies on one {'line' if line else 'plane'} with all {stations} stations that see it"
@@ -110,7 +110,7 @@ def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]
     return [f"[{listed(m)}]" for m in sorted(members, key=len)]
 
 
-def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], part: np.ndarray) -> str:
+def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], *, part: np.ndarray) -> str:
     """Why the reduced system is singular, `part` (n,) the share of each station parameter in what floats."""
     parts = pieces(problem, names, joined)
     if len(parts) > 1:
@@ -120,10 +120,12 @@ def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, n
     return RANK_DEFICIENT.format(names=listed(called))
 
 
-def contradiction(problem: Problem, state: IterationState, names: Names, statistics: Statistics | None) -> str | None:
+def contradiction(
+    problem: Problem, state: IterationState, names: Names, *, statistics: Statistics | None
+) -> str | None:
     """The status of a network whose residuals are beyond belief as a whole, or None; without statistics less exact."""
     rows = np.flatnonzero(problem.root > 0.0)
-    misclosure = np.abs(linearise(problem, state, rows, problem.root[rows]).misclosure)
+    misclosure = np.abs(linearise(problem, state, rows, root=problem.root[rows]).misclosure)
     median = float(np.median(misclosure))
     if median < BELIEVABLE:
         return None

@@ -193,7 +193,7 @@ def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lane
     if not len(possible):
         return
     ranges, which, lanes = ranges.of(possible), which[possible], lanes[possible]
-    start = starts(planes, which, ranges.d, ranges.u, near=chunk.of(possible).near)
+    start = starts(planes, which, ranges.d, u=ranges.u, near=chunk.of(possible).near)
     solution, status = descent.least_squares_positions(ranges, start)
     answered = status <= PositionStatus.CONTRADICTING
     part.status[lanes], part.pvv[lanes], part.iterations[lanes] = status, solution.pvv, solution.iterations

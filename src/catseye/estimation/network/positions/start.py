@@ -73,7 +73,7 @@ class Starts:
         return Starts(self.foot[lanes], self.height[lanes], self.normal[lanes], self.sign[lanes], self.side[lanes])
 
 
-def starts(planes: Planes, which: np.ndarray, d: np.ndarray, u: np.ndarray, *, near: np.ndarray | None) -> Starts:
+def starts(planes: Planes, which: np.ndarray, d: np.ndarray, *, u: np.ndarray, near: np.ndarray | None) -> Starts:
     """The closed form for targets of patterns `which` (k,), d and u as in `descent.Ranges`, near (1 or k, 3).
 
     The height comes from the mean square of the ranges, or from the stations' own spread along the normal, which also

@@ -66,6 +66,6 @@ class FramePoints(ObservationKind):
         array([ 0.,  0., -1.])
         """
         own = self.columns[:, 9]
-        local, slope = in_frame(x, self.point, self.pose, self.start)
+        local, slope = in_frame(x, self.point, self.pose, start=self.start)
         jacobian = np.concatenate([slope.reshape(-1, 9), np.where(own < 0, 0.0, -1.0)[:, None]], axis=1)
         return local.ravel() - value(x, own), jacobian

@@ -53,6 +53,6 @@ class PointsOnSphere(ObservationKind):
         array([0.5])
         """
         radius = self.columns[:, 6]
-        size, unit = length(sight(x, self.centre, self.point, None))
+        size, unit = length(sight(x, self.centre, self.point, shift=None))
         jacobian = np.concatenate([both(unit), np.where(radius < 0, 0.0, -1.0)[:, None]], axis=1)
         return size - self.radius - value(x, radius), jacobian

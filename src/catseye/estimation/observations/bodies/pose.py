@@ -58,7 +58,7 @@ def turned_back(vector: np.ndarray, w: np.ndarray, start: np.ndarray) -> tuple[n
     return local, back @ np.swapaxes(turn, -1, -2), back @ skew(y) @ right_jacobian(w)
 
 
-def in_frame(x: np.ndarray, point: np.ndarray, pose: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def in_frame(x: np.ndarray, point: np.ndarray, pose: np.ndarray, *, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ground points in a frame's coordinates, R' (X - T), and their derivatives.
 
     x       parameters

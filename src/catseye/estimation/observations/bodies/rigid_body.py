@@ -60,5 +60,5 @@ class RigidBodies(ObservationKind):
         >>> b.predict(np.array([5.0, 2.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2]))[0].round(12)
         array([2., 0., 0.])
         """
-        local, slope = in_frame(x, self.point, self.pose, self.start)
+        local, slope = in_frame(x, self.point, self.pose, start=self.start)
         return local.ravel(), slope.reshape(-1, 9)

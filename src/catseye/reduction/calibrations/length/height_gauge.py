@@ -139,7 +139,7 @@ def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Cal
         observed,
         predict,
         parameters,
-        scatter,
+        scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, solution, [name for name in OFFSETS if name in sought])

@@ -122,7 +122,7 @@ def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibr
         observed.ravel(),
         predict,
         parameters,
-        scatter,
+        scatter=scatter,
         options=FitOptions(
             active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
         ),
@@ -197,7 +197,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
             *_effects(sheet, solution),
             "a mirror's record has one u_axis_mm for four values and one u_tilt_rad for three; these are of the beam "
             "alone: keep the larger of them and the record's",
-            *scatter_notes(fit, "mm", 1.0, 4),
+            *scatter_notes(fit, "mm", 1.0, sought=4),
         ),
         curve=_circles(readings, solution),
         axes=("p, from the screen's middle (mm)", "q, from the screen's middle (mm)"),

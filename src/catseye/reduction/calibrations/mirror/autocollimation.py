@@ -104,11 +104,11 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
         p = dict(zip(names, values, strict=True))
         theta = azimuth_angle(na + aside[0], p["N_a0"])
         shaft = 0.5 * elevation_angle(ne + aside[1], p["N_e0"])
-        normal = face_normal(theta, shaft, p["face tilt"], p["axis tilt"])
+        normal = face_normal(theta, shaft, p["face tilt"], axis_tilt=p["axis tilt"])
         beta, alignment = [p["beta1"], p["beta2"]], [p["lean x"], p["lean y"], p["roll"]]
         reading = mirror_reading(normal, beta, alignment)
         if flat.any():
-            reading[flat] = flat_reading(normal[flat], beta, alignment, [p["flat up"], p["flat along"]])
+            reading[flat] = flat_reading(normal[flat], beta, alignment, flat=[p["flat up"], p["flat along"]])
         return (shown * (1.0 + p["scale"]) * reading).ravel()
 
     start = np.array([p.start for p in parameters])
@@ -120,7 +120,7 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
         observed,
         predict,
         parameters,
-        _scatter(readings, shaking),
+        scatter=_scatter(readings, shaking),
         options=FitOptions(
             active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
         ),
@@ -278,7 +278,7 @@ def _circles(
     curves = [np.full((1, 2), np.nan)]
     for ne in np.unique(readings.get("elevation_counts")[~flat]):
         shaft = 0.5 * elevation_angle(ne, solution.value("N_e0"))
-        normal = face_normal(theta, shaft, solution.value("face tilt"), solution.value("axis tilt"))
+        normal = face_normal(theta, shaft, solution.value("face tilt"), axis_tilt=solution.value("axis tilt"))
         alignment = [solution.value(name) for name in ("lean x", "lean y", "roll")]
         reading = mirror_reading(normal, [solution.value("beta1"), solution.value("beta2")], alignment)
         curves += [0.5 * reading / ARCSECOND, np.full((1, 2), np.nan)]

@@ -93,7 +93,7 @@ def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calib
         measured,
         predict,
         parameters,
-        scatter,
+        scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=readings.sheet.level),
     )
     return _calibration(readings, solution, words, known)

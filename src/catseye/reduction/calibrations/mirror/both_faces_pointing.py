@@ -126,7 +126,7 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
         observed.ravel(),
         predict,
         parameters,
-        scatter,
+        scatter=scatter,
         options=FitOptions(
             active=np.repeat(readings.active, 2),
             together=np.repeat(np.arange(m), 2),

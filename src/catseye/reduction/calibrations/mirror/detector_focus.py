@@ -152,7 +152,11 @@ def _fitted(
     )
     on = readings.active if active is None else active
     return fit_curved(
-        observed, model, parameters, scatter, options=FitOptions(active=on, reject=reject, level=readings.sheet.level)
+        observed,
+        model,
+        parameters,
+        scatter=scatter,
+        options=FitOptions(active=on, reject=reject, level=readings.sheet.level),
     )
 
 

@@ -117,7 +117,7 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
         counts,
         predict,
         parameters,
-        scatter,
+        scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     return _calibration(readings, solution, turn + solution.values[waves : waves + n][which])
@@ -193,7 +193,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) 
         notes=(
             f"the waves reach {np.abs(_wave(TURN, terms, order)).max():.2f} counts; one count is "
             f'{DEGREE / ARCSECOND * 360 / COUNTS_PER_TURN:.2f}" of the axis',
-            *scatter_notes(fit, "counts", 1.0, 2 * n),
+            *scatter_notes(fit, "counts", 1.0, sought=2 * n),
         ),
         curve={
             "readings": (psi[on] / DEGREE, observed[on]),

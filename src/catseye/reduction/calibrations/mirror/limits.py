@@ -73,7 +73,7 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
             ModelParameter(f"{name} stop", float(np.median(counts[there])), 0.1)
             for name, there in (("low", ~high), ("high", high))
         ],
-        scatter,
+        scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
     single = claimed if claimed is not None else solution.fit.components["scatter of a touch"]

@@ -141,7 +141,7 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
         observed.ravel(),
         predict,
         parameters,
-        ObservedScatter(np.diag(_u_counts(readings).ravel() ** 2)),
+        scatter=ObservedScatter(np.diag(_u_counts(readings).ravel() ** 2)),
         options=FitOptions(
             active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
         ),

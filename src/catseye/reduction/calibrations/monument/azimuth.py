@@ -129,7 +129,9 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDi
 
     def predicted(azimuth: float, changed: SightConditions) -> np.ndarray:
         turned, zenith = geometry_of(sights, azimuth, changed)
-        lean = leaning(sights, turned, zenith, sheet.lean_x_arcsec * ARCSECOND, sheet.lean_z_arcsec * ARCSECOND)
+        lean = leaning(
+            sights, turned, zenith, lean_x=sheet.lean_x_arcsec * ARCSECOND, lean_z=sheet.lean_z_arcsec * ARCSECOND
+        )
         return turned + lean
 
     def slope(step: float, up: tuple[float, SightConditions], down: tuple[float, SightConditions]) -> np.ndarray:
@@ -158,8 +160,16 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
     effects = [
         Effect("collimation, arcsec", per * sights.face / np.sin(zenith), sheet.u_collimation_arcsec),
         Effect("trunnion axis, arcsec", per * sights.face / np.tan(zenith), sheet.u_trunnion_arcsec),
-        Effect("lean of the axis to x^, arcsec", leaning(sights, turned, zenith, per, 0.0), sheet.u_lean_arcsec),
-        Effect("lean of the axis to z^, arcsec", leaning(sights, turned, zenith, 0.0, per), sheet.u_lean_arcsec),
+        Effect(
+            "lean of the axis to x^, arcsec",
+            leaning(sights, turned, zenith, lean_x=per, lean_z=0.0),
+            sheet.u_lean_arcsec,
+        ),
+        Effect(
+            "lean of the axis to z^, arcsec",
+            leaning(sights, turned, zenith, lean_x=0.0, lean_z=per),
+            sheet.u_lean_arcsec,
+        ),
     ]
     for k, reference in enumerate(sheet.reference):
         rows = sights.are("reference") & (sights.which == k)
@@ -334,7 +344,7 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
             "stars: UT1 - UTC = "
             f"{sheet.ut1_utc_s:g} s, u {sheet.u_ut1_utc_s:g} s, as the sheet states" if sights.are("star").any()
             else "no star was seen",
-            *scatter_notes(fit, "arcsec", ARCSECOND, 1),
+            *scatter_notes(fit, "arcsec", ARCSECOND, sought=1),
         ),
         curve={
             "readings": (number[on], residual[on]),

@@ -180,7 +180,7 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditi
                 POLARIS if k < 0 else star_of(sheet.star[k]),
                 mjd[rows],
                 latitude,
-                longitude,
+                longitude=longitude,
                 height=float(points[0, 2]) + frame.height,
                 ut1_utc=sheet.ut1_utc_s + changed.time,
                 pole=(
@@ -206,7 +206,7 @@ def star_of(entry: CataloguedStar) -> Star:
 
 
 def leaning(
-    sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray, lean_x: float, lean_z: float
+    sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray, *, lean_x: float, lean_z: float
 ) -> np.ndarray:
     """What the lean of the vertical axis adds to each reading in the field, rad.
 

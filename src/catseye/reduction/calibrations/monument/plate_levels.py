@@ -186,7 +186,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
             "ground frame's z, by the curvature of the earth and the deflection of the vertical; this is taken out",
             "the plate was not turned: its wedge is in u with u_wedge_arcsec" if "plate_deg" not in readings.numbers
             else "the plate was turned on its balls: its wedge is found from the readings",
-            *scatter_notes(fit, "arcsec", ARCSECOND, 2),
+            *scatter_notes(fit, "arcsec", ARCSECOND, sought=2),
         ),
         curve={
             "readings": (where[on], cleared[on]),

@@ -173,7 +173,7 @@ def _calibration(
             f"{effect / MILLIRADIAN:+.3g} mrad of phase",
             f"u from the scatter alone {np.sqrt(fit.scattered[0, 0]) / MILLIRADIAN:.2g} mrad; the rest is leakage left "
             "over",
-            *scatter_notes(fit, "mrad", MILLIRADIAN, 1),
+            *scatter_notes(fit, "mrad", MILLIRADIAN, sought=1),
         ),
         curve={
             "readings": (level[on], observed[on] / MILLIRADIAN),

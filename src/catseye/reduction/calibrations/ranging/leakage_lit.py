@@ -186,7 +186,7 @@ def _calibration(
             f"the light has {radius / MILLIVOLT:.4g} mV, the leakage {abs(leakage) / radius:.2%} of it",
             f"u_leakage_volt of the record is {to_come / MILLIVOLT:.3g} mV: of the centre {u_centre / MILLIVOLT:.3g} mV"
             f", and u_session_volt = {sheet.u_session_volt:g} of the sheet",
-            *scatter_notes(fit, "mV", MILLIVOLT, 2),
+            *scatter_notes(fit, "mV", MILLIVOLT, sought=2),
         ),
         curve={
             "readings": (z[on].real / MILLIVOLT, z[on].imag / MILLIVOLT),

@@ -256,7 +256,7 @@ def _calibration(
         }
     on, residual = fit.active, fit.residual / micrometre
     noise = _covariance(rail, fit)[np.ix_(on, on)]
-    period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, rail.half)
+    period, height, chance = spectrum(rail.path[on], fit.residual[on], noise, half=rail.half)
     smooth = rail.observed - fit.predicted
     dense = np.linspace(rail.length[on].min(), rail.length[on].max(), 2000)
     return Calibration(

@@ -208,7 +208,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
                 for name, d, s in zip(unknown, difference, scatter, strict=True)
             ),
             *([f"drift removed: {', '.join(f'{d:+.3g}' for d in drifts)} µm/h"] if sheet.drift else []),
-            *scatter_notes(fit, "µm", micrometre, count),
+            *scatter_notes(fit, "µm", micrometre, sought=count),
         ),
         curve={
             "readings": (hours[on], drawn[on]),

@@ -11,7 +11,7 @@ WORST_CONDITION = 1e6  # of the two waves of a period: a sine that vanishes at e
 
 
 def spectrum(
-    position: np.ndarray, residual: np.ndarray, covariance: np.ndarray, half: float
+    position: np.ndarray, residual: np.ndarray, covariance: np.ndarray, *, half: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Period (k,) m, amplitude (k,) m of the best wave of each, and chance (k,) of as strong a line without a cause.
 
