@@ -134,7 +134,9 @@ def _one(stations, path, targets, own, frame, begin, interval, shares) -> tuple[
     rate = np.sum(relative * speed[None], axis=-1) / distance
     across = np.sqrt(np.maximum(np.sum(speed[None] ** 2, axis=-1) - rate**2, 0.0))
     most = 1.05 * np.linalg.norm(bend, axis=-1)[None] + 1e-4
-    bound = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape), interval=interval)[2]
+    bound = line_bound(
+        seen[0], np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape), interval=interval
+    )[2]
     apparent = np.linalg.norm(seen[1], axis=-1), np.broadcast_to(most, distance.shape)
     longest = longest_interval(seen[0], *apparent)
     mirror = in_mirror_axes(stations[:, None], place[None])

@@ -102,7 +102,9 @@ def use_table() -> str:
         wrong = obliquity_correction(u.heights, u.ratio, memo) - obliquity_correction(u.heights, u.ratio, cosine)
         angles.append(np.abs(wrong).max())
         kept.append(np.abs(wrong.mean(axis=1)).max())
-        found = ball_ranges([u], scan, (d - obliquity_correction(u.heights, u.ratio, cosine))[None], covariance=np.zeros((12, 12)))
+        found = ball_ranges(
+            [u], scan, (d - obliquity_correction(u.heights, u.ratio, cosine))[None], covariance=np.zeros((12, 12))
+        )
         sight = (scan - u.ball) / np.linalg.norm(scan - u.ball, axis=1, keepdims=True)
         square.append(np.abs(ball_distance_memo(found.d_mp[0], sight, u.h_corr * u.normal) - found.d_bc[0]).max())
     return "\n".join(

@@ -1,7 +1,6 @@
 """What a calibration gives, whatever was calibrated: quantities with covariance, residuals, decisions, provenance."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -72,7 +71,7 @@ class Calibration:
 
     kind: str
     title: str
-    provenance: dict[str, Any]
+    provenance: dict[str, object]
     quantities: tuple[Quantity, ...]
     covariance: np.ndarray
     columns: tuple[str, ...]

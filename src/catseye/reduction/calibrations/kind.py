@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +27,7 @@ class CalibrationKind:
     recipe: Callable[[SheetReadings, bool], Calibration]
 
 
-def provenance(readings: SheetReadings) -> dict[str, Any]:
+def provenance(readings: SheetReadings) -> dict[str, object]:
     """Who measured what with which files, then every other key of the sheet as it was given."""
     sheet = readings.sheet
     stated = {key: getattr(sheet, key) for key in PROVENANCE}

@@ -5,7 +5,7 @@
 A block that stands in several stacks brings its certificate's uncertainty into all of them, as one effect.
 """
 
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, TypedDict
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -229,7 +229,7 @@ def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np
 class CommonParts(TypedDict):
     """What calibrations by blocks and of spacers have alike; see `Calibration` for the words."""
 
-    provenance: dict[str, Any]
+    provenance: dict[str, object]
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     decisions: tuple[TestOutcome, ...]

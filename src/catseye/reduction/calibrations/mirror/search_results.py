@@ -11,7 +11,7 @@ both are right; that is tested as a whole (chi-square) and for each parameter.
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, field_serializer
@@ -68,7 +68,7 @@ class SearchSheet(Sheet):
     mirror: Annotated[MirrorGeometry, Field()]
 
     @field_serializer("monument", "mirror")
-    def _as_given(self, record: MonumentGeometry | MirrorGeometry) -> dict[str, Any]:
+    def _as_given(self, record: MonumentGeometry | MirrorGeometry) -> dict[str, object]:
         return record.model_dump(exclude_unset=True)
 
 
