@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from datetime import datetime
 from html import escape
-from typing import Any
+from typing import Any, cast
 
 from catseye.gateways.calibrations.certificate_figure import calibration_figure
 from catseye.gateways.calibrations.certificate_record import record_lines
@@ -170,12 +170,13 @@ def _readings(calibration: Calibration) -> str:
 
 def _inputs(calibration: Calibration, when: datetime) -> str:
     provenance = calibration.provenance
-    settings = [(key, str(value)) for key, value in provenance["sheet"].items()]
+    sheet, hashes = (cast(dict[str, object], provenance[key]) for key in ("sheet", "inputs_sha256"))
+    settings = [(key, str(value)) for key, value in sheet.items()]
     return section(
         "provenance",
         "Provenance",
         paragraph(f"Computed {when:%Y-%m-%d %H:%M:%S} UTC by catseye {versions()['catseye']}."),
-        table(("input", "SHA-256"), list(provenance["inputs_sha256"].items()), "th"),
+        table(("input", "SHA-256"), list(hashes.items()), "th"),
         "<h3>Stated in the sheet</h3>",
         table(("key", "value"), settings, "tt"),
         folded("Programs", table(("part", "version"), list(versions().items()), "tt")),

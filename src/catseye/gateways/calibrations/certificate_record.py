@@ -5,7 +5,7 @@ import math
 import re
 from collections.abc import Iterable
 from datetime import date
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def calibration_toml(calibration: Calibration) -> str:
     rows = ",\n".join(f"  {_value([_cell(cell) for cell in row])}" for row in calibration.rows)
     lines += ["", "[readings]", f"columns = {_value(list(calibration.columns))}", f"rows = [\n{rows},\n]"]
     for name in ("inputs_sha256", "sheet"):
-        lines += ["", *_table(name, provenance[name])]
+        lines += ["", *_table(name, cast(dict[str, Any], provenance[name]))]
     return "\n".join(lines) + "\n"
 
 
