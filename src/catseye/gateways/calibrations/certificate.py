@@ -176,7 +176,7 @@ def _inputs(calibration: Calibration, when: datetime) -> str:
         "provenance",
         "Provenance",
         paragraph(f"Computed {when:%Y-%m-%d %H:%M:%S} UTC by catseye {versions()['catseye']}."),
-        table(("input", "SHA-256"), list(hashes.items()), "th"),
+        table(("input", "SHA-256"), [(name, str(digest)) for name, digest in hashes.items()], "th"),
         "<h3>Stated in the sheet</h3>",
         table(("key", "value"), settings, "tt"),
         folded("Programs", table(("part", "version"), list(versions().items()), "tt")),
