@@ -38,7 +38,7 @@ def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, *, focal_length:
 
     Source: [BAARS07]; derived above. Good to deviation^2 / f.
 
-    >>> round(float(half_path(1e-3, 0.0, 120.0, 60.0)) * 1e3, 6)
+    >>> round(float(half_path(1e-3, 0.0, 120.0, focal_length=60.0)) * 1e3, 6)
     0.707107
     """
     return np.asarray(deviation, dtype=float) * cos_incidence(x, y, focal_length)

@@ -89,7 +89,7 @@ def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, *, gr
     Source: derived here, -h^2/2 sum power (n_g - n_p)/(n_p - 1): each element is thinner at h by h^2 power/2(n_p - 1).
     [BOR88] has it for a single lens. Paraxial; `traced_lens` is exact.
 
-    >>> round(float(lens_group_lag(0.025, 1 / 0.2, 1.511187, 1.527464)) * 1e6, 2)
+    >>> round(float(lens_group_lag(0.025, 1 / 0.2, 1.511187, group=1.527464)) * 1e6, 2)
     -49.75
     """
     power, n_p, n_g = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (powers, phase, group))

@@ -43,7 +43,7 @@ def hydrostatic_pressure_hpa(
     Source: [CIDDOR96] appendix A, ideal gas in hydrostatic balance. Good to 0.01 hPa over 100 m when the mean
     temperature is known to 0.2 °C.
 
-    >>> round(float(hydrostatic_pressure_hpa(933.0, 20.0, 0.0, 100.0)), 3)
+    >>> round(float(hydrostatic_pressure_hpa(933.0, 20.0, 0.0, z_to=100.0)), 3)
     922.19
     """
     p = np.asarray(pressure_hpa, float)
@@ -65,7 +65,7 @@ def interpolate_height(z, z1, v1, *, z2, v2):
     Source: first degree in height, [PARKER04] section 1.3. Two stations at one height give their mean everywhere.
     As good as the profile is straight: near the ground on a sunny day it is not.
 
-    >>> float(interpolate_height(25.0, 0.0, 20.0, 50.0, 19.0))
+    >>> float(interpolate_height(25.0, 0.0, 20.0, z2=50.0, v2=19.0))
     19.5
     """
     z, z1, v1, z2, v2 = (np.asarray(value, float) for value in (z, z1, v1, z2, v2))

@@ -76,7 +76,7 @@ def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, *, frequency_hz
 
     Source: [PIERCE19] chapter 10; relaxation frequencies [ISO93]. Raises ValidityError for the frequency.
 
-    >>> round(float(dispersion(20.0, 1013.25, 0.0, 10e3).phase) * 1e6)
+    >>> round(float(dispersion(20.0, 1013.25, 0.0, frequency_hz=10e3).phase) * 1e6)
     399
     """
     FREQUENCY.check(frequency_hz)

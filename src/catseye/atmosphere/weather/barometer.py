@@ -270,7 +270,7 @@ class CarriedPressure(NamedTuple):
 
         Source: [JCGM100] eq. 10.
 
-        >>> top = carried_pressure(933.0, 20.0, 803.8, 951.8)
+        >>> top = carried_pressure(933.0, 20.0, 803.8, z_to=951.8)
         >>> round(float(top.standard_uncertainty_hpa(0.1, u_temperature_c=1.0)), 3)
         0.112
         """
@@ -305,7 +305,7 @@ def carried_pressure(
     Source: [ICAO93] eqs. of the layers with lapse, with [CIDDOR96]'s molar masses; ideal gas. Good to 0.005 hPa over
     150 m with exact inputs, 4e-4 of the fall.
 
-    >>> round(float(carried_pressure(1013.25, 15.0, 0.0, 1000.0).pressure_hpa), 2)
+    >>> round(float(carried_pressure(1013.25, 15.0, 0.0, z_to=1000.0).pressure_hpa), 2)
     898.75
     """
     PRESSURE.check(pressure_hpa)

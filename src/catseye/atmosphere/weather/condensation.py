@@ -90,7 +90,7 @@ def condensation(surface_c, temperature_c, pressure_hpa, *, humidity_percent, u=
     Raises ValidityError outside these limits, for an uncertainty below zero, and for a covariance above u u.
     Source: [PARKER04] section 1.4.1 with eqs. 1.3, 1.4, 1.7; [JCGM100] eq. 13.
 
-    >>> risk = condensation(5.0, 10.0, 933.0, 75.0, u=CondensationSpread(surface_c=0.5))
+    >>> risk = condensation(5.0, 10.0, 933.0, humidity_percent=75.0, u=CondensationSpread(surface_c=0.5))
     >>> round(float(risk.margin_k), 2), str(risk.deposit), round(float(risk.probability), 2)
     (-0.78, 'dew', 0.94)
     """

@@ -30,7 +30,7 @@ def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, *, directio
 
     >>> flat = MirrorStation([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
     >>> up = [[0.0, 0.0, 1.0]]  # is y of this mirror: Theta = Phi = a quarter turn
-    >>> nearest(flat, [0.0, 12_500.0], [20_000.0, 13_000.0], up).round(6).tolist()  # 5000 counts of azimuth short
+    >>> nearest(flat, [0.0, 12_500.0], [20_000.0, 13_000.0], directions=up).round(6).tolist()  # 5000 counts short
     [0.314159]
     """
     s = np.asarray(directions, dtype=float).reshape(-1, 3) @ station.mirror_from_ground.T

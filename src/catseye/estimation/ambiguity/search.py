@@ -130,7 +130,7 @@ def locate(
 
     >>> s = np.array([[60.0, 0, 0], [0, 60, 0], [-60, 0, 5], [0, -60, -5], [40, 40, 20]])
     >>> l = np.mod(np.linalg.norm(s - [1.0, 2.0, 30.0], axis=1), 0.1)
-    >>> located = locate([1.2, 1.9, 30.2], 0.04 * np.eye(3), s, l, period=0.1, covariance=np.full(5, 1e-8))
+    >>> located = locate([1.2, 1.9, 30.2], 0.04 * np.eye(3), s, lengths=l, period=0.1, covariance=np.full(5, 1e-8))
     >>> located.status.name, located.x.round(6).tolist(), located.cycles[:3].tolist()
     ('FOUND', [1.0, 2.0, 30.0], [662, 653, 659])
     """

@@ -310,7 +310,7 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
     Raises EstimationError for a pillar whose side the distances do not tell.
 
     Pillars are placed one after the other, on either side of those before them; the distances that close tell which.
-    >>> places_in_line([0, 0, 1], [1, 2, 2], [20.0, 120.0, 100.0], 3)
+    >>> places_in_line([0, 0, 1], [1, 2, 2], [20.0, 120.0, 100.0], count=3)
     array([  0.,  20., 120.])
     """
     length: dict[tuple[int, int], float] = {}

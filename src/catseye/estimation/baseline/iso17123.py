@@ -58,7 +58,7 @@ def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
     Source: [ISO12], full test procedure, there for seven points and 21 distances. Raises EstimationError where the
     distances do not determine the zero, or leave nothing redundant.
 
-    >>> result = full_test([0, 0, 1, 0, 1, 2], [1, 2, 2, 3, 3, 3], [1.1, 3.1, 2.1, 6.1, 5.1, 3.1], [0, 1, 2, 3])
+    >>> result = full_test([0, 0, 1, 0, 1, 2], [1, 2, 2, 3, 3, 3], [1.1, 3.1, 2.1, 6.1, 5.1, 3.1], order=[0, 1, 2, 3])
     >>> round(result.zero, 12), result.degrees_of_freedom
     (0.1, 2)
     """
@@ -120,7 +120,7 @@ def same_precision(s: float, degrees_of_freedom: int, s_before: float, *, before
 
     Source: [ISO12], statistical tests.
 
-    >>> test = same_precision(1.0, 14, 1.0, 14)
+    >>> test = same_precision(1.0, 14, 1.0, before=14)
     >>> round(test.lower, 2), round(test.limit, 2)
     (0.34, 2.98)
     """

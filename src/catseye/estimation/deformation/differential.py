@@ -114,7 +114,7 @@ def displacements(
     >>> stations = np.array([[50.0, 0, 0], [0, 50, 0], [0, 0, 50], [-30, -30, -30]])
     >>> truth = np.array([0.001, -0.002, 0.003])
     >>> changes = change_of_range(stations, np.zeros(3), truth)
-    >>> displacements(stations, np.zeros(3), changes, 1e-5).displacement[0].round(12)
+    >>> displacements(stations, np.zeros(3), changes, sigma=1e-5).displacement[0].round(12)
     array([ 0.001, -0.002,  0.003])
     """
     points = np.asarray(approximate_points, dtype=float)

@@ -10,7 +10,7 @@ from catseye.gateways.calibrations.certificate_figure import calibration_figure
 from catseye.gateways.calibrations.certificate_record import record_lines
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
 
 TITLE = "Certificate of calibration"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours
@@ -152,7 +152,7 @@ def _tests(calibration: Calibration) -> str:
     )
 
 
-def _outcome(decision: TestOutcome) -> str:
+def _outcome(decision: CheckOutcome) -> str:
     return "–" if decision.passed is None else "passed" if decision.passed else "FAILED"
 
 

@@ -189,7 +189,7 @@ def line_bound(
 
     Source: derived at the top of this file. A strict bound, larger than what happens by a factor of some 2 to 5.
 
-    >>> counts, angle, way = line_bound([0.0, 120.0, 0.0], 1.0, 0.0, 0.128)
+    >>> counts, angle, way = line_bound([0.0, 120.0, 0.0], 1.0, 0.0, interval=0.128)
     >>> counts.round(5).tolist(), round(float(way), 7)
     ([0.00227, 0.00113], 2.42e-05)
     """

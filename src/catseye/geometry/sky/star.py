@@ -81,7 +81,7 @@ def star_place(
 
     Source: [SOFA23] (SOFA's Atco13 as pyerfa has it); 1 mas for given UT1, pole and star.
 
-    >>> azimuth, zenith = star_place(POLARIS, 61_280.0, 0.67, -1.39)
+    >>> azimuth, zenith = star_place(POLARIS, 61_280.0, 0.67, longitude=-1.39)
     >>> bool(abs(zenith - (np.pi / 2 - 0.67)) < np.radians(0.7))
     True
     """

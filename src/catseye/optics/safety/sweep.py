@@ -61,8 +61,9 @@ def repetition_factor(count: float, duration: float, subtense: float, *, wavelen
     Source: [IEC14] clause 4.3 f 3. For points and pulses longer than T_i it is 1; before 2014 it was count^(-1/4)
     always.
 
-    >>> repetition_factor(1000, 1e-3, 1.5e-3, 0.780, 10.0), round(repetition_factor(1000, 1e-6, 1.5e-3, 0.780, 10.0), 3)
-    (1.0, 0.889)
+    >>> factors = [repetition_factor(1000, t, 1.5e-3, wavelength_um=0.780, total=10.0) for t in (1e-3, 1e-6)]
+    >>> [round(factor, 3) for factor in factors]
+    [1.0, 0.889]
     """
     f = factors(wavelength_um, duration, subtense)
     if duration > 0.25 or count <= 1.0:

@@ -20,7 +20,7 @@ from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights
 from catseye.reduction.baseline.job import BaselineJob, Progress
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
 from catseye.reduction.baseline.statistical_tests import FOLLOWS, SuspectShot, decisions_of
-from catseye.reduction.calibrations.calibration import TestOutcome
+from catseye.reduction.calibrations.calibration import CheckOutcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class BaselineCalibration:
     test: FullTest | str
     all_shots: FullTest | None
     against: Baseline | None
-    decisions: tuple[TestOutcome, ...]
+    decisions: tuple[CheckOutcome, ...]
     suspects: tuple[SuspectShot, ...]
     rejected: tuple[str, ...]
     cyclic: tuple[str, ...]

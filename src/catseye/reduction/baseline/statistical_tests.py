@@ -8,7 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.adjustment import BaselineSolution
 from catseye.estimation.baseline.iso17123 import FullTest, is_nothing, same_precision, within_claim
-from catseye.reduction.calibrations.calibration import TestOutcome
+from catseye.reduction.calibrations.calibration import CheckOutcome
 
 if TYPE_CHECKING:
     from catseye.records.laboratory.baseline import Baseline
@@ -91,7 +91,7 @@ def decisions_of(
     weather: tuple[float, float],
     against: "Baseline | None",
     suspects: tuple[SuspectShot, ...],
-) -> tuple[TestOutcome, ...]:
+) -> tuple[CheckOutcome, ...]:
     """Every test with its outcome.
 
     solution    the adjustment
@@ -109,7 +109,7 @@ def decisions_of(
         _setups(solution, level),
         _weather(weather, solution.freedom_sets, level),
         *(_instrument(solution, agreement, level) if agreement is not None else ()),
-        TestOutcome(
+        CheckOutcome(
             "outliers",
             float(len(suspects)),
             0.0,
@@ -121,14 +121,14 @@ def decisions_of(
 
 def _standard(
     test: FullTest | str, claimed: FullTest | None, settings: "BaselineSettings", against: "Baseline | None"
-) -> list[TestOutcome]:
+) -> list[CheckOutcome]:
     """The standard's three questions; sets, each one distance, are the sample."""
     if isinstance(test, str) or claimed is None:
-        return [TestOutcome(f"ISO 17123-4 {q}", float("nan"), float("nan"), None, str(test)) for q in "ac"]
+        return [CheckOutcome(f"ISO 17123-4 {q}", float("nan"), float("nan"), None, str(test)) for q in "ac"]
     claim = within_claim(claimed.s**2, claimed.degrees_of_freedom, settings.level)
     words = f"{settings.specified_mm:g} mm + {settings.specified_ppm:g} ppm"
     text = f"sets scatter {'as' if claim.passed else 'more than'} specified ({words})"
-    outcomes = [TestOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
+    outcomes = [CheckOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
     if against is not None and against.s_mm is not None and against.degrees_of_freedom:
         same = same_precision(
             test.s / MILLIMETRE,
@@ -141,21 +141,21 @@ def _standard(
             f"s {test.s / MILLIMETRE:.3f} mm here, {against.s_mm:.3f} mm at the known baseline; "
             f"the ratio of squares must be {same.lower:.3g} at least, too"
         )
-        outcomes.append(TestOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
+        outcomes.append(CheckOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
     zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, level=settings.level)
     text = f"zero {test.zero / MILLIMETRE:+.3f} ± {test.u_zero / MILLIMETRE:.3f} mm is "
     text += "not significant" if zero.passed else "significant: correct for it"
-    return [*outcomes, TestOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
+    return [*outcomes, CheckOutcome("ISO 17123-4 c: zero", zero.statistic, zero.limit, zero.passed, text)]
 
 
-def _setups(solution: BaselineSolution, level: float) -> TestOutcome:
+def _setups(solution: BaselineSolution, level: float) -> CheckOutcome:
     """Do sets disagree by more than their shots do? F of the means' squares over the shots'."""
     from scipy.stats import f
 
     name = "sets agree as their shots do"
     between, within = solution.freedom_sets, solution.freedom_shots
     if within < 1 or between < 1:
-        return TestOutcome(name, float("nan"), float("nan"), None, "no repeated shots: the test is not possible")
+        return CheckOutcome(name, float("nan"), float("nan"), None, "no repeated shots: the test is not possible")
     squares = float(np.sum(solution.used.within**2)) / within
     means = float(np.sum(solution.used.shots * solution.residual**2)) / between
     ratio = means / squares if squares > 0.0 else float("inf")
@@ -165,34 +165,36 @@ def _setups(solution: BaselineSolution, level: float) -> TestOutcome:
         if ratio <= limit
         else "repeats hide most of it: pointing, centring and the air change from set to set"
     )
-    return TestOutcome(name, ratio, limit, ratio <= limit, text)
+    return CheckOutcome(name, ratio, limit, ratio <= limit, text)
 
 
-def _weather(weather: tuple[float, float], freedom: int, level: float) -> TestOutcome:
+def _weather(weather: tuple[float, float], freedom: int, level: float) -> CheckOutcome:
     name = FOLLOWS
     share, u = weather
     if not np.isfinite(share):
-        return TestOutcome(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
+        return CheckOutcome(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
     one = is_nothing(share - 1.0, u, max(freedom - 1, 1), level=level)
     text = f"lengths followed {share:.2f} ± {u:.2f} of the changes of index that the sensors say (1 expected)"
     if not one.passed and abs(share) < abs(share - 1.0):
         text += ": as if corrected in the field already, or thermometers not in the air of the path"
-    return TestOutcome(name, one.statistic, one.limit, one.passed, text)
+    return CheckOutcome(name, one.statistic, one.limit, one.passed, text)
 
 
-def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: float) -> tuple[TestOutcome, ...]:
+def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: float) -> tuple[CheckOutcome, ...]:
     """Zero and scale against known pillars, and whether the sets agree with those as well as the maker claims."""
     outcomes = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)
         test = is_nothing(value, u, solution.freedom_of(key), level=level)
         text = f"{key} {value / scale:+.3f} ± {u / scale:.3f} {unit} against the known pillars"
-        outcomes.append(TestOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text))
+        outcomes.append(
+            CheckOutcome(f"{key} against the known baseline", test.statistic, test.limit, test.passed, text)
+        )
     freedom = agreement.freedom_sets
     if freedom > 0:
         fit = within_claim(agreement.sets_squares / freedom, freedom, level)
         text = f"sets {'agree' if fit.passed else 'do not agree'} with the known pillars as well as is claimed for both"
-        outcomes.append(TestOutcome("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
+        outcomes.append(CheckOutcome("agreement with the known baseline", fit.statistic, fit.limit, fit.passed, text))
     return tuple(outcomes)
 
 

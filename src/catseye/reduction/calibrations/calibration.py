@@ -30,7 +30,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class TestOutcome:
+class CheckOutcome:
     """A statistical test or a comparison with a limit, with its outcome.
 
     name       "outliers: largest |w|"
@@ -76,7 +76,7 @@ class Calibration:
     covariance: np.ndarray
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
-    decisions: tuple[TestOutcome, ...] = ()
+    decisions: tuple[CheckOutcome, ...] = ()
     variance_factor: float = float("nan")
     degrees_of_freedom: int = 0
     notes: tuple[str, ...] = ()

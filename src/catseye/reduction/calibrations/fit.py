@@ -14,7 +14,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
-from catseye.reduction.calibrations.calibration import TestOutcome
+from catseye.reduction.calibrations.calibration import CheckOutcome
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 SCATTER_LIMIT = 0.05  # level of the test of the variance factor, two-sided
@@ -90,7 +90,7 @@ class CalibrationFit:
         """(m,) bool: takes part although the test rejects it."""
         return self.active & self.checked & (np.abs(self.statistic) > self.critical)
 
-    def decisions(self, level: float = SCATTER_LIMIT) -> tuple[TestOutcome, ...]:
+    def decisions(self, level: float = SCATTER_LIMIT) -> tuple[CheckOutcome, ...]:
         """Tests of the scatter and of the single readings."""
         outcomes = []
         if self.test == "w" and self.degrees_of_freedom > 0.5:
@@ -98,7 +98,7 @@ class CalibrationFit:
             low, high = test.lower, test.upper
             limit = high if self.variance_factor >= 1.0 else low
             outcomes.append(
-                TestOutcome(
+                CheckOutcome(
                     "scatter: variance factor",
                     self.variance_factor,
                     limit,
@@ -108,7 +108,7 @@ class CalibrationFit:
             )
         elif self.test == "tau":
             outcomes.append(
-                TestOutcome(
+                CheckOutcome(
                     "scatter: variance factor",
                     float("nan"),
                     float("nan"),
@@ -118,17 +118,17 @@ class CalibrationFit:
             )
         else:
             outcomes.append(
-                TestOutcome("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings")
+                CheckOutcome("scatter: variance factor", float("nan"), float("nan"), None, "no redundant readings")
             )
         tested = self.active & self.checked
         if tested.any():
             worst = float(np.max(np.abs(self.statistic[tested])))
             count = int(np.count_nonzero(self.suspects))
             text = "no reading stands out" if not count else f"{count} of the values used stand out: look at them"
-            outcomes.append(TestOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
+            outcomes.append(CheckOutcome(f"outliers: largest |{self.test}|", worst, self.critical, not count, text))
         else:
             outcomes.append(
-                TestOutcome("outliers", float("nan"), float("nan"), None, "no reading is checked by the others")
+                CheckOutcome("outliers", float("nan"), float("nan"), None, "no reading is checked by the others")
             )
         return tuple(outcomes)
 

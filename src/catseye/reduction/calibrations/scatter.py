@@ -36,7 +36,7 @@ def restricted_likelihood(
     Source: [PATTERSON71] (restricted maximum likelihood and its information).
 
     >>> y = np.array([1.0, 2.0, 4.0, 5.0])
-    >>> float(restricted_likelihood(y, np.ones((4, 1)), [np.eye(4)], np.zeros((4, 4)))[0].round(6))
+    >>> float(restricted_likelihood(y, np.ones((4, 1)), [np.eye(4)], claimed=np.zeros((4, 4)))[0].round(6))
     3.333333
     """
     m, p = design.shape

@@ -53,7 +53,7 @@ def median_series(d_1: Array, d_2: Array, d_12: Array, *, delta: Array) -> Array
     (delta_1 + delta_2)/delta is right.
 
     >>> exact = np.sqrt((18.05**2 + 18.04**2) / 2 - 0.635**2 / 4)
-    >>> round(float(median_series(18.05, 18.04, 0.635, 17.95) - exact) * 1e6, 1)
+    >>> round(float(median_series(18.05, 18.04, 0.635, delta=17.95) - exact) * 1e6, 1)
     -14.6
     """
     first, second = d_1 - delta, d_2 - delta

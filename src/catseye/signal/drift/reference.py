@@ -33,7 +33,7 @@ def drift_at(
     without naming a rule. Exact for a random walk; a smooth warm-up transient T'' bends it by T'' gap^2 / 8.
 
     >>> phase, covariance = drift_at(np.array([0.0, 100.0]), np.array([0.0, 0.01]), np.zeros(2),
-    ...                              np.array([50.0]), random_walk=1e-4)
+    ...                              time=np.array([50.0]), random_walk=1e-4)
     >>> f"{phase[0]:.6f} {covariance[0, 0]:.3e}"
     '0.005000 2.500e-07'
     """
@@ -72,7 +72,7 @@ def drift_along(
     Source: smoother of two filters: a random walk seen from before and from behind are independent witnesses of the
     present. Exact.
 
-    >>> phase, u = drift_along(np.array([0.0, 100.0]), np.array([0.0, 0.01]), np.zeros(2), np.array([50.0]),
+    >>> phase, u = drift_along(np.array([0.0, 100.0]), np.array([0.0, 0.01]), np.zeros(2), time=np.array([50.0]),
     ...                        random_walk=1e-4)
     >>> f"{phase[0]:.6f} {u[0]:.3e}"
     '0.005000 5.000e-04'

@@ -50,7 +50,7 @@ def remove_amplitude_phase(
 
     phase   rad, as measured; the others as for `amplitude_phase`
 
-    >>> round(float(remove_amplitude_phase(1.0, np.e, 1.0, 1e-3)), 12)
+    >>> round(float(remove_amplitude_phase(1.0, np.e, 1.0, coefficient=1e-3)), 12)
     0.999
     """
     added = amplitude_phase(amplitude, reference_amplitude, coefficient, quadratic=quadratic)

@@ -28,7 +28,7 @@ def sound_speed(temperature_c, pressure_hpa, humidity_percent, *, co2_ppm=450.0)
 
     Source: [CRAMER93] eq. 15, to 300 ppm; vapour by [PARKER04] eqs. 1.3 and 1.5.
 
-    >>> round(float(sound_speed(0.0, 1013.25, 0.0, 314.0)), 2)
+    >>> round(float(sound_speed(0.0, 1013.25, 0.0, co2_ppm=314.0)), 2)
     331.45
     """
     t, p = np.asarray(temperature_c, float), np.asarray(pressure_hpa, float) * 100.0

@@ -14,7 +14,7 @@ from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
-from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -232,7 +232,7 @@ class CommonParts(TypedDict):
     provenance: dict[str, object]
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
-    decisions: tuple[TestOutcome, ...]
+    decisions: tuple[CheckOutcome, ...]
     variance_factor: float
     degrees_of_freedom: int
     notes: tuple[str, ...]

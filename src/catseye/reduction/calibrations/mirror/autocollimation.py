@@ -23,7 +23,7 @@ from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
@@ -234,13 +234,13 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray,
     )  # fmt: skip
 
 
-def _tilt_decision(solution: CurvedFit, limit: float | None) -> TestOutcome:
+def _tilt_decision(solution: CurvedFit, limit: float | None) -> CheckOutcome:
     name, nan = "face parallel to the elevation shaft: |tilt|, arcsec", float("nan")
     if not np.isinf(solution.parameters[solution.index("face tilt")].u):
-        return TestOutcome(name, nan, nan, None, "the readings were not asked for the tilt; it has a prior")
+        return CheckOutcome(name, nan, nan, None, "the readings were not asked for the tilt; it has a prior")
     tilt, u = solution.value("face tilt") / ARCSECOND, solution.u("face tilt") / ARCSECOND
     text = f'the face leans {tilt:+.2f}" (u {u:.2g}"); the record corrects for it'
-    return TestOutcome(name, abs(tilt), limit or nan, None if limit is None else abs(tilt) <= limit, text)
+    return CheckOutcome(name, abs(tilt), limit or nan, None if limit is None else abs(tilt) <= limit, text)
 
 
 def _notes(solution: CurvedFit, flat: bool) -> tuple[str, ...]:

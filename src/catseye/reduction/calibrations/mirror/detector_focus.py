@@ -21,7 +21,7 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
@@ -238,7 +238,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, lon
     )  # fmt: skip
 
 
-def _within_the_run(solution: CurvedFit, place: np.ndarray) -> TestOutcome:
+def _within_the_run(solution: CurvedFit, place: np.ndarray) -> CheckOutcome:
     """Best focus must lie among the readings: beyond them it is a guess of the model."""
     on = place[solution.fit.active]
     middle, low, high = solution.value("best focus"), float(on.min()), float(on.max())
@@ -246,17 +246,17 @@ def _within_the_run(solution: CurvedFit, place: np.ndarray) -> TestOutcome:
     text = (
         "amplitudes fall on both sides" if nearer > 0.0 else "the top lies outside of the readings: go on with the run"
     )
-    return TestOutcome("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text)
+    return CheckOutcome("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text)
 
 
-def _symmetry(longer: CurvedFit | None) -> tuple[TestOutcome, ...]:
+def _symmetry(longer: CurvedFit | None) -> tuple[CheckOutcome, ...]:
     """Whether the fall is alike on both sides, by an odd term; spherical aberration makes it differ."""
     if longer is None:
         return ()
     ratio = abs(longer.value("skew")) / longer.u("skew")
     limit = float(student(longer.fit.effective[-1], ODD))  # the skew is the last that is sought
     text = "both sides fall alike" if ratio <= limit else "the sides differ (aberration): take model = 'curve'"
-    return (TestOutcome("odd term: |skew| / u", ratio, limit, bool(ratio <= limit), text),)
+    return (CheckOutcome("odd term: |skew| / u", ratio, limit, bool(ratio <= limit), text),)
 
 
 RECIPE = CalibrationKind(

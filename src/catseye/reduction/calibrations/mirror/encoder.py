@@ -20,7 +20,7 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
@@ -208,7 +208,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) 
     )
 
 
-def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[TestOutcome, ...]:
+def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[CheckOutcome, ...]:
     """Whether each order is there at all: its squared Mahalanobis distance from zero.
 
     Chi-square of two degrees where the scatter is claimed, else twice Fisher's F with the scatter's own degrees.
@@ -228,7 +228,7 @@ def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[TestOut
         limit = 2.0 * fdtri(2.0, degrees, 1.0 - level / n) if degrees < MANY else -2.0 * np.log(level / n)
         size = float(np.hypot(*pair))
         text = f"{size:.3g} counts, {'more than chance makes' if statistic > limit else 'which chance makes as well'}"
-        outcomes.append(TestOutcome(f"order {k}: squared distance from none", statistic, float(limit), None, text))
+        outcomes.append(CheckOutcome(f"order {k}: squared distance from none", statistic, float(limit), None, text))
     return tuple(outcomes)
 
 

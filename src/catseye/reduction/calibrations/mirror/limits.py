@@ -13,7 +13,7 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes, student
@@ -132,12 +132,12 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, single: float) ->
     )
 
 
-def _reach(low: int, high: int) -> TestOutcome:
+def _reach(low: int, high: int) -> CheckOutcome:
     """Whether every direction is reached, direct or prime: the pointings lie half a turn apart."""
     travel = float(high - low)
     reached = "every direction is reached" if travel >= HALF_TURN else "some directions are not reached"
     text = f"{reached}, in the direct or the prime pointing"
-    return TestOutcome("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text)
+    return CheckOutcome("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text)
 
 
 def _unreached(low: int, high: int, na0: float | None) -> tuple[str, ...]:

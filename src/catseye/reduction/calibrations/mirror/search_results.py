@@ -27,7 +27,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
@@ -196,7 +196,7 @@ class _Compared:
         self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
         self.decided = int(np.count_nonzero(self.share > DECIDED))
 
-    def whole(self, level: float) -> TestOutcome:
+    def whole(self, level: float) -> CheckOutcome:
         """Whether laboratory and field agree in all that the counts say something of."""
         informed = self.share > INFORMED
         along = self.vectors[:, informed].T @ self.change
@@ -208,7 +208,7 @@ class _Compared:
             if passed
             else "the field contradicts the laboratory: look at the single changes"
         )
-        return TestOutcome(
+        return CheckOutcome(
             f"laboratory against field: chi-square, {degrees} combinations",
             statistic,
             test.upper * degrees,
@@ -216,7 +216,7 @@ class _Compared:
             text,
         )
 
-    def single(self, level: float) -> list[TestOutcome]:
+    def single(self, level: float) -> list[CheckOutcome]:
         """Each parameter's change over its own standard uncertainty."""
         limit = w_critical(single_level(level, len(self.free)))
         outcomes = []
@@ -224,7 +224,7 @@ class _Compared:
             share, name = 1.0 - self.left[k, k], PARAMETERS[j]
             if share <= INFORMED:
                 outcomes.append(
-                    TestOutcome(
+                    CheckOutcome(
                         f"{name}: change over its u", float("nan"), float("nan"), None, "the counts say nothing of it"
                     )
                 )
@@ -232,7 +232,7 @@ class _Compared:
             ratio = float(self.change[k] / np.sqrt(share))
             left = np.sqrt(self.left[k, k])
             text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {left:.2f} is left"
-            outcomes.append(TestOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
+            outcomes.append(CheckOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
         return outcomes
 
     def combination(self, k: int) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -296,10 +296,10 @@ def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple
     )
 
 
-def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[TestOutcome]:
+def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[CheckOutcome]:
     """The closure of each set that visited the lab twice, against three of its u."""
     return [
-        TestOutcome(
+        CheckOutcome(
             f"closure of set {name}, arcsec",
             closure / ARCSECOND,
             CLOSURE_FACTOR * u / ARCSECOND,

@@ -21,7 +21,7 @@ from catseye.errors import ValidityError
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome, RecordValue
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -237,12 +237,12 @@ def _constant_note(readings: SheetReadings, fit: CalibrationFit) -> str:
     )
 
 
-def _loops_decision(loops: list[tuple[str, float, float]]) -> TestOutcome:
+def _loops_decision(loops: list[tuple[str, float, float]]) -> CheckOutcome:
     """The loop whose misclosure is largest beside its u, against three of that."""
     worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
     if worst is None:
-        return TestOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
-    return TestOutcome(
+        return CheckOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
+    return CheckOutcome(
         f"loops: misclosure of {len(loops)}, the worst, mm",
         worst[1] / MILLIMETRE,
         CLOSURE_FACTOR * worst[2] / MILLIMETRE,

@@ -17,7 +17,7 @@ from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, gr
 from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
@@ -188,7 +188,7 @@ def _calibration(
             (readings.words["point"][k], *(float(readings.get(f"{c}_m")[k]) for c in NAMES)) for k in range(len(plan))
         ),
         decisions=(
-            TestOutcome(
+            CheckOutcome(
                 "to the state plane and back, mm",
                 closure,
                 ROUNDING_MM,

@@ -11,7 +11,7 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
@@ -112,7 +112,7 @@ def _scatter(readings: SheetReadings) -> ObservedScatter:
     return ObservedScatter(claimed, {SCATTER: np.diag(sheet.reference_amplitude_volt**2 * relative)})
 
 
-def _line_decision(longer: CalibrationFit | None) -> TestOutcome:
+def _line_decision(longer: CalibrationFit | None) -> CheckOutcome:
     """Does the line suffice? t of the quadratic term against Student's, or the normal where the scatter is claimed."""
     from scipy.stats import norm
     from scipy.stats import t as student
@@ -120,13 +120,13 @@ def _line_decision(longer: CalibrationFit | None) -> TestOutcome:
     name = "line in the logarithm: |t| of a quadratic term"
     if longer is None:
         text = "too few different amplitudes to test it, or the term is in the model"
-        return TestOutcome(name, float("nan"), float("nan"), None, text)
+        return CheckOutcome(name, float("nan"), float("nan"), None, text)
     statistic = abs(float(longer.x[2]) / float(np.sqrt(longer.covariance[2, 2])))
     half = 1.0 - 0.5 * LINE_LEVEL
     limit = float(student.ppf(half, longer.degrees_of_freedom) if longer.components else norm.ppf(half))
     passed = statistic <= limit
     text = "a line suffices" if passed else "a line does not suffice: set quadratic = true, or use fewer attenuations"
-    return TestOutcome(name, statistic, limit, passed, text)
+    return CheckOutcome(name, statistic, limit, passed, text)
 
 
 def _calibration(

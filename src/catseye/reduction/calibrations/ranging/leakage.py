@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
@@ -75,11 +75,11 @@ def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> 
     return ObservedScatter(claimed, unknown)
 
 
-def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
+def _sessions_decision(sheet: LeakageSheet, sessions: int) -> CheckOutcome:
     """Whether the sessions tell how the leakage differs from one to the next."""
     name = "sessions"
     if sheet.u_session_volt is not None:
-        return TestOutcome(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
+        return CheckOutcome(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
     enough = sessions >= FEWEST_SESSIONS
     text = "they tell how the leakage differs from one to the next"
     if not enough:
@@ -87,7 +87,7 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> TestOutcome:
             "too few to tell how the leakage differs from one to the next: u_leakage_volt may be far too small; "
             "measure more, or state u_session_volt"
         )
-    return TestOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
+    return CheckOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
 
 
 def _rows(

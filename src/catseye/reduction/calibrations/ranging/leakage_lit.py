@@ -14,7 +14,7 @@ from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
@@ -163,7 +163,7 @@ def _calibration(
     arc = _arc((z - leakage)[on])
     radius = float(np.median(np.abs(z - leakage)[on]))
     ring = leakage + radius * np.exp(1j * np.linspace(0.0, TWO_PI, 361))
-    covered = TestOutcome(
+    covered = CheckOutcome(
         "arc of the circle, rad",
         arc,
         SHORTEST_ARC,

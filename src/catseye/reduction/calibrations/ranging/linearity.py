@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome, Quantity, RecordValue
 from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -109,7 +109,7 @@ def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], st
 
 def _chosen(
     rail: Rail, kept: tuple[int, ...], effects: list[Effect], active: np.ndarray, sheet: LinearitySheet
-) -> tuple[tuple[int, ...], tuple[TestOutcome, ...]]:
+) -> tuple[tuple[int, ...], tuple[CheckOutcome, ...]]:
     """The orders to keep: up to the highest whose pair of terms is significant, by the F test against one order less.
 
     Each order is tested with the scatter of the longest series; [FOERSTNER16] chapter 4 (tests of hypotheses). The
@@ -138,7 +138,7 @@ def _chosen(
         significant = bool(statistic > limit)
         highest = k if significant else highest
         text = f"F test of its two terms at the level {single:.2g}: {'' if significant else 'not '}significant"
-        outcomes.append(TestOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
+        outcomes.append(CheckOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
     return kept[:highest], tuple(outcomes)
 
 
@@ -196,10 +196,10 @@ def _rows(readings: SheetReadings, rail: Rail, fit: CalibrationFit) -> tuple[tup
     )
 
 
-def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -> TestOutcome:
+def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -> CheckOutcome:
     """Whether a line stands out of the residuals' spectrum; periods and heights in m, and each line's probability."""
     top = int(np.argmin(chance))
-    return TestOutcome(
+    return CheckOutcome(
         "spectrum of residuals: chance of the highest line",
         float(chance[top]),
         0.05,
@@ -238,7 +238,7 @@ def _calibration(
     rail: Rail,
     fit: CalibrationFit,
     orders: tuple[int, ...],
-    decisions: tuple[TestOutcome, ...],
+    decisions: tuple[CheckOutcome, ...],
     reason: str,
 ) -> Calibration:
     sheet, micrometre = readings.sheet, 1e-3 * MILLIMETRE

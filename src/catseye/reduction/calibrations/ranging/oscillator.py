@@ -10,7 +10,7 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Quantity, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance
 from catseye.signal.drift.allan import allan_deviation
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
@@ -76,7 +76,7 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         columns=("averaged", "averaged_s", "allan_deviation_rad", "low_95_rad", "high_95_rad", "kind", "range_um"),
         rows=rows,
         decisions=(
-            TestOutcome(
+            CheckOutcome(
                 "spurs: lines in the spectrum",
                 float(len(spectrum.spurs)),
                 0.0,

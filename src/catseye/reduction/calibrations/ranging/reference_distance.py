@@ -13,7 +13,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -200,7 +200,7 @@ def _calibration(
     )
 
 
-def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray) -> TestOutcome:
+def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray) -> CheckOutcome:
     """Is the whole number of cycles of every reading used safe? The margin against the doubt of the coarse length."""
     sheet = readings.sheet
     common = np.hypot(np.hypot(sheet.u_d0_nominal_mm, sheet.u_distance_common_mm), sheet.u_pc_mm)
@@ -210,7 +210,7 @@ def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray
     least = int(np.argmin(np.where(on, margin / doubt, np.inf)))
     limit = SAFE * float(doubt[least])
     worst = float(margin[least]) / MILLIMETRE
-    return TestOutcome(
+    return CheckOutcome(
         "whole cycles: smallest margin, mm",
         worst,
         limit,

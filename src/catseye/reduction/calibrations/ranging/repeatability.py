@@ -9,7 +9,7 @@ from catseye.estimation.quality.repeatability import Repeatability
 from catseye.estimation.quality.repeatability import repeatability as analysed
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
 
 KIND = "repeatability"
@@ -70,7 +70,7 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
         columns=("set", "range_m", "within_um", "set_um", "state"),
         rows=rows,
         decisions=(
-            TestOutcome(
+            CheckOutcome(
                 "sets agree: F",
                 analysis.f,
                 analysis.f_limit,

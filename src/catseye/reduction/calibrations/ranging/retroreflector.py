@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Cell, TestOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
@@ -160,10 +160,10 @@ def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...
     )
 
 
-def _seatings_decision(readings: SheetReadings, count: int) -> TestOutcome:
+def _seatings_decision(readings: SheetReadings, count: int) -> CheckOutcome:
     """Whether each of the retroreflectors, `count` unknown ones and the reference, was seated more than once."""
     alternations = int(np.max(_seatings(readings))) + 1
-    return TestOutcome(
+    return CheckOutcome(
         "seatings",
         float(alternations),
         float(2 * (count + 1)),
