@@ -38,7 +38,8 @@ def main() -> None:
     solid = solid_panels(part, rng, piston=2.5e-4, slope=8e-5, twist=2e-5, bump=4e-5)
     write_maps(solid, HERE / "maps", rng)
     crew = Crew(rng)
-    rows, stands = panel_readings(solid, sheet, crew, tour=CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2)))
+    tour = CornerTour(members=("Ada", "Ben"), a_day=25, turns=(0, 1, 2))
+    rows, stands = panel_readings(solid, sheet, crew, tour=tour)
     wrong = next(k for k, row in enumerate(rows) if row.startswith(WRONG[0]))
     cells = rows[wrong].split(",")
     cells[WRONG[1]] = f"{float(cells[WRONG[1]]) + WRONG[2]:.3f}"
