@@ -1,4 +1,4 @@
-"""A real head: an A/D card, two LM628 motion chips, a clock card and a panel of switches behind `ranger.head.Head`.
+"""A real head: an A/D card, two LM628 motion chips, a clock card and switches behind `ranger.head.RangerHead`.
 
 Fill in the drivers below and serve it:
 
@@ -77,7 +77,7 @@ class Panel(Protocol):
 
 
 class CardAndChips:
-    """A `Head` of such hardware; see its methods there.
+    """A `RangerHead` of such hardware; see its methods there.
 
     card    A/D
     ports   of the chips of azimuth and elevation

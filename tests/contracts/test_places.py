@@ -122,7 +122,7 @@ def test_what_is_history_is_still_said():
         ("see `reduction/epoch/test_epoch.py` and `catseye reduce`", True, None, True),
         ("as `atmosphere.index.air.MODELS` says", None, True, None),
         ("as `catseye.signal.cycles.whole.CycleDecision.margin` says", None, True, None),
-        ("as `catseye.signal.cycles.whole.Decision.marvel` says", None, False, None),
+        ("as `catseye.signal.cycles.whole.CycleDecision.marvel` says", None, False, None),
         ("as `signal.whole` says, by `.venv/bin/catseye reduse`", None, False, False),
         ("`records.night.campaign.read_campaign(directory)`, `catseye plot servo`", None, True, True),
         ("`estimation.adjustment`", None, False, None),

@@ -97,3 +97,27 @@ def test_signatures_say_what_they_take(room):
         if re.search(r"\bAny\b", ast.unparse(annotation))
     ]
     assert anything == []
+
+
+def known_names():
+    """Everything that some module defines, uses or imports."""
+    for tree in TREES.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef):
+                yield node.name
+            elif isinstance(node, ast.Name):
+                yield node.id
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                yield from ((each.asname or each.name).rpartition(".")[2] for each in node.names)
+
+
+def strangers(text, names):
+    """Classes in backticks that nobody knows."""
+    return [name for name in re.findall(r"`([A-Z][a-z]+[A-Za-z]*)(?:\.\w+)?`", text) if name not in names]
+
+
+def test_classes_that_docstrings_name_are_there():
+    names = {*known_names(), "None"}
+    assert strangers("as `Slews.position`", names) == ["Slews"]
+    texts = {path.relative_to(ROOT): path.read_text(encoding="utf-8") for path in (*TREES, ROOT / "CONTRIBUTING.md")}
+    assert {path: gone for path, text in texts.items() if (gone := strangers(text, names))} == {}

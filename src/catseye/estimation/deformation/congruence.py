@@ -76,7 +76,7 @@ def _crossing(rising: Callable[[float], float]) -> float:
 def pooled_variance_factor(first: tuple[float, float], second: tuple[float, float]) -> tuple[VarianceFactor, float]:
     """Variance factor of two epochs together, and the p-value of their being equal (two-sided F test).
 
-    first, second   (variance factor, degrees of freedom) of each epoch's adjustment, as `Solution.variance_factor`
+    first, second   (variance factor, degrees of freedom) of each epoch, as `LeastSquaresSolution.variance_factor`
 
     Source: [CASPARY87] (homogeneity of two epochs).
 

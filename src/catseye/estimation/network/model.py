@@ -26,7 +26,7 @@ class NetworkPoints:
     fixed   (n, 3) bool: coordinates held at xyz
     datum   (n, 3) bool: coordinates that take part in the inner constraints, relative to xyz
 
-    A stochastic point is a free one with an observation of its coordinates, of kind `Coordinates`.
+    A stochastic point is a free one with an observation of its coordinates, of kind `ObservedCoordinates`.
     """
 
     names: tuple[str, ...]

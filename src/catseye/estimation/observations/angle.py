@@ -16,7 +16,7 @@ class HorizontalAngles(ObservationKind):
 
     name             what the group is, for reports
     observed         (m,) rad, clockwise seen from above, on any turn
-    covariance       of the observed values, see `Observations`
+    covariance       of the observed values, see `ObservationGroup`
     at               (m,) column of the x of the point where the instrument stands
     backsight        (m,) the same of the point sighted first
     foresight        (m,) the same of the point sighted second

@@ -16,7 +16,7 @@ class Azimuths(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) rad, on any turn
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point measured from
     target       (m,) the same of the point measured to
     shift        (m, 3) or (3,) m, added to target minus origin, or None; only eccentricities matter

@@ -17,7 +17,7 @@ class ObservedCoordinates(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) metres
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
     axis         (m,) 0, 1, 2 for x, y, z
     """

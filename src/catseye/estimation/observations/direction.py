@@ -18,7 +18,7 @@ class Directions(ObservationKind):
 
     name          what the group is, for reports
     observed      (m,) rad, on any turn
-    covariance    of the observed values, see `Observations`
+    covariance    of the observed values, see `ObservationGroup`
     origin        (m,) column of the x of the point where the instrument stands
     target        (m,) the same of the point sighted
     orientation   (m,) column of the set's orientation, rad

@@ -21,7 +21,7 @@ class FixedDistances(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) metres
-    covariance   of the observed values, see `Observations`; `held` makes it
+    covariance   of the observed values, see `ObservationGroup`; `held` makes it
     origin       (m,) column of the x of one end
     target       (m,) the same of the other
     shift        (m, 3) or (3,) m, added to target minus origin, or None

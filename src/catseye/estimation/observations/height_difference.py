@@ -16,7 +16,7 @@ class HeightDifferences(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) metres
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point measured from
     target       (m,) the same of the point measured to
     shift        (m, 3) or (3,) m, added to target minus origin, or None; only z matters

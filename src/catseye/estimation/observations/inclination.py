@@ -16,7 +16,7 @@ class Inclinations(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) rad
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point where the line begins
     target       (m,) the same of the point where it ends
     shift        (m, 3) or (3,) m, added to target minus origin, or None

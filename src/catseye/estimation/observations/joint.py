@@ -15,7 +15,7 @@ class Joint(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) of all parts in order
-    covariance   of the observed values, (m, m) or another form of `Observations`
+    covariance   of the observed values, (m, m) or another form of `ObservationGroup`
     parts        groups of any kind, m rows together
     """
 

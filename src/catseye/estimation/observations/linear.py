@@ -14,7 +14,7 @@ class Linear(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,)
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     columns      (k,) indices of parameters, without repeats
     matrix       (m, k)
     """

@@ -21,7 +21,7 @@ class ObservedTilts(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) rad, positive when the axis points up
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     axis         (m, 3) or (3,) directions in the frame, of any length but zero
     turn         (3,) or (m, 3) columns of w, rad; -1 for a parameter that is zero
     start        R0, (3, 3) or (m, 3, 3), ground from frame

@@ -16,7 +16,7 @@ class Vectors(ObservationKind):
 
     name         what the group is, for reports
     observed     (3b,) metres, vector by vector
-    covariance   of the observed values: (b, 3, 3), or another form of `Observations`
+    covariance   of the observed values: (b, 3, 3), or another form of `ObservationGroup`
     origin       (b,) column of the x of the point measured from
     target       (b,) the same of the point measured to
     shift        (b, 3) or (3,) m, added to target minus origin: (0, 0, target less instrument height); or None

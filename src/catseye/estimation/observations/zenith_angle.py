@@ -25,7 +25,7 @@ class ZenithAngles(ObservationKind):
 
     name                what the group is, for reports
     observed            (m,) rad from straight up, first face
-    covariance          of the observed values, see `Observations`
+    covariance          of the observed values, see `ObservationGroup`
     origin              (m,) column of the x of the point where the instrument stands
     target              (m,) the same of the point sighted
     shift               (m, 3) or (3,) m, added to target minus origin: (0, 0, target less instrument height); or None

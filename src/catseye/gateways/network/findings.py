@@ -58,7 +58,7 @@ class ObservationTable:
     bias_to_noise     (m,) how many standard uncertainties of any result an error just not detectable moves it, at most;
                       nan where unknown, as within correlated groups
     effect            (m,) m, how far an error of the size of mdb moves the named point that it moves most, or nan
-    observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `Fit`; mdb is its
+    observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `GroupFit`; mdb is its
                       detectable_error; the last three are nan where nothing checks the observation, and all four
                       where there is no answer
     """

@@ -12,7 +12,7 @@ _inlined = njit(error_model="numpy")
 
 @_inlined
 def _count(time, start, end, ramp, duration, speed):
-    """Count of one axis; as `Slew.position`."""
+    """Count of one axis; as `MirrorSlew.position`."""
     t = min(max(time, 0.0), duration)
     left = duration - t
     if t < left:
@@ -22,7 +22,7 @@ def _count(time, start, end, ramp, duration, speed):
 
 @_inlined
 def _slowed(time, ramp, duration):
-    """Share of the top speed that an axis does not exceed from a time on; as in `Slew.beam_rate`."""
+    """Share of the top speed that an axis does not exceed from a time on; as in `MirrorSlew.beam_rate`."""
     left = max(duration - time, 0.0)
     if left < ramp:
         return left / ramp

@@ -69,7 +69,7 @@ class Explanation:
     ranger: str
     target: str
     mjd_utc: float
-    status: str
+    status: ShotStatus
     reason: Reason | None
     phasor: complex
     u_across: float

@@ -1,6 +1,6 @@
 """One shot at a time: samples to a phase with its status, and at once a range with what is known by then.
 
-The range of `LiveRange` is a first answer: corrections are those of the line's last epoch, the electronics those of the
+The range of `ShotAnswer` is a first one: corrections are those of the line's last epoch, the electronics those of the
 last good reference. The epoch's solution uses the phases, not these ranges.
 """
 

@@ -44,7 +44,7 @@ class Change:
     deviation             (k,) m, along the normal, above zero towards the focus
     deviation_covariance  (k, k) m^2
     half_path             (k,) m
-    weights, places       as in `Shape`
+    weights, places       as in `SurfaceShape`
     """
 
     first: Prisms

@@ -92,7 +92,7 @@ class Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """covariance (T, 3, 3) of the targets, m^2; and (m,) of the ranges, as in `least_squares.adjustment.Fit`."""
+    """covariance (T, 3, 3) of the targets, m^2; and (m,) of the ranges, as in `least_squares.adjustment.GroupFit`."""
 
     covariance: np.ndarray
     residual: np.ndarray

@@ -45,7 +45,7 @@ class RangingSolution:
     width               parameters a station: 3 (x y z), or 5 (x y z zero scale)
     covariance          (n, n) of the stations' parameters, a priori; zero where held, nan without answer or tests
     covariance_targets  (T, 3, 3) m^2
-    redundancy          (m,) as in `least_squares.adjustment.Fit`, here of the ranges; nan without answer or tests
+    redundancy          (m,) as in `least_squares.adjustment.GroupFit`, here of the ranges; nan without answer or tests
     standardised        (m,)
     detectable          (m,) m
     """

@@ -19,7 +19,7 @@ class FramePoints(ObservationKind):
 
     name          what the group is, for reports
     observed      (3n,) m, x, y, z point by point
-    covariance    of the observed values: (n, 3, 3), or another form of `Observations`; its smallest sensible standard
+    covariance    of the observed values: (n, 3, 3), or as `ObservationGroup` has it; its smallest sensible standard
                   uncertainty is that of `FixedDistances`, for the same reason
     point         (n,) column of the x of each point on the ground
     pose          (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter that is zero

@@ -19,7 +19,7 @@ class LevelPlanes(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) metres, usually zeros
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
     level        (m,) column of the plane's height, m, -1 for the plane z = 0
     height       (m,) or one, m, of the plane's mark above the point

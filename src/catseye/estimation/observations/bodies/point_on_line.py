@@ -21,7 +21,7 @@ class PointsOnLine(ObservationKind):
 
     name         what the group is, for reports
     observed     (2b,) metres, point by point
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     point        (b,) column of the point's x
     centre       (3,) or (b, 3) m, near the points: the tilts turn the line about it
     along        (3,) or (b, 3), the direction's start

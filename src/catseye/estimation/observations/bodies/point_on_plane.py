@@ -21,7 +21,7 @@ class PointsOnPlane(ObservationKind):
 
     name         what the group is, for reports
     observed     (m,) metres
-    covariance   of the observed values, see `Observations`
+    covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
     centre       (3,) or (m, 3) m, near the points: the tilts turn the plane about it
     normal       (3,) or (m, 3), the normal's start

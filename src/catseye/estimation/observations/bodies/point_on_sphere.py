@@ -16,7 +16,7 @@ class PointsOnSphere(ObservationKind):
 
     name            what the group is, for reports
     observed        (m,) metres
-    covariance      of the observed values, see `Observations`
+    covariance      of the observed values, see `ObservationGroup`
     point           (m,) column of the point's x
     centre          (m,) column of the x of the centre C, which is a point as any other
     radius          (m,) or one, the known part of the radius, m

@@ -20,7 +20,7 @@ class RigidBodies(ObservationKind):
 
     name         what the group is, for reports
     observed     (3n,) m, body coordinates x, y, z point by point
-    covariance   of the observed values, (3n, 3n) or another form of `Observations`
+    covariance   of the observed values, (3n, 3n) or another form of `ObservationGroup`
     point        (n,) column of the x of each point on the ground
     pose         (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter that is zero
     start        R0, (3, 3) or (n, 3, 3), ground from body

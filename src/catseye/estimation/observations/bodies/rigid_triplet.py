@@ -29,7 +29,7 @@ class RigidTriplets(ObservationKind):
 
     name         what the group is, for reports
     observed     (5n,) four lengths in m and an angle in rad, unit by unit; 0, 0, H_corr, D_12, 0 of a data sheet
-    covariance   of the observed values: (n, 5, 5), or another form of `Observations`
+    covariance   of the observed values: (n, 5, 5), or another form of `ObservationGroup`
     left         (n,) column of the x of the left prism's reference point
     right        (n,) the same of the right prism
     ball         (n,) the same of the ball's centre
