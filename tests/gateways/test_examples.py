@@ -10,7 +10,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.gateways import examples
-from catseye.gateways.examples import bundled_site, example_campaign, site_directory
+from catseye.gateways.examples import bundled_site, example_campaign, located
 from catseye.records.site.folder import read_site, site_files
 from catseye.reduction.site.places import places_of
 from repository import ROOT
@@ -44,21 +44,52 @@ def points(dish):
     return np.array([target.position_mm for target in dish.values()])
 
 
-def test_the_site_is_found_by_its_name():
-    assert bundled_site("gbt") == SITES / "gbt"
-    assert site_directory("gbt") == SITES / "gbt"
-    assert site_directory("./gbt") == Path("gbt")
-    assert site_directory("elsewhere/gbt") == Path("elsewhere/gbt")
-    assert example_campaign() == SITES.parent / "night-01"
+def test_examples_are_found_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert bundled_site("gbt") == located("gbt") == SITES / "gbt"
+    assert example_campaign() == located("night-01") == SITES.parent / "night-01"
+    assert located("./gbt") == SITES / "gbt"  # a path is what it means: here is no such folder
+    assert located("elsewhere/gbt") == Path("elsewhere/gbt")
+    assert located("networks/feed-arm.toml") == located("examples/networks/feed-arm.toml")
+    assert located("networks/feed-arm.toml").is_file()
     with pytest.raises(InputError, match=r"^site = 'vla' is not bundled \(expected gbt\)$"):
         bundled_site("vla")
+    for name in ("", "..", "../sites", "/etc", "nothing"):
+        with pytest.raises(InputError, match=r"^example .* is not there"):
+            examples.example(name)
 
 
-def test_a_site_that_was_not_installed_is_refused_in_one_line(monkeypatch, tmp_path):
+def test_what_lies_here_goes_before_an_example_unless_it_is_no_site(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("night-01").mkdir()
+    Path("night-01", "coordinates.json").touch()  # what catseye reduce wrote
+    assert located("night-01") == SITES.parent / "night-01"
+    Path("night-01", "site.toml").touch()
+    assert located("night-01") == Path("night-01")
+    Path("networks").mkdir()
+    Path("networks", "feed-arm.toml").touch()
+    assert located("networks/feed-arm.toml") == Path("networks/feed-arm.toml")
+
+
+def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
+    names = examples.example_names()
+    assert {"night-01", "sites/gbt", "networks/ground-ring", "networks/feed-arm.toml"} <= set(names)
+    assert all(examples.example(name).exists() for name in names)
+    count = examples.copy_examples(tmp_path / "mine")
+    assert count > 200
+    assert (tmp_path / "mine/night-01/frames.npy").stat().st_size == (
+        ROOT / "examples/night-01/frames.npy"
+    ).stat().st_size
+    with pytest.raises(InputError, match="is there and not empty"):
+        examples.copy_examples(tmp_path / "mine")
+
+
+def test_examples_that_were_not_installed_are_refused_in_one_line(monkeypatch, tmp_path):
     package = tmp_path / "lib" / "catseye"
     monkeypatch.setattr(examples, "__file__", str(package / "gateways" / "examples.py"))
-    with pytest.raises(InputError, match=r"^the bundled site gbt is missing: neither [^\n]+ nor [^\n]+$"):
+    with pytest.raises(InputError, match=r"^the examples are missing: neither [^\n]+ nor [^\n]+$"):
         bundled_site("gbt")
+    (package / "examples" / "night-01").mkdir(parents=True)
     (package / "examples" / "sites" / "gbt").mkdir(parents=True)
     assert bundled_site("gbt") == package / "examples" / "sites" / "gbt"
 

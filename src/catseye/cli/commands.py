@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catseye import __version__
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine, say
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.version import __version__
 
 if TYPE_CHECKING:
-    from catseye.reduction.epoch.epoch import Reduction
+    from catseye.api.night import NightResult
 
 ROOMS = (
     *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
@@ -90,22 +91,14 @@ def reduce(
     air_model: AirModel = ReductionSettings.air_model,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """A campaign's samples to coordinates, pose, surface and report."""
     if out is None and not json:
         raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
-    reduction = _reduced(campaign, out, air_model, quiet)
-    if json:
-        _say_reduction(reduction)
-    elif not quiet:
-        _tell(reduction)
-        say(
-            wrapped(
-                "Written to",
-                f"{out}/: report.html, ranges.csv, coordinates.csv, coordinates.json, surface.csv, "
-                "pose.json, provenance.json",
-            )
-        )
+    night = _reduced(campaign, out, air_model, quiet)
+    files = "report.html, ranges.csv, coordinates.csv, coordinates.json, surface.csv, pose.json, provenance.json"
+    _tell(night, f"{out}/: {files}", json=json, quiet=quiet, strict=strict)
 
 
 @app.command(epilog="\b\nExample: catseye demo my-first-night")
@@ -117,52 +110,34 @@ def demo(
     """The bundled night of measurements, reduced and explained."""
     from catseye.gateways.examples import example_campaign
 
-    reduction = _reduced(example_campaign(), directory, ReductionSettings.air_model, quiet)
-    if json:
-        _say_reduction(reduction)
-    elif not quiet:
-        _tell(reduction)
-        say(f"\nReport: {directory / 'report.html'}")
+    night = _reduced(example_campaign(), directory, ReductionSettings.air_model, quiet)
+    _tell(night, f"{directory / 'report.html'}, and tables beside it", json=json, quiet=quiet)
 
 
-def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "Reduction":
+def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "NightResult":
     """Read, reduce and, when there is an `out`, write it whole or not at all."""
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import refuse_output
 
     if out is not None:
         refuse_output(out, campaign)
     progress = ProgressLine(quiet)
     try:
-        from catseye.records.night.campaign import read_campaign
-        from catseye.reduction.epoch.epoch import reduce_epoch
+        from catseye import api
 
-        night = read_campaign(campaign)
-        reduction = reduce_epoch(night, ReductionSettings(air_model=air_model), progress)
+        night = api.reduce(campaign, air_model=air_model, progress=progress)
         if out is not None:
-            from catseye.gateways.epoch.files import write_reduction
-
-            with whole_directory(out, campaign) as directory:
-                write_reduction(reduction, directory, progress)
-        return reduction
+            api.save(night, out, progress=progress)
+        return night
     finally:
         progress.clear()
 
 
-def _say_reduction(reduction: "Reduction") -> None:
-    from catseye.gateways.epoch.objects import reduction_object
-    from catseye.gateways.writers.objects import json_line
+def _tell(night: "NightResult", files: str, *, json: bool, quiet: bool, strict: bool = False) -> None:
+    """The night's sentences, the feed arm's rows after them, and where the rest is."""
+    from catseye.gateways.epoch.summary import feed_arm_rows
 
-    say(json_line(reduction_object(reduction)))
-
-
-def _tell(reduction: "Reduction") -> None:
-    from catseye.gateways.epoch.summary import feed_arm_rows, passages
-
-    for passage in passages(reduction):
-        say(wrapped(passage.title, passage.text))
-        if passage.title == "The feed arm":
-            for name, x, u in feed_arm_rows(reduction):
-                say(
-                    f"{'':<14}{name}  x {x[0]:9.4f}  y {x[1]:9.4f}  z {x[2]:9.4f} m   "
-                    f"u {u[0]:.3f}, {u[1]:.3f}, {u[2]:.3f} mm"
-                )
+    rows = [
+        f"{'':<14}{name}  x {x[0]:9.4f}  y {x[1]:9.4f}  z {x[2]:9.4f} m   u {u[0]:.3f}, {u[1]:.3f}, {u[2]:.3f} mm"
+        for name, x, u in feed_arm_rows(night.reduction)
+    ]
+    tell(night, json=json, quiet=quiet, strict=strict, rows=rows, written=[("Written to", files)])

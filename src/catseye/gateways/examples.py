@@ -1,18 +1,53 @@
-"""The campaign and the sites that come with catseye."""
+"""What comes with catseye under examples/: found by name, listed, and copied out."""
 
+import shutil
 from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.records.files.refusal import shown
 
-NIGHT = Path("examples", "night-01")
-SITES = Path("examples", "sites")
+SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # names that a user may type without the folder
 SITE_NAMES = ("gbt",)
+MARK = {"night-01": "site.toml", "gbt": "site.toml"}  # what a folder of one's own of that name must hold to be meant
+SKIPPED = {"__pycache__"}
+
+
+def examples_directory() -> Path:
+    """Where the examples are: inside the installed package, or beside the sources; or InputError."""
+    package = Path(__file__).parents[1]
+    for root in (package, package.parents[1]):
+        if (root / "examples" / "night-01").is_dir():
+            return root / "examples"
+    raise InputError(f"the examples are missing: neither {package / 'examples'} nor {package.parents[1] / 'examples'}")
+
+
+def example_names() -> tuple[str, ...]:
+    """Every example by the name that `example` takes, sorted: files, and folders that are read as one."""
+    root = examples_directory()
+    wholes = [path.parent for path in root.rglob("site.toml")] + [path.parent for path in root.rglob("points.csv")]
+    files = [
+        path
+        for path in root.rglob("*")
+        if path.is_file() and not SKIPPED & set(path.parts) and not any(whole in path.parents for whole in wholes)
+    ]
+    return tuple(sorted(path.relative_to(root).as_posix() for path in [*wholes, *files]))
+
+
+def example(name: str) -> Path:
+    """Where an example is; InputError for a name that is none.
+
+    name   "night-01", "gbt", or the place under examples/, as networks/feed-arm.toml
+    """
+    root = examples_directory()
+    place = root / SHORT.get(name, name)
+    if not name or Path(name).is_absolute() or ".." in Path(name).parts or not place.exists():
+        raise InputError(f"example {shown(name)} is not there (expected one that `catseye examples` lists)")
+    return place
 
 
 def example_campaign() -> Path:
-    """Where the bundled campaign is: inside the installed package, or beside the sources."""
-    return bundled(NIGHT, "the example campaign")
+    """Where the bundled campaign is."""
+    return example("night-01")
 
 
 def bundled_site(name: str) -> Path:
@@ -22,24 +57,41 @@ def bundled_site(name: str) -> Path:
     """
     if name not in SITE_NAMES:
         raise InputError(f"site = {shown(name)} is not bundled (expected {', '.join(SITE_NAMES)})")
-    return bundled(SITES / name, f"the bundled site {name}")
+    return example(name)
 
 
-def site_directory(name: str) -> Path:
-    """The directory that a user's SITE means: a bundled site's if it is just its name, else the path as it stands.
+def located(path: Path | str) -> Path:
+    """What a user's path means: the path as it stands, or the example of that name where nothing stands there.
 
-    name   as the user wrote it; a folder of one's own called gbt is ./gbt
+    path   as the user wrote it. A folder of one's own called night-01 or gbt goes before the bundled one where it is a
+           site's or a campaign's; what a command wrote under that name does not.
 
-    >>> site_directory("./gbt").as_posix()
-    'gbt'
+    >>> located("elsewhere/gbt").as_posix()
+    'elsewhere/gbt'
     """
-    return bundled_site(name) if name in SITE_NAMES else Path(name)
+    given, name = Path(path), str(path)
+    if name in SHORT:
+        return given if (given / MARK[name]).exists() else example(name)
+    if given.exists() or given.is_absolute():
+        return given
+    try:
+        return example(given.as_posix().removeprefix("examples/"))
+    except InputError:
+        return given
 
 
-def bundled(place: Path, what: str) -> Path:
-    """Where something under examples/ is: inside the installed package, or beside the sources; or InputError."""
-    package = Path(__file__).parents[1]
-    for root in (package, package.parents[1]):
-        if (root / place).is_dir():
-            return root / place
-    raise InputError(f"{what} is missing: neither {package / place} nor {package.parents[1] / place}")
+def copy_examples(directory: Path) -> int:
+    """Copy all examples into a folder, which is made; how many files.
+
+    directory   new or empty
+
+    Raises InputError where it holds something or cannot be written.
+    """
+    root = examples_directory()
+    try:
+        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+            raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
+        shutil.copytree(root, directory, ignore=shutil.ignore_patterns(*SKIPPED), dirs_exist_ok=True)
+    except OSError as problem:
+        raise InputError(f"{directory}: cannot be written: {problem.strerror or problem}") from problem
+    return sum(path.is_file() for path in directory.rglob("*"))

@@ -6,6 +6,7 @@ from typing import Any
 
 from catseye.constants import ARCSECOND
 from catseye.coordinator.firing import GOOD, OF_THE_LINE
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
@@ -19,6 +20,19 @@ OFFSETS = (
 )
 
 
+def simulation_verdict(book: LiveBook) -> Verdict:
+    """Whether the site's epochs are as far from the truth as they claim."""
+    if not book.epochs:
+        return Verdict("failed", "no epoch was solved: the time was too short (expected half a minute at least)")
+    compared = list(book.comparisons.values())
+    if not compared:
+        return Verdict("doubtful", "no epoch could be held against the truth")
+    beyond = sum(each.chi2 > each.band[1] for each in compared)
+    if beyond > len(compared) // 10:
+        return Verdict("doubtful", f"{beyond} of {len(compared)} epochs are farther from the truth than they claim")
+    return Verdict("good", f"{len(compared) - beyond} of {len(compared)} epochs are as near the truth as they claim")
+
+
 def simulation_object(
     book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int
 ) -> dict[str, Any]:
@@ -27,6 +41,7 @@ def simulation_object(
     seconds   of the site's time, from the first round on
     """
     return {
+        "verdict": simulation_verdict(book).to_object(),
         "seed": world.seed,
         "start_mjd": world.start_mjd,
         "motion": world.motion,
@@ -36,7 +51,7 @@ def simulation_object(
         "acknowledged": book.acknowledged,
         "used": sum(book.statuses[status] for status in GOOD),
         "rejected": {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD},
-        "epochs": [_epoch(row, book.comparisons.get(row["number"])) for row in book.epochs],
+        "epochs": [epoch_object(row, book.comparisons.get(row["number"])) for row in book.epochs],
         "faults": list(world.faults),
         "troubles": [
             {"who": who, "kind": kind, "count": n, "text": book.troubles.texts[who, kind]}
@@ -46,7 +61,8 @@ def simulation_object(
     }
 
 
-def _epoch(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
+def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
+    """An epoch as `--json` has it, with how far it is from the truth where it was held against it."""
     epoch = {
         "number": row["number"],
         "mjd": row["ticks"] / TICKS_PER_DAY,

@@ -13,6 +13,7 @@ from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
 from catseye.errors import InputError
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
@@ -113,9 +114,22 @@ def _moved(rows: np.ndarray) -> Moved:
     return Moved((float(mean[0]), float(mean[1]), float(mean[2])), float(np.linalg.norm(rows, axis=1).max()), len(rows))
 
 
+def replay_verdict(outcome: ReplayOutcome) -> Verdict:
+    """Whether the run's own records give its answers again to the last bit; of other records how far they move it."""
+    if outcome.same:
+        return Verdict("good", "every answer is the same bit for bit")
+    if outcome.calibrations is not None:
+        furthest = max((m.largest_mm for m in outcome.moved.values()), default=0.0)
+        return Verdict("good", f"reduced with other records, which move points by up to {furthest:.3f} mm")
+    if not outcome.run.buffers:
+        return Verdict("doubtful", "the run kept no samples, so its answers cannot be had again bit for bit")
+    return Verdict("failed", f"the run's own samples and records give other answers, first {outcome.first}")
+
+
 def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
     """What `catseye replay --json` prints."""
     return {
+        "verdict": replay_verdict(outcome).to_object(),
         "run": outcome.run.run,
         "uuid": outcome.run.uuid,
         "site": outcome.run.site,

@@ -1,7 +1,7 @@
 """The command of the air."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -69,8 +69,9 @@ def air(  # noqa: PLR0913 - its options are its command line
     json: Json = False,
 ) -> None:
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
-    from catseye.gateways.air.objects import air_object
+    from catseye.gateways.air.objects import air_object, air_passages, air_verdict
     from catseye.gateways.writers.objects import json_line
+    from catseye.gateways.writers.passage import Passage
     from catseye.reduction.air.routes import IndexFormula, air_by, station_pressure, surface_of
 
     u_of = {
@@ -112,7 +113,8 @@ def air(  # noqa: PLR0913 - its options are its command line
         u_co2_ppm=u_co2_ppm,
         formula=IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm),
     )
-    answer = air_object(state, wavelength_um, u)
+    verdict = air_verdict(state, u)
+    answer = air_object(state, wavelength_um, u, verdict=verdict)
     if surface_c is not None:
         u_weather = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
         surface = surface_of(state, moisture, surface_c, u_surface_c=u_surface_c, **u_weather)
@@ -120,8 +122,8 @@ def air(  # noqa: PLR0913 - its options are its command line
     if json:
         say(json_line(answer))
         return
-    for name, value in _rows(answer):
-        say(wrapped(name, value))
+    for passage in [Passage("verdict", verdict.text), *air_passages(answer)]:
+        say(wrapped(passage.title, passage.text))
     if surface_c is not None:
         say(wrapped("surface", surface.lines()[0]))
 
@@ -170,30 +172,3 @@ def _one_pressure(
             "needs --mercury-c, and --gravity or both --latitude-deg and --elevation-m.",
             param_hint="'--barometer-mmhg'",
         )
-
-
-def _rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
-    slope = answer["sensitivity"]
-    dew_point = f"{answer['dew_point_c']:.2f} °C" if math.isfinite(answer["dew_point_c"]) else "none"
-    carbon = (
-        f"{slope['co2_ppm'] * 1e8:+.4f} ppm per 100 ppm of carbon dioxide"
-        if slope["co2_ppm"]
-        else f"the formula's air has {answer['co2_ppm']:.0f} ppm of carbon dioxide"
-    )
-    return [
-        ("group index", f"{answer['group_index']:.9f}"),
-        ("phase index", f"{answer['phase_index']:.9f}"),
-        ("uncertainty", f"{answer['standard_uncertainty']:.2g} (of the group index, 1σ)"),
-        ("per °C", f"{slope['temperature_c'] * 1e6:+.4f} ppm"),
-        ("per hPa", f"{slope['pressure_hpa'] * 1e6:+.4f} ppm"),
-        ("per %", f"{slope['humidity_percent'] * 1e6:+.4f} ppm of relative humidity"),
-        ("per nm", f"{slope['wavelength_um'] * 1e3:+.4f} ppm of wavelength"),
-        ("CO2", carbon),
-        ("pressure", f"{answer['pressure_hpa']:.3f} hPa"),
-        (
-            "vapour",
-            f"{answer['vapour_pressure_hpa']:.3f} hPa, {answer['humidity_percent']:.2f} %, dew point {dew_point}",
-        ),
-        ("modulation", f"{answer['group_wavelength']:.9f} m a wavelength at 1500 MHz"),
-        ("formula", f"{answer['model']}, {answer['wavelength_um']:g} µm"),
-    ]

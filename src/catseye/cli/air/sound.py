@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, app, uncertainty
-from catseye.cli.terminal import say, wrapped
+from catseye.cli.results import tell
 from catseye.cli.vocabularies import SOUND_MODELS, one_of
 
 U = {"callback": uncertainty}
@@ -38,16 +38,17 @@ def sound(  # noqa: PLR0913 - its options are its command line
     json: Json = False,
 ) -> None:
     """Speed of sound in air, its sensitivities and its uncertainty, by the notes' formula and today's."""
-    from catseye.atmosphere.sound.speed import sound as sound_of
-    from catseye.gateways.air.sound_objects import sound_object, sound_rows
-    from catseye.gateways.writers.objects import json_line
+    from catseye.api.weather import sound as sound_of
 
-    weather = (temperature_c, pressure_hpa, humidity_percent)
-    state = sound_of(*weather, model=model, co2_ppm=co2_ppm)
-    u = float(state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm))
-    answer = sound_object(state, weather, co2_ppm, u=u)
-    if json:
-        say(json_line(answer))
-        return
-    for title, text in sound_rows(answer):
-        say(wrapped(title, text))
+    result = sound_of(
+        temperature_c,
+        pressure_hpa,
+        humidity_percent,
+        model=model,
+        co2_ppm=co2_ppm,
+        u_temperature_c=u_temperature_c,
+        u_pressure_hpa=u_pressure_hpa,
+        u_humidity_percent=u_humidity_percent,
+        u_co2_ppm=u_co2_ppm,
+    )
+    tell(result, json=json)

@@ -134,10 +134,10 @@ SolidsFile = Annotated[Path | None, typer.Option("--solids", metavar="SOLIDS.tom
 
 def site_of(name: str) -> "SiteFolder":
     """A site's records, by its bundled name or folder."""
-    from catseye.gateways.examples import site_directory
+    from catseye.gateways.examples import located
     from catseye.records.site.folder import read_site
 
-    return read_site(site_directory(name))
+    return read_site(located(name))
 
 
 def mjd_start(text: str | None, usual: float | None = None) -> float:

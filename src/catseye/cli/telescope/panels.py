@@ -87,10 +87,10 @@ def panels(  # noqa: PLR0913 - its options are its command line
 
 def _layout(given: str, focal_length: float) -> "PanelLayout":
     """The layout of a table, or of a site's prisms."""
-    from catseye.gateways.examples import site_directory
+    from catseye.gateways.examples import located
     from catseye.records.panels.layout import layout_of_site, read_layout
     from catseye.records.site.folder import read_site
 
     if given.endswith(".csv"):
         return read_layout(Path(given), focal_length)
-    return layout_of_site(read_site(site_directory(given)))
+    return layout_of_site(read_site(located(given)))

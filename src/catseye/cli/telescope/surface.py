@@ -211,7 +211,7 @@ def _result(
     progress: ProgressLine,
 ) -> "tuple[SurfaceResult, dict[str, str]]":
     """What the inputs say, and the SHA-256 of each file read."""
-    from catseye.gateways.examples import site_directory
+    from catseye.gateways.examples import located
     from catseye.gateways.surface.report import SurfaceResult
     from catseye.records.panels.actuators import read_positions
     from catseye.records.site.folder import read_site
@@ -220,7 +220,7 @@ def _result(
     from catseye.reduction.surface.lookup import lookup_of
     from catseye.reduction.surface.shape import LitAperture, shape_of
 
-    site = read_site(site_directory(telescope))
+    site = read_site(located(telescope))
     aperture = LitAperture.of(site.site.paraboloid)
     epochs, hashes = reading.of(inputs, site)
     shapes = []

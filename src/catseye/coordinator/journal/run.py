@@ -9,11 +9,11 @@ from hashlib import sha256
 import numpy as np
 from sqlalchemy import insert, select
 
-from catseye import __version__
 from catseye.coordinator.journal.entries import Run, plain
 from catseye.coordinator.journal.place import JournalAddress, reading_engine, writing_engine
 from catseye.coordinator.journal.tables import RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
 from catseye.coordinator.parts import Clock, ticks_now
+from catseye.version import __version__
 
 OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
 

@@ -1,17 +1,35 @@
-"""The index of air as a plain object for JSON: SI units unless a key says otherwise."""
+"""The index of air on the way out: its verdict, its lines for people, a plain object for JSON in SI units."""
 
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 
 if TYPE_CHECKING:
     from catseye.atmosphere.index.air import AirState
 
+FORMULA_ALONE = "u is the formula's alone until the sensors' are given (--u-temperature-c and its like)"
 
-def air_object(air: "AirState", wavelength_um: float, u: Any) -> dict[str, Any]:
+
+def air_verdict(air: "AirState", u: Any) -> Verdict:
+    """Good within the formula's limits, which were checked; what its uncertainty stands for.
+
+    u   standard uncertainty of the group index, as told
+    """
+    alone = bool(np.all(np.asarray(u) <= np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)))
+    what = FORMULA_ALONE if alone else "u has the formula's part and the sensors'"
+    return Verdict("good", f"within the limits of {air.model}; {what}")
+
+
+def air_object(air: "AirState", wavelength_um: Any, u: Any, *, verdict: Verdict) -> dict[str, Any]:
     """The air as `catseye air --json` gives it.
 
     u   standard uncertainty of the group index, formula and instruments
     """
     return {
+        "verdict": verdict.to_object(),
         "model": air.model,
         "wavelength_um": wavelength_um,
         "temperature_c": air.temperature_c,
@@ -28,3 +46,50 @@ def air_object(air: "AirState", wavelength_um: float, u: Any) -> dict[str, Any]:
         "standard_uncertainty": u,
         "formula_uncertainty": air.standard_uncertainty,
     }
+
+
+def air_passages(answer: dict[str, Any]) -> list[Passage]:
+    """The index, its uncertainty and its slopes; of many states, from the smallest to the largest value.
+
+    answer   as `air_object` gives it
+    """
+    slope = answer["sensitivity"]
+    carbon = (
+        f"{spread(slope['co2_ppm'], '+.4f', 1e8)} ppm per 100 ppm of carbon dioxide"
+        if np.any(slope["co2_ppm"])
+        else f"the formula's air has {spread(answer['co2_ppm'], '.0f')} ppm of carbon dioxide"
+    )
+    alone = answer["standard_uncertainty"] is answer["formula_uncertainty"] or np.array_equal(
+        answer["standard_uncertainty"], answer["formula_uncertainty"]
+    )
+    whose = "the formula's alone: the sensors' are not given" if alone else "the formula's and the sensors'"
+    dew_point = spread(answer["dew_point_c"], ".2f")
+    rows = {
+        "group index": spread(answer["group_index"], ".9f"),
+        "phase index": spread(answer["phase_index"], ".9f"),
+        "uncertainty": f"{spread(answer['standard_uncertainty'], '.2g')} (of the group index, 1σ; {whose})",
+        "per °C": f"{spread(slope['temperature_c'], '+.4f', 1e6)} ppm",
+        "per hPa": f"{spread(slope['pressure_hpa'], '+.4f', 1e6)} ppm",
+        "per %": f"{spread(slope['humidity_percent'], '+.4f', 1e6)} ppm of relative humidity",
+        "per nm": f"{spread(slope['wavelength_um'], '+.4f', 1e3)} ppm of wavelength",
+        "CO2": carbon,
+        "pressure": f"{spread(answer['pressure_hpa'], '.3f')} hPa",
+        "vapour": f"{spread(answer['vapour_pressure_hpa'], '.3f')} hPa, {spread(answer['humidity_percent'], '.2f')} %, "
+        f"dew point {dew_point}{'' if dew_point == 'none' else ' °C'}",
+        "modulation": f"{spread(answer['group_wavelength'], '.9f')} m a wavelength at 1500 MHz",
+        "formula": f"{answer['model']}, {spread(answer['wavelength_um'], 'g')} µm",
+    }
+    return [Passage(title, text) for title, text in rows.items()]
+
+
+def spread(values: Any, form: str, factor: float = 1.0) -> str:
+    """A number, or of several the smallest and the largest; "none" where there is none.
+
+    >>> spread(1.5, ".2f"), spread([1.0, 3.0, 2.0], "g"), spread(float("nan"), "g")
+    ('1.50', '1 to 3', 'none')
+    """
+    known = np.asarray(values, dtype=float)[np.isfinite(values)] * factor
+    if not known.size:
+        return "none"
+    low, high = (format(float(v), form) for v in (known.min(), known.max()))
+    return low if low == high else f"{low} to {high}"

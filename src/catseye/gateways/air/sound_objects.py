@@ -2,18 +2,24 @@
 
 from typing import Any
 
+import numpy as np
+
 from catseye.atmosphere.sound import parker2004 as sound_parker2004
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import MODELS, Sound, sound
 from catseye.errors import ValidityError
+from catseye.gateways.air.objects import FORMULA_ALONE, spread
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 
+Weather = tuple[Any, Any, Any]
 FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give
 
 
-def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: float, *, u: float) -> dict[str, Any]:
+def sound_object(state: Sound, weather: Weather, co2_ppm: Any, *, u: Any) -> dict[str, Any]:
     """Sound as `catseye sound --json` gives it.
 
-    weather   temperature °C, pressure hPa, relative humidity %
+    weather   temperature °C, pressure hPa, relative humidity %, numbers or arrays
     u         standard uncertainty of the speed, formula and inputs, m/s
     """
     slopes = state.sensitivity._asdict()
@@ -21,6 +27,7 @@ def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: flo
         del slopes["co2_ppm"]
     t, p, h = weather
     return {
+        "verdict": sound_verdict(state, u).to_object(),
         "model": state.model,
         "temperature_c": t,
         "pressure_hpa": p,
@@ -40,7 +47,7 @@ def sound_object(state: Sound, weather: tuple[float, float, float], co2_ppm: flo
     }
 
 
-def gamma_water_cost(state: Sound, weather: tuple[float, float, float]) -> dict[str, Any]:
+def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
     """What the ratio of specific heats that the notes print for water costs, at this weather."""
     t, p, _ = weather
     printed = sound_parker2004.speed(t, p, state.vapour_pressure_hpa)
@@ -54,45 +61,56 @@ def gamma_water_cost(state: Sound, weather: tuple[float, float, float]) -> dict[
     }
 
 
-def sound_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
-    """The object's lines for a terminal, each (title, text)."""
+def sound_verdict(state: Sound, u: Any) -> Verdict:
+    """Good within the formula's limits, which were checked; what its uncertainty stands for.
+
+    u   standard uncertainty of the speed, m/s, as told
+    """
+    alone = bool(np.all(np.asarray(u) <= state.standard_uncertainty * (1.0 + 1e-12)))
+    what = FORMULA_ALONE if alone else "u has the formula's part and the sensors'"
+    return Verdict("good", f"within the limits of {state.model}; {what}")
+
+
+def sound_passages(answer: dict[str, Any]) -> list[Passage]:
+    """The speed, its slopes and what other formulas say; of many states, from the smallest to the largest value.
+
+    answer   as `sound_object` gives it
+    """
     slope, cost, low = answer["sensitivity"], answer["notes_gamma_w"], answer["dispersion"][0]
     carbon = (
-        f"{slope['co2_ppm'] * 100.0:+.5f} m/s per 100 ppm of carbon dioxide"
+        f"{spread(slope['co2_ppm'], '+.5f', 100.0)} m/s per 100 ppm of carbon dioxide"
         if "co2_ppm" in slope
         else "the formula's air has its own carbon dioxide"
     )
     others = "; ".join(
-        f"{name} {item['speed']:.3f} ± {item['standard_uncertainty']:.2g} m/s"
+        f"{name} {spread(item['speed'], '.3f')} ± {item['standard_uncertainty']:.2g} m/s"
         if item["speed"] is not None
         else f"{name}: {item['reason']}"
         for name, item in answer["models"].items()
     )
-    return [
-        ("speed", f"{answer['speed']:.3f} m/s at zero frequency, dry air {answer['dry_speed']:.3f} m/s"),
-        ("uncertainty", f"{answer['standard_uncertainty']:.2g} m/s (1σ)"),
-        ("per °C", f"{slope['temperature_c']:+.6f} m/s"),
-        ("per hPa", f"{slope['pressure_hpa']:+.6f} m/s"),
-        ("per %", f"{slope['humidity_percent']:+.6f} m/s of relative humidity"),
-        ("per hPa (e)", f"{slope['vapour_pressure_hpa']:+.6f} m/s"),
-        ("CO2", carbon),
-        (
-            "time",
-            f"{answer['travel_time_per_m'] * 1e3:.6f} ms/m, {answer['travel_time_per_m_per_c'] * 1e6:+.4f} µs/m/°C",
-        ),
-        ("vapour", f"{answer['vapour_pressure_hpa']:.3f} hPa"),
-        ("formula", answer["model"]),
-        ("formulas", others),
-        (
-            "notes",
-            f"γ_w = {cost['printed']} (4.3) is printed for {cost['right']:.2f}: slow by {cost['slow_by']:.3f} m/s, "
-            f"{cost['temperature_read_high_by_c']:.2f} °C too warm in thermometry",
-        ),
-        ("dispersion", f"at {low['frequency_hz']:g} Hz faster by {low['phase_excess']:.3f} m/s"),
-    ]
+    rows = {
+        "speed": f"{spread(answer['speed'], '.3f')} m/s at zero frequency, dry air "
+        f"{spread(answer['dry_speed'], '.3f')} m/s",
+        "uncertainty": f"{spread(answer['standard_uncertainty'], '.2g')} m/s (1σ)",
+        "per °C": f"{spread(slope['temperature_c'], '+.6f')} m/s",
+        "per hPa": f"{spread(slope['pressure_hpa'], '+.6f')} m/s",
+        "per %": f"{spread(slope['humidity_percent'], '+.6f')} m/s of relative humidity",
+        "per hPa (e)": f"{spread(slope['vapour_pressure_hpa'], '+.6f')} m/s",
+        "CO2": carbon,
+        "time": f"{spread(answer['travel_time_per_m'], '.6f', 1e3)} ms/m, "
+        f"{spread(answer['travel_time_per_m_per_c'], '+.4f', 1e6)} µs/m/°C",
+        "vapour": f"{spread(answer['vapour_pressure_hpa'], '.3f')} hPa",
+        "formula": answer["model"],
+        "formulas": others,
+        "notes": f"γ_w = {cost['printed']} (4.3) is printed for {cost['right']:.2f}: slow by "
+        f"{spread(cost['slow_by'], '.3f')} m/s, {spread(cost['temperature_read_high_by_c'], '.2f')} °C too warm in "
+        "thermometry",
+        "dispersion": f"at {low['frequency_hz']:g} Hz faster by {spread(low['phase_excess'], '.3f')} m/s",
+    }
+    return [Passage(title, text) for title, text in rows.items()]
 
 
-def _speed_by(name: str, weather: tuple[float, float, float], co2_ppm: float) -> dict[str, Any]:
+def _speed_by(name: str, weather: Weather, co2_ppm: Any) -> dict[str, Any]:
     try:
         state = sound(*weather, model=name, co2_ppm=co2_ppm)
     except ValidityError as problem:
@@ -100,10 +118,10 @@ def _speed_by(name: str, weather: tuple[float, float, float], co2_ppm: float) ->
     return {"speed": state.speed, "standard_uncertainty": state.standard_uncertainty}
 
 
-def _dispersed(state: Sound, weather: tuple[float, float, float], frequency: float) -> dict[str, float]:
+def _dispersed(state: Sound, weather: Weather, frequency: float) -> dict[str, Any]:
     share = dispersion(weather[0], weather[1], state.vapour_pressure_hpa, frequency_hz=frequency)
     return {
         "frequency_hz": frequency,
-        "phase_excess": float(share.phase * state.speed),
-        "group_excess": float(share.group * state.speed),
+        "phase_excess": share.phase * state.speed,
+        "group_excess": share.group * state.speed,
     }

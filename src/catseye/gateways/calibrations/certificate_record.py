@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from catseye import __version__
 from catseye.gateways.writers.objects import plain
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import PROVENANCE
+from catseye.version import __version__
 
 FORMAT = "catseye-calibration-1"
 MARK = f'format = "{FORMAT}"'  # by which a file is known as ours

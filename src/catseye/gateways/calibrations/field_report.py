@@ -6,7 +6,6 @@ from html import escape
 
 import numpy as np
 
-from catseye import __version__
 from catseye.constants import DEGREE
 from catseye.gateways.calibrations.certificate import SIGNATURES
 from catseye.gateways.calibrations.field_report_fields import (
@@ -21,6 +20,7 @@ from catseye.gateways.calibrations.field_report_fields import (
 )
 from catseye.gateways.writers.page import page
 from catseye.geometry.mirror.mount import gamma, lambda_
+from catseye.version import __version__
 
 SERVO_ROWS = 9  # an axis's position at the cube and its eight chip settings
 MATRIX_CELLS = 9

@@ -9,10 +9,12 @@ from catseye.constants import MILLIMETRE
 from catseye.estimation.quality.propagation import Input, agreement
 from catseye.gateways.epoch.summary import MEANING
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.budget.explanation import Explanation
 
 MICROMETRE = 1e-6
+LIKELY_SLIP = 1e-6  # probability of another number of whole cycles that is worth a word
 SMALLEST_SHARE = 5e-5  # of a line in the text's table
 START_OF_MJD = datetime(1858, 11, 17)
 
@@ -27,6 +29,7 @@ def explanation_object(explanation: Explanation, seed: int | None = None) -> dic
     """
     budget, cycles = explanation.budget, explanation.cycles
     return {
+        "verdict": explanation_verdict(explanation).to_object(),
         "shot": explanation.shot,
         "ranger": explanation.ranger,
         "target": explanation.target,
@@ -53,6 +56,24 @@ def explanation_object(explanation: Explanation, seed: int | None = None) -> dic
         "references": [{"shot": s, "after": after, "weight": w} for s, after, w in explanation.references],
         "notes": list(explanation.notes),
     }
+
+
+def explanation_verdict(explanation: Explanation) -> Verdict:
+    """Whether the shot has a range that its own chain and the network bear out."""
+    if explanation.budget is None:
+        if explanation.status == "reference":
+            return Verdict("good", "a reference shot, which follows the electronics and has no range of its own")
+        return Verdict("failed", f"no range: {explanation.reason or explanation.status}")
+    if explanation.reason:
+        return Verdict("doubtful", f"left out of the adjustment: {explanation.reason}")
+    if explanation.cycles is not None and float(explanation.cycles.slip_probability) > LIKELY_SLIP:
+        chance = float(explanation.cycles.slip_probability)
+        return Verdict("doubtful", f"the number of whole cycles is another with a probability of {chance:.1e}")
+    if explanation.scattered is not None and agreement(explanation.budget, explanation.scattered, digits=1) is False:
+        return Verdict("doubtful", "the budget differs from its Monte Carlo: believe the Monte Carlo")
+    if explanation.adjusted is None:
+        return Verdict("doubtful", "no adjustment stands behind it, so nothing checks it")
+    return Verdict("good", "it took part in the adjustment, which bears it out")
 
 
 def _inputs(explanation: Explanation) -> list[dict[str, Any]]:

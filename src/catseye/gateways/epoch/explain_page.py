@@ -11,13 +11,15 @@ from catseye.gateways.epoch.explain import (
     SMALLEST_SHARE,
     distribution,
     explanation_passages,
+    explanation_verdict,
     metres,
     micrometres,
     when,
 )
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, mpl, styled, svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.budget.explanation import Explanation
 from catseye.reduction.budget.scene import Assumptions
@@ -46,9 +48,9 @@ def explanation_page(explanation: Explanation, campaign: Campaign, made_at: date
         f"explained by catseye on {made_at:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>"
     )
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(explanation))
-    body = [header, _cards(explanation), f"<dl>{words}</dl>"]
+    body = [header, verdict_line(explanation_verdict(explanation)), _cards(explanation), f"<dl>{words}</dl>"]
     if explanation.budget is not None:
-        drawn = figures(explanation)
+        drawn = {name: svg(figure) for name, figure in figures(explanation).items()}
         body += [
             _budget(explanation, drawn["contributions"]),
             _scattered(drawn.get("histogram")),
@@ -58,15 +60,13 @@ def explanation_page(explanation: Explanation, campaign: Campaign, made_at: date
     return page(f"catseye: shot {explanation.shot} of {name}", "\n".join(part for part in body if part))
 
 
-def figures(explanation: Explanation) -> dict[str, str]:
-    """The budget's contributions and, after a Monte Carlo, its histogram, as SVG text."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+def figures(explanation: Explanation) -> dict[str, Figure]:
+    """The budget's contributions and, after a Monte Carlo, its histogram."""
+    with styled():
         drawn = {"contributions": _contributions(explanation)}
         if explanation.scattered is not None:
             drawn["histogram"] = _histogram(explanation)
-        return {name: svg(figure) for name, figure in drawn.items()}
+        return drawn
 
 
 def _colour(key: str) -> str:

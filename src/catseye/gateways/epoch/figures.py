@@ -1,4 +1,4 @@
-"""Figures of a reduction as SVG text, drawn without a display."""
+"""Figures of a reduction, drawn without a display."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from matplotlib.collections import EllipseCollection, LineCollection
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
 from catseye.gateways.epoch.tables import kind_of
-from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, nice, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, Figure, nice, styled
 from catseye.reduction.epoch.epoch import Reduction
 
 COLOURS = {
@@ -23,11 +23,9 @@ MARKERS = {"ground ranger": "^", "feed-arm ranger": "s", "structure": "D", "benc
 LOOSE = 1.0 * MILLIMETRE  # u of a coordinate beyond which the ranges do not hold it and no ellipsoid is drawn
 
 
-def figures(reduction: Reduction) -> dict[str, str]:
-    """Every figure of the report by its name, as SVG text."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+def figures(reduction: Reduction) -> dict[str, Figure]:
+    """Every figure of the report by its name."""
+    with styled():
         drawn = {
             "plan": _plan(reduction),
             "elevation": _elevation(reduction),
@@ -39,7 +37,7 @@ def figures(reduction: Reduction) -> dict[str, str]:
         }
         if reduction.surface is not None:
             drawn["dish"] = _dish(reduction)
-        return {name: svg(figure) for name, figure in drawn.items() if figure is not None}
+        return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
 def _view(reduction: Reduction, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

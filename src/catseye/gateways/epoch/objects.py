@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.constants import PPM
+from catseye.gateways.epoch.summary import verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.output import FORMAT
 
@@ -29,6 +30,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
         points[name] = {"x": x, "y": y, "z": z, "covariance": covariance, "shots": coordinates.shots[row]}
     total, used, rejected = len(reduction.status), reduction.status.count("used"), len(reduction.rejected)
     return {
+        "verdict": verdict(reduction).to_object(),
         "campaign": reduction.campaign.site.campaign.name,
         "frame": "ground",
         "status": coordinates.status,

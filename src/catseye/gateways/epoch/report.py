@@ -9,10 +9,12 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.epoch.figures import figures
 from catseye.gateways.epoch.objects import benchmark_object
-from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits
+from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits, verdict
 from catseye.gateways.epoch.tables import kind_of
+from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
@@ -34,7 +36,7 @@ CONTENTS = {
 
 def report(reduction: Reduction, when: datetime) -> str:
     """The whole page of a reduction, HTML."""
-    drawn = figures(reduction)
+    drawn = {name: svg(figure) for name, figure in figures(reduction).items()}
     name = reduction.campaign.site.campaign.name
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
@@ -46,6 +48,7 @@ def report(reduction: Reduction, when: datetime) -> str:
     )
     body = [
         header,
+        verdict_line(verdict(reduction)),
         _summary(reduction),
         _feed_arm(reduction, drawn),
         _dish(reduction, drawn),

@@ -5,12 +5,15 @@ from collections import Counter
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
+from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.gateways.epoch.tables import kind_of
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 
+MOST_REJECTED = 0.1  # share of all shots; more is no usual night
 MEANING = {
     "blocked": "nothing came back",
     "reflected": "light from elsewhere in the return",
@@ -21,6 +24,31 @@ MEANING = {
     "bad reference": "something else in the beam of the internal cube",
     "no reference": "the drift of the electronics is unknown",
 }
+
+
+def verdict(reduction: Reduction) -> Verdict:
+    """Whether the night may be relied on: its scatter bears out what is claimed, and few shots were lost."""
+    coordinates = reduction.coordinates
+    factor, degrees = coordinates.variance_factor, coordinates.degrees_of_freedom
+    if coordinates.status != CONVERGED:
+        return Verdict("failed", f"the adjustment did not settle: {coordinates.status}")
+    if not (np.isfinite(factor) and degrees >= 1.0):
+        return Verdict("doubtful", "nothing was measured twice, so nothing checks the claimed uncertainties")
+    _, spread = trust_limits(reduction)
+    if factor > 1.0 + 2.0 * spread:
+        more = 100.0 * (np.sqrt(factor) - 1.0)
+        return Verdict("doubtful", f"the measurements scatter {more:.0f} % more than their uncertainties claim")
+    shots, rejected = len(reduction.status), len(reduction.rejected)
+    if rejected > MOST_REJECTED * shots:
+        return Verdict("doubtful", f"{rejected} of {shots} shots were rejected, over {100.0 * MOST_REJECTED:.0f} %")
+    count = Counter(reduction.status)
+    if count[ShotStatus.UNDECIDED]:
+        return Verdict(
+            "doubtful",
+            f"{count[ShotStatus.UNDECIDED]} shots contradict each other, and nothing says which is wrong",
+        )
+    says = "as their uncertainties claim" if factor >= 1.0 - 2.0 * spread else "less than their uncertainties claim"
+    return Verdict("good", f"the measurements scatter {says}, and {rejected} of {shots} shots were rejected")
 
 
 def passages(reduction: Reduction) -> list[Passage]:

@@ -12,10 +12,10 @@ from xml.sax.saxutils import escape
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from catseye import __version__
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.estimation.network.diagnosis import unconnected
 from catseye.gateways.network.findings import Findings
+from catseye.version import __version__
 
 NAMESPACE = "http://www.gnu.org/software/gama/gama-local-adjustment"
 GON = TWO_PI / 400.0  # rad

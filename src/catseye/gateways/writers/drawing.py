@@ -2,6 +2,8 @@
 
 import io
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ with deferred():  # its first import writes that cache under a lock file
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "svg"]
+__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "styled", "svg"]
 
 INK, FAINT, GRID, BAD = "#22303c", "#6b7883", "#e3e8ec", "#c8323c"
 SERIES = ("#1f5a99", "#d9641e", "#1e8e74", "#8a5fa8", "#b08a1e", "#6f8fa8")
@@ -47,10 +49,20 @@ STYLE: Any = {
 }
 
 
+@contextmanager
+def styled() -> Iterator[None]:
+    """Within the block figures look like catseye's, whatever the user's own settings are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
 def svg(figure: Figure) -> str:
     """A figure as SVG text, the same for the same figure."""
     stream = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+    with styled():
+        FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
     return stream.getvalue()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye import __version__
+from catseye.version import __version__
 
 PACKAGES = ("numpy", "scipy", "pydantic", "matplotlib", "threadpoolctl", "typer")
 

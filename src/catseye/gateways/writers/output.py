@@ -31,22 +31,24 @@ FORMATS = (
     "catseye-track-profile-1",
     "catseye-structure-1",
     "catseye-panels-1",
+    "catseye-result-1",
 )
 
 
-def refuse_output(out: Path, campaign: Path) -> Path:
+def refuse_output(out: Path, *read: Path) -> Path:
     """The directory that `out` stands for, links resolved, when it can be made or replaced; or InputError.
 
-    out        as the user wrote it; missing, empty, or an earlier output of catseye and of nobody else
-    campaign   the directory or file that is read, which must be neither in it nor around it
+    out    as the user wrote it; missing, empty, or an earlier output of catseye and of nobody else
+    read   the directories and files that are read, which must be neither in it nor around it
     """
     where = out.resolve()
-    source = campaign.resolve()
     here = Path.cwd().resolve()
     if where == here or where in here.parents:
         raise InputError(f"--out {out}: is the current directory or holds it (expected a directory of its own)")
-    if where == source or where in source.parents or source in where.parents:
-        raise InputError(f"--out {out}: is, holds or lies in the input {campaign} (expected a place outside it)")
+    for each in read:
+        source = each.resolve()
+        if where == source or where in source.parents or source in where.parents:
+            raise InputError(f"--out {out}: is, holds or lies in the input {each} (expected a place outside it)")
     if not where.parent.is_dir():
         raise InputError(f"--out {out}: {out.parent} is not a directory (expected an existing one)")
     if not os.access(where.parent, os.W_OK | os.X_OK):
@@ -85,12 +87,12 @@ def _written(where: Path) -> set[str]:
 
 
 @contextmanager
-def whole_directory(out: Path, campaign: Path) -> Iterator[Path]:
+def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
     """A directory to write into, which takes the place of `out` when the block ends well and vanishes otherwise.
 
     It is a neighbour of `out`, so that putting it in place is a rename.
     """
-    where = refuse_output(out, campaign)
+    where = refuse_output(out, *read)
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     old = where.parent / f".catseye-{secrets.token_hex(6)}"
 
@@ -104,7 +106,7 @@ def whole_directory(out: Path, campaign: Path) -> Iterator[Path]:
         try:
             fresh.mkdir()
             yield fresh
-            refuse_output(out, campaign)
+            refuse_output(out, *read)
             with deferred():
                 _replace(where, fresh, old)
         except OSError as problem:

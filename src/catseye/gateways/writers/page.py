@@ -34,6 +34,10 @@ th, td { padding: .32rem .7rem; border-bottom: 1px solid var(--line); vertical-a
 tr:last-child td { border-bottom: 0; } td.n, th.n { text-align: right; white-space: nowrap; }
 td.w { white-space: normal; min-width: 18rem; } td.h { font-family: ui-monospace, monospace; font-size: .78rem; }
 .notes li { margin: .2rem 0; } .bad { color: var(--bad); font-weight: 600; }
+.verdict { margin: 1.1rem 0; padding: .7rem .95rem; border-radius: 4px; max-width: none; border-left: 6px solid; }
+.verdict b { margin-right: .1rem; } .verdict.good { background: #eaf4f0; border-color: #1e8e74; }
+.verdict.doubtful { background: #fbf3e2; border-color: #b87a00; }
+.verdict.failed { background: #fbecec; border-color: var(--bad); }
 summary { cursor: pointer; color: var(--accent); margin: .6rem 0; }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
   .scroll { overflow: visible; max-height: none; border: 0; } figure, .card, tr { break-inside: avoid; }

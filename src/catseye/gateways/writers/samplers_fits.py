@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from catseye import __version__
 from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE, write_whole
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
+from catseye.version import __version__
 
 MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
 TIME = "MJD"

@@ -1,0 +1,288 @@
+"""`reduce` and `explain`: a night of samples to coordinates, and one of its shots down to every input."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from catseye.api.reading import place_of
+from catseye.api.result import Progress, Result, quantities
+from catseye.constants import MILLIMETRE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from astropy.table import QTable
+    from matplotlib.figure import Figure
+
+    from catseye.gateways.writers.passage import Passage
+    from catseye.records.night.campaign import Campaign
+    from catseye.reduction.budget.explanation import Explanation
+    from catseye.reduction.epoch.epoch import Reduction
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NightResult(Result):
+    """A night reduced: n points in the ground frame (x east, y north, z up; m).
+
+    names                of the points
+    x                    (n, 3) m
+    covariance           (3n, 3n) m², x, y, z of each point in turn
+    u                    (n, 3) m, standard uncertainties
+    shots                (n,) int, used shots that each point had part in
+    variance_factor      [pvv] / degrees of freedom, expectation 1
+    degrees_of_freedom   of the adjustment
+    rejected             shot id -> reason; reference shots included
+    refractivity_ppm     mean group refractivity over the used paths
+    pose                 the dish against its nominal posture as `--json` has it; None where it was not seen
+    notes                what a person should know, one line each
+    reduction            everything else: phases, ranges, electronics, surface
+    """
+
+    names: tuple[str, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    u: np.ndarray
+    shots: np.ndarray
+    variance_factor: float
+    degrees_of_freedom: float
+    rejected: dict[int, str]
+    refractivity_ppm: float
+    pose: dict[str, Any] | None
+    notes: tuple[str, ...]
+    reduction: "Reduction"
+
+    def passages(self) -> "Sequence[Passage]":
+        """The night, the shots, the feed arm, the dish, the air, and how far to trust it all."""
+        from catseye.gateways.epoch.summary import passages
+
+        return passages(self.reduction)
+
+    def headline(self) -> "Sequence[Passage]":
+        """The night and the feed arm."""
+        return [p for p in self.passages() if p.title in ("The night", "The feed arm")]
+
+    def to_object(self) -> dict[str, Any]:
+        """As `catseye reduce --json`."""
+        from catseye.gateways.epoch.objects import reduction_object
+
+        return reduction_object(self.reduction)
+
+    def tables(self) -> "dict[str, QTable]":
+        """`points`: a row a point; `ranges`: a row a shot that was adjusted; `surface`: a row a prism of the dish."""
+        from catseye.gateways.epoch.tables import kind_of
+
+        blocks = self.covariance.reshape(len(self.names), 3, len(self.names), 3)
+        own = blocks[np.arange(len(self.names)), :, np.arange(len(self.names))]
+        points = {
+            "point": (self.names, ""),
+            "kind": ([kind_of(self.reduction, name) for name in self.names], ""),
+            **{axis: (self.x[:, k], "m") for k, axis in enumerate("xyz")},
+            **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate("xyz")},
+            "covariance": (own / MILLIMETRE**2, "mm2"),
+            "shots": (self.shots, ""),
+        }
+        ranges = self.reduction.coordinates.ranges
+        shots = {
+            "shot": (self.reduction.campaign.shots.shot[ranges.shot], ""),
+            "ranger": (ranges.ranger, ""),
+            "target": (ranges.target, ""),
+            "range": (ranges.range_, "m"),
+            "u_range": (ranges.u_range / MILLIMETRE, "mm"),
+            "residual": (ranges.residual / MILLIMETRE, "mm"),
+            "standardised": (ranges.standardised, ""),
+            "used": (ranges.used, ""),
+        }
+        tables = {"points": quantities(points, frame="ground"), "ranges": quantities(shots)}
+        surface = self.reduction.surface
+        if surface is not None:
+            tables["surface"] = quantities(
+                {
+                    "point": (surface.names, ""),
+                    "deviation": (surface.fit.deviation / MILLIMETRE, "mm"),
+                    "u_deviation": (surface.u_deviation / MILLIMETRE, "mm"),
+                }
+            )
+        return tables
+
+    def figures(self) -> "dict[str, Figure]":
+        """The figures of the report: plan, elevation, feed arm, residuals, zeros, air, dish."""
+        from catseye.gateways.epoch.figures import figures
+
+        return figures(self.reduction)
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """As `catseye reduce --out`."""
+        from catseye.gateways.epoch.files import write_reduction
+
+        write_reduction(self.reduction, directory, progress)
+
+    def sources(self) -> tuple[Path, ...]:
+        """The campaign's directory."""
+        return (self.reduction.campaign.directory,)
+
+
+def reduce(
+    campaign: "str | os.PathLike[str] | Campaign" = "night-01",
+    *,
+    air_model: str = "ciddor_hill1999",
+    progress: Progress | None = None,
+) -> NightResult:
+    """A night's samples to coordinates, pose and surface, nothing moving meanwhile.
+
+    campaign    directory laid out as the bundled night-01, its bundled name, or what `load` gave
+    air_model   formula for the index of air
+    progress    called with (what, done, of how many)
+
+    Raises InputError where the campaign cannot be used and EstimationError where the adjustment finds no answer.
+
+    >>> night = reduce("night-01")
+    >>> night.x.shape, night.verdict.word
+    ((64, 3), 'good')
+    """
+    from catseye.gateways.epoch.objects import reduction_object
+    from catseye.gateways.epoch.summary import verdict
+    from catseye.reduction.epoch.epoch import reduce_epoch
+    from catseye.reduction.epoch.settings import ReductionSettings
+
+    reduction = reduce_epoch(campaign_of(campaign), ReductionSettings(air_model=air_model), progress)
+    coordinates = reduction.coordinates
+    return NightResult(
+        verdict(reduction),
+        tuple(coordinates.points),
+        coordinates.x,
+        coordinates.covariance,
+        np.sqrt(np.maximum(np.diag(coordinates.covariance), 0.0)).reshape(-1, 3),
+        np.array([coordinates.shots[k] for k in range(len(coordinates.points))]),
+        coordinates.variance_factor,
+        coordinates.degrees_of_freedom,
+        {shot: str(reason) for shot, reason in reduction.rejected.items()},
+        coordinates.refractivity_ppm,
+        reduction_object(reduction)["pose"],
+        reduction.notes,
+        reduction,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExplanationResult(Result):
+    """One shot explained, before any adjustment.
+
+    shot, ranger, target   which
+    status        what became of it
+    range_        m, as this shot alone gives it; None where it gives none
+    u_range       m, standard uncertainty
+    explanation   everything else: budget, Monte Carlo, whole cycles, the network's word
+    """
+
+    shot: int
+    ranger: str
+    target: str
+    status: str
+    range_: float | None
+    u_range: float | None
+    explanation: "Explanation"
+    campaign: "Campaign"
+    seed: int | None
+
+    def passages(self) -> "Sequence[Passage]":
+        """The shot, its return, its range, cycles, Monte Carlo and the network's word."""
+        from catseye.gateways.epoch.explain import explanation_passages
+
+        return explanation_passages(self.explanation)
+
+    def headline(self) -> "Sequence[Passage]":
+        """The shot and its range."""
+        return [p for p in self.passages() if p.title in (f"Shot {self.shot}", "The range")]
+
+    def to_object(self) -> dict[str, Any]:
+        """As `catseye explain --json`."""
+        from catseye.gateways.epoch.explain import explanation_object
+
+        return explanation_object(self.explanation, self.seed)
+
+    def tables(self) -> "dict[str, QTable]":
+        """`budget`: a row an input; value, u and slope are in each input's own unit, which stands beside it."""
+        items, budget = self.explanation.items, self.explanation.budget
+        rows = range(len(items) if budget is not None else 0)
+        columns = {
+            "input": ([items[k].given.name for k in rows], ""),
+            "value": ([items[k].given.value for k in rows], ""),
+            "u": ([items[k].given.u for k in rows], ""),
+            "unit": ([items[k].unit for k in rows], ""),
+            "contribution": ([1e6 * budget.contribution[k] for k in rows] if budget is not None else [], "um"),
+            "share": ([100.0 * budget.share[k] for k in rows] if budget is not None else [], "%"),
+        }
+        return {"budget": quantities(columns, shot=self.shot)}
+
+    def figures(self) -> "dict[str, Figure]":
+        """Contributions of the inputs and, after a Monte Carlo, its histogram."""
+        from catseye.gateways.epoch.explain_page import figures
+
+        return figures(self.explanation) if self.explanation.budget is not None else {}
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """The page that `--page` writes, as explanation.html, with the table and the JSON."""
+        from catseye.gateways.epoch.explain_page import explanation_page
+
+        self.write_files(
+            directory,
+            progress,
+            {"explanation.html": lambda now: explanation_page(self.explanation, self.campaign, now)},
+        )
+
+    def inputs(self) -> dict[str, str]:
+        """The campaign's files."""
+        return self.campaign.hashes
+
+    def sources(self) -> tuple[Path, ...]:
+        """The campaign's directory."""
+        return (self.campaign.directory,)
+
+
+def explain(
+    campaign: "str | os.PathLike[str] | Campaign",
+    shot: int,
+    *,
+    air_model: str = "ciddor_hill1999",
+    monte_carlo: int = 200_000,
+    seed: int = 1,
+    progress: Progress | None = None,
+) -> ExplanationResult:
+    """The range of one shot and every cause of its uncertainty, before any adjustment.
+
+    campaign      as for `reduce`
+    shot          its number in shots.csv
+    monte_carlo   draws through the whole chain; 0 for none
+    seed          of the draws
+
+    Raises InputError for an unknown shot.
+    """
+    from catseye.gateways.epoch.explain import explanation_verdict
+    from catseye.reduction.budget.explanation import explain_shot
+    from catseye.reduction.epoch.settings import ReductionSettings
+
+    night = campaign_of(campaign)
+    settings = ReductionSettings(air_model=air_model)
+    found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
+    return ExplanationResult(
+        explanation_verdict(found),
+        found.shot,
+        found.ranger,
+        found.target,
+        str(found.status),
+        found.budget.value if found.budget is not None else None,
+        found.budget.u if found.budget is not None else None,
+        found,
+        night,
+        seed if monte_carlo else None,
+    )
+
+
+def campaign_of(source: "str | os.PathLike[str] | Campaign") -> "Campaign":
+    """The campaign itself, read where a path or a name was given."""
+    from catseye.records.night.campaign import Campaign, read_campaign
+
+    return source if isinstance(source, Campaign) else read_campaign(place_of(source))

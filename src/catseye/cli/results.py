@@ -1,0 +1,51 @@
+"""How commands end: a result told to people or programs, written where asked, and the exit status it deserves."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from catseye.cli.terminal import complain, say, wrapped
+
+if TYPE_CHECKING:
+    from catseye.api.result import Result
+    from catseye.gateways.writers.verdict import Verdict
+
+Strict = Annotated[bool, typer.Option("--strict", help="Exit with 1, after writing, where the verdict is not good.")]
+
+
+def tell(
+    result: "Result",
+    *,
+    json: bool,
+    quiet: bool = False,
+    strict: bool = False,
+    rows: Iterable[str] = (),
+    written: Sequence[tuple[str, object]] = (),
+) -> None:
+    """Say a result: its JSON, or verdict, sentences and rows; then leave with 1 where `strict` asks for it.
+
+    rows      lines that follow the sentences, for people only
+    written   title and what was written under it; None: nothing was
+    """
+    if json:
+        from catseye.gateways.writers.objects import json_line
+
+        say(json_line(result.to_object()))
+    elif not quiet:
+        say(wrapped("Verdict", result.verdict.text))
+        for passage in result.passages():
+            say(wrapped(passage.title, passage.text))
+        for row in rows:
+            say(row)
+        for title, what in written:
+            if what is not None:
+                say(wrapped(title, str(what)))
+    judge(result.verdict, strict=strict)
+
+
+def judge(verdict: "Verdict", *, strict: bool) -> None:
+    """Leave with exit status 1 and the verdict on stderr, where `strict` and the verdict is not good."""
+    if strict and verdict.word != "good":
+        complain(verdict.text)
+        raise typer.Exit(1)
