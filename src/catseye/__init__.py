@@ -1,20 +1,33 @@
 """Catseye: laser metrology for large telescopes and structures, from raw samples to coordinates with uncertainty.
 
     >>> import catseye
-    >>> float(round(catseye.air(temperature_c=20, pressure_hpa=933, humidity_percent=50).group_index, 9))
-    1.000254297
+    >>> round(float(catseye.air(temperature_c=20, pressure_hpa=933, humidity_percent=50).group_index), 9)
+    1.000253319
 
-Its functions are those of `catseye.api`, loaded when they are first asked for; its errors those of `catseye.errors`.
+Its functions are those of the files in `catseye.api`, loaded when they are first asked for; its errors those of
+`catseye.errors`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from catseye.errors import CatseyeError, EstimationError, FrameError, InputError, ValidityError
 from catseye.version import __version__
 
 if TYPE_CHECKING:
-    from catseye.api import air, examples, explain, load, reduce, replay, save, show, simulate, sound
+    from catseye.api.living import replay, simulate
+    from catseye.api.night import explain, reduce
+    from catseye.api.reading import examples, load
+    from catseye.api.result import save, show
+    from catseye.api.weather import air, sound
 
+FACE = {  # file of catseye.api -> what of it is catseye's
+    "living": ("replay", "simulate"),
+    "night": ("explain", "reduce"),
+    "reading": ("examples", "load"),
+    "result": ("save", "show"),
+    "weather": ("air", "sound"),
+}
 
 __all__ = [
     "CatseyeError",
@@ -37,12 +50,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'catseye' has no attribute {name!r}")
-    from catseye import api
-
-    value = globals()[name] = getattr(api, name)
-    return value
+    for file, names in FACE.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(f"catseye.api.{file}"), name)
+            return value
+    raise AttributeError(f"module 'catseye' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -106,4 +106,6 @@ def test_every_result_class_says_its_fields():
     for kind in Result.__subclasses__():
         assert kind.__doc__, kind
         for field in kind.__annotations__:
-            assert field in kind.__doc__ or field in ("campaign", "seed", "state", "co2_ppm"), f"{kind.__name__}.{field}"
+            assert field in kind.__doc__ or field in ("campaign", "seed", "state", "co2_ppm"), (
+                f"{kind.__name__}.{field}"
+            )

@@ -61,7 +61,7 @@ class NightResult(Result):
         return passages(self.reduction)
 
     def headline(self) -> "Sequence[Passage]":
-        """The night and the feed arm."""
+        """The two passages on the night and on the feed arm."""
         return [p for p in self.passages() if p.title in ("The night", "The feed arm")]
 
     def to_object(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class NightResult(Result):
         write_reduction(self.reduction, directory, progress)
 
     def sources(self) -> tuple[Path, ...]:
-        """The campaign's directory."""
+        """Directory of the campaign."""
         return (self.reduction.campaign.directory,)
 
 
@@ -140,7 +140,7 @@ def reduce(
 
     >>> night = reduce("night-01")
     >>> night.x.shape, night.verdict.word
-    ((64, 3), 'good')
+    ((130, 3), 'good')
     """
     from catseye.gateways.epoch.objects import reduction_object
     from catseye.gateways.epoch.summary import verdict
@@ -194,7 +194,7 @@ class ExplanationResult(Result):
         return explanation_passages(self.explanation)
 
     def headline(self) -> "Sequence[Passage]":
-        """The shot and its range."""
+        """The two passages on the shot and its range."""
         return [p for p in self.passages() if p.title in (f"Shot {self.shot}", "The range")]
 
     def to_object(self) -> dict[str, Any]:
@@ -234,11 +234,11 @@ class ExplanationResult(Result):
         )
 
     def inputs(self) -> dict[str, str]:
-        """The campaign's files."""
+        """SHA-256 of the campaign's files."""
         return self.campaign.hashes
 
     def sources(self) -> tuple[Path, ...]:
-        """The campaign's directory."""
+        """Directory of the campaign."""
         return (self.campaign.directory,)
 
 

@@ -59,7 +59,7 @@ class AirResult(Result):
         return air_object(self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict)
 
     def tables(self) -> "dict[str, QTable]":
-        """A row a state."""
+        """One table, a row for each state."""
         import numpy as np
 
         columns = {
@@ -105,7 +105,7 @@ def air(
     Source: the model's own file in `catseye.atmosphere.index`.
 
     >>> round(float(air(20.0, 933.0, 50.0).group_index), 9)
-    1.000254297
+    1.000253319
     """
     from catseye.atmosphere.index.air import air as state_of
     from catseye.gateways.air.objects import air_verdict
@@ -173,7 +173,7 @@ class SoundResult(Result):
         return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty)
 
     def tables(self) -> "dict[str, QTable]":
-        """A row a state."""
+        """One table, a row for each state."""
         import numpy as np
 
         columns = {

@@ -111,7 +111,9 @@ def demo(
     from catseye.gateways.examples import example_campaign
 
     night = _reduced(example_campaign(), directory, ReductionSettings.air_model, quiet)
-    _tell(night, f"{directory / 'report.html'}, and tables beside it", json=json, quiet=quiet)
+    _tell(night, None, json=json, quiet=quiet)
+    if not json and not quiet:
+        say(f"\nReport: {directory / 'report.html'}")
 
 
 def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "NightResult":
@@ -122,17 +124,18 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
         refuse_output(out, campaign)
     progress = ProgressLine(quiet)
     try:
-        from catseye import api
+        from catseye.api.night import reduce as reduced
+        from catseye.api.result import save
 
-        night = api.reduce(campaign, air_model=air_model, progress=progress)
+        night = reduced(campaign, air_model=air_model, progress=progress)
         if out is not None:
-            api.save(night, out, progress=progress)
+            save(night, out, progress=progress)
         return night
     finally:
         progress.clear()
 
 
-def _tell(night: "NightResult", files: str, *, json: bool, quiet: bool, strict: bool = False) -> None:
+def _tell(night: "NightResult", files: str | None, *, json: bool, quiet: bool, strict: bool = False) -> None:
     """The night's sentences, the feed arm's rows after them, and where the rest is."""
     from catseye.gateways.epoch.summary import feed_arm_rows
 

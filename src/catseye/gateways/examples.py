@@ -41,7 +41,7 @@ def example(name: str) -> Path:
     root = examples_directory()
     place = root / SHORT.get(name, name)
     if not name or Path(name).is_absolute() or ".." in Path(name).parts or not place.exists():
-        raise InputError(f"example {shown(name)} is not there (expected one that `catseye examples` lists)")
+        raise InputError(f"example {shown(name)} is not there (expected one of catseye.examples())")
     return place
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from catseye.gateways.epoch.explain import budget_lines, explanation_object, explanation_passages
 from catseye.gateways.epoch.explain_page import MARK, explanation_page, figures
+from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import json_line
 from catseye.reduction.budget.explanation import explain_shot
 from catseye.reduction.budget.scene import Assumptions
@@ -152,7 +153,7 @@ def test_the_page_of_a_shot_without_a_range_has_no_figures(explained, reduction)
 
 def test_figures_are_drawn_the_same_each_time(explained):
     found = explained(94)
-    first, second = figures(found), figures(found)
+    first, second = svgs(figures(found)), svgs(figures(found))
     assert first == second
     assert set(first) == {"contributions", "histogram"}
     assert set(figures(dataclasses.replace(found, scattered=None))) == {"contributions"}

@@ -9,9 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from catseye.gateways.epoch.figures import figures
 from catseye.gateways.epoch.objects import pose_object
-from catseye.gateways.epoch.report import report
+from catseye.gateways.epoch.report import pictures, report
 from catseye.gateways.epoch.summary import passages
 from catseye.gateways.epoch.tables import ranges_csv
 from catseye.gateways.writers.objects import json_page
@@ -41,13 +40,13 @@ class Balance(HTMLParser):
 
 @pytest.fixture(scope="module")
 def drawn(reduction):
-    return figures(reduction)
+    return pictures(reduction)
 
 
 @pytest.fixture
 def drawn_already(monkeypatch, drawn):
     """The figures' part of the report, which takes most of its time, from the shelf."""
-    monkeypatch.setattr("catseye.gateways.epoch.report.figures", lambda reduction: drawn)
+    monkeypatch.setattr("catseye.gateways.epoch.report.pictures", lambda reduction: drawn)
 
 
 @pytest.fixture(scope="module")

@@ -66,6 +66,9 @@ class JournalReader:
             if version_of(connection, self.place) == 0:
                 raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
 
+    def __repr__(self) -> str:
+        return f"<Journal {self.place}: {len(self.runs())} runs>"
+
     def runs(self) -> tuple[StoredRun, ...]:
         """All runs of the journal, oldest first."""
         with self._reading() as connection:

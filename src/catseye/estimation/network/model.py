@@ -51,7 +51,7 @@ class NetworkParameter:
     unit: str = "1"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ObservationNetwork:
     """Points, other parameters and groups of observations.
 
@@ -73,6 +73,10 @@ class ObservationNetwork:
     axis_names: tuple[str, str, str] = ("x", "y", "z")
     source: str = ""
     description: str = ""
+
+    def __repr__(self) -> str:
+        observed = ", ".join(f"{len(group.observed)} {group.name}" for group in self.groups)
+        return f"<Network {self.source}: {len(self.points.names)} points; observed: {observed or 'nothing'}>"
 
 
 @dataclass(frozen=True, eq=False)

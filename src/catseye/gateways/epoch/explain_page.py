@@ -16,7 +16,7 @@ from catseye.gateways.epoch.explain import (
     micrometres,
     when,
 )
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, mpl, styled, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, mpl, styled, svgs
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
@@ -50,7 +50,7 @@ def explanation_page(explanation: Explanation, campaign: Campaign, made_at: date
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(explanation))
     body = [header, verdict_line(explanation_verdict(explanation)), _cards(explanation), f"<dl>{words}</dl>"]
     if explanation.budget is not None:
-        drawn = {name: svg(figure) for name, figure in figures(explanation).items()}
+        drawn = svgs(figures(explanation))
         body += [
             _budget(explanation, drawn["contributions"]),
             _scattered(drawn.get("histogram")),

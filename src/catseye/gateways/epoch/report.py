@@ -11,7 +11,7 @@ from catseye.gateways.epoch.figures import figures
 from catseye.gateways.epoch.objects import benchmark_object
 from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits, verdict
 from catseye.gateways.epoch.tables import kind_of
-from catseye.gateways.writers.drawing import svg
+from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
@@ -36,7 +36,7 @@ CONTENTS = {
 
 def report(reduction: Reduction, when: datetime) -> str:
     """The whole page of a reduction, HTML."""
-    drawn = {name: svg(figure) for name, figure in figures(reduction).items()}
+    drawn = pictures(reduction)
     name = reduction.campaign.site.campaign.name
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
@@ -61,6 +61,11 @@ def report(reduction: Reduction, when: datetime) -> str:
         _provenance(reduction, when),
     ]
     return page(f"catseye: {name}", "\n".join(body))
+
+
+def pictures(reduction: Reduction) -> dict[str, str]:
+    """The figures of the page, as SVG text."""
+    return svgs(figures(reduction))
 
 
 def _summary(reduction: Reduction) -> str:

@@ -2,7 +2,7 @@
 
 import io
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,7 +16,7 @@ with deferred():  # its first import writes that cache under a lock file
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "styled", "svg"]
+__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "styled", "svg", "svgs"]
 
 INK, FAINT, GRID, BAD = "#22303c", "#6b7883", "#e3e8ec", "#c8323c"
 SERIES = ("#1f5a99", "#d9641e", "#1e8e74", "#8a5fa8", "#b08a1e", "#6f8fa8")
@@ -64,6 +64,11 @@ def svg(figure: Figure) -> str:
     with styled():
         FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
     return stream.getvalue()
+
+
+def svgs(figures: Mapping[str, Figure]) -> dict[str, str]:
+    """Each figure as SVG text, by the same names."""
+    return {name: svg(figure) for name, figure in figures.items()}
 
 
 def nice(value: float) -> float:

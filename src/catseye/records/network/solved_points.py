@@ -18,7 +18,7 @@ FILE, BESIDE = "coordinates.json", "pose.json"
 DRAWN = 1e-6  # of two standard uncertainties' product: how unsymmetric a covariance in print may be
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SolvedPoints:
     """The points of one epoch in the ground frame.
 
@@ -38,6 +38,9 @@ class SolvedPoints:
     covariance: np.ndarray
     posture: tuple[float, float] | None
     hashes: dict[str, str]
+
+    def __repr__(self) -> str:
+        return f"<Solved points of {self.campaign}: {len(self.names)} with their full covariance; from {self.file}>"
 
     def block(self, names: Sequence[str]) -> np.ndarray:
         """(3k, 3k) m^2, of some points in this order."""

@@ -28,7 +28,7 @@ SOUND_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a path temperature may lie 
 PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ObservedSite(SiteFolder):
     """A site with its shots and its weather, all that ranges and coordinates need once phases are known.
 
@@ -40,11 +40,19 @@ class ObservedSite(SiteFolder):
     path_temperatures: PathTemperatureTable | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Campaign(ObservedSite):
     """Everything that a campaign's directory holds: its site and its night, with the samples of each shot."""
 
     frames: np.ndarray = field(kw_only=True)
+
+    def __repr__(self) -> str:
+        count, samples = self.frames.shape
+        return (
+            f"<Campaign {self.site.campaign.name}: {count} shots of {samples} samples by {len(self.rangers)} rangers, "
+            f"{len(self.target_names)} targets known, {len(self.weather.mjd_utc)} weather readings; "
+            f"from {self.directory}>"
+        )
 
 
 def read_campaign(directory: Path | str) -> Campaign:

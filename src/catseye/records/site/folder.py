@@ -26,7 +26,7 @@ T = TypeVar("T")
 REFERENCE = "ZRG"  # as a target: the ranger's internal cube
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SiteFolder:
     """Everything that a site's directory holds; `hashes` are the SHA-256 of its files by relative path."""
 
@@ -39,6 +39,13 @@ class SiteFolder:
     triplets: dict[str, TripletRecord]
     benchmarks: tuple[BenchmarkRow, ...]
     hashes: dict[str, str]
+
+    def __repr__(self) -> str:
+        return (
+            f"<Site {self.site.campaign.name}: {len(self.monuments)} rangers on the ground and "
+            f"{len(self.feedarm.ranger)} on the feed arm, {len(self.targets)} targets, {len(self.triplets)} triplets, "
+            f"{len(self.benchmarks)} benchmarks; from {self.directory}>"
+        )
 
     @property
     def rangers(self) -> tuple[str, ...]:
