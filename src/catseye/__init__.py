@@ -49,12 +49,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    for file, names in FACE.items():
-        if name in names:
-            value = globals()[name] = getattr(import_module(f"catseye.api.{file}"), name)
-            return value
-    raise AttributeError(f"module 'catseye' has no attribute {name!r}")
+if not TYPE_CHECKING:  # or mypy would let every name pass
+
+    def __getattr__(name: str) -> Any:
+        for file, names in FACE.items():
+            if name in names:
+                value = globals()[name] = getattr(import_module(f"catseye.api.{file}"), name)
+                return value
+        raise AttributeError(f"module 'catseye' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
