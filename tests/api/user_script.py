@@ -10,19 +10,21 @@ import numpy as np
 
 import catseye
 
-night = catseye.reduce("night-01")
-assert_type(night.x, np.ndarray)
-assert_type(night.variance_factor, float)
-assert_type(night.names, tuple[str, ...])
-assert_type(night.verdict.why, str)
-night.coordinates  # type: ignore[attr-defined]  # noqa: B018
 
-shot = catseye.explain(Path("night-01"), 120, monte_carlo=0)
-assert_type(shot.u_range, float | None)
-shot.u  # type: ignore[attr-defined]  # noqa: B018
+def user_script() -> None:
+    night = catseye.reduce("night-01")
+    assert_type(night.x, np.ndarray)
+    assert_type(night.variance_factor, float)
+    assert_type(night.names, tuple[str, ...])
+    assert_type(night.verdict.why, str)
+    night.coordinates  # type: ignore[attr-defined]  # noqa: B018
 
-catseye.air(20.0, 933.0)  # type: ignore[call-arg]
-catseye.reduced  # type: ignore[attr-defined]  # noqa: B018
+    shot = catseye.explain(Path("night-01"), 120, monte_carlo=0)
+    assert_type(shot.u_range, float | None)
+    shot.u  # type: ignore[attr-defined]  # noqa: B018
 
-assert_type(catseye.simulate(minutes=1.0).seconds, float)
-assert_type(catseye.save(night, "out"), Path)
+    catseye.air(20.0, 933.0)  # type: ignore[call-arg]
+    catseye.reduced  # type: ignore[attr-defined]  # noqa: B018
+
+    assert_type(catseye.simulate(minutes=1.0).seconds, float)
+    assert_type(catseye.save(night, "out"), Path)

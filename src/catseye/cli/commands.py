@@ -143,4 +143,4 @@ def _tell(night: "NightResult", files: str | None, *, json: bool, quiet: bool, s
         f"{'':<14}{name}  x {x[0]:9.4f}  y {x[1]:9.4f}  z {x[2]:9.4f} m   u {u[0]:.3f}, {u[1]:.3f}, {u[2]:.3f} mm"
         for name, x, u in feed_arm_rows(night.reduction)
     ]
-    tell(night, json=json, quiet=quiet, strict=strict, rows=rows, written=[("Written to", files)])
+    tell(night, json=json, quiet=quiet, strict=strict, rows=rows, under="The feed arm", written=[("Written to", files)])

@@ -21,11 +21,13 @@ def tell(
     quiet: bool = False,
     strict: bool = False,
     rows: Iterable[str] = (),
+    under: str = "",
     written: Sequence[tuple[str, object]] = (),
 ) -> None:
     """Say a result: its JSON, or verdict, sentences and rows; then leave with 1 where `strict` asks for it.
 
-    rows      lines that follow the sentences, for people only
+    rows      lines for people only, which follow the sentences
+    under     or follow the passage of this title
     written   title and what was written under it; None: nothing was
     """
     if json:
@@ -36,8 +38,10 @@ def tell(
         say(wrapped("Verdict", result.verdict.text))
         for passage in result.passages():
             say(wrapped(passage.title, passage.text))
-        for row in rows:
-            say(row)
+            if passage.title == under:
+                say("\n".join(rows))
+        if not under:
+            say("\n".join(rows))
         for title, what in written:
             if what is not None:
                 say(wrapped(title, str(what)))

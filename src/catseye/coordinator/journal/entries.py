@@ -42,9 +42,9 @@ class AnsweredShot:
     misfit: float = NAN
 
     @classmethod
-    def of(cls, shot: LiveShot, verdict: "ShotAnswer") -> "AnsweredShot":
+    def of(cls, shot: LiveShot, answer: "ShotAnswer") -> "AnsweredShot":
         """The shot with the answer that `Live.shot` gave."""
-        return cls(shot, str(verdict.status), verdict.text, verdict.range_, verdict.u_range, verdict.misfit)
+        return cls(shot, str(answer.status), answer.text, answer.range_, answer.u_range, answer.misfit)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ class Handshake:
         if set(self._replies) == LINES or (reply.command == "CONNECT" and reply.ok is not True):
             self._whole.set()
 
-    async def verdict(self, ranger: str, port: int, closed: "asyncio.Future[str]", limit: float) -> str | None:
+    async def why_not(self, ranger: str, port: int, closed: "asyncio.Future[str]", limit: float) -> str | None:
         """What is wrong with a connection; None where it can be used.
 
         closed   done when the connection is over

@@ -174,7 +174,7 @@ class RangerLink:
             return f"{self.address.host} port {port} does not answer within {limit:g} s"
         wrong: str | None = "given up"
         try:
-            wrong = await self._handshake.verdict(self.ranger, port, client.closed, limit)
+            wrong = await self._handshake.why_not(self.ranger, port, client.closed, limit)
         finally:
             if wrong is not None:
                 client.close()

@@ -1,0 +1,85 @@
+"""Every line of the README that a reader would type works from a fresh wheel, where no repository is near."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+import venv
+
+import pytest
+
+from repository import ROOT
+from wheel_scene import built, run_there, unpacked
+
+LONGEST = 60.0  # s that a line may take without having said so beforehand
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def pieces():
+    """Commands and Python blocks in the order of the page: ("catseye", JSON of its words) or ("python", source)."""
+    found = [
+        (match.start(), "catseye", json.dumps(shlex.split(match[1])))
+        for match in re.finditer(r"(?m)(?:^    \$ |`)(catseye [a-z][^`\n]*)", TEXT)
+    ]
+    found += [(m.start(), "python", m[1]) for m in re.finditer(r"(?ms)^```python\n(.*?)^```", TEXT)]
+    return [(kind, text) for _, kind, text in sorted(found)]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    return built(tmp_path_factory.mktemp("dist"))
+
+
+def refused(ran):
+    """Lines that failed or took longer than a reader waits unwarned."""
+    return [
+        (text, each)
+        for (_, text), each in zip(pieces(), ran, strict=True)
+        if each["status"] or each["seconds"] > LONGEST
+    ]
+
+
+def test_the_page_is_a_screen_and_a_half_with_a_picture_and_lines_to_type():
+    assert len(TEXT) < 7000
+    assert "](docs/" in TEXT
+    kinds = [kind for kind, _ in pieces()]
+    assert kinds.count("catseye") >= 10
+    assert kinds.count("python") == 1
+
+
+def test_every_line_works_from_a_wheel(wheel, tmp_path):
+    site = unpacked(wheel, tmp_path / "site")
+    (tmp_path / "work").mkdir()
+    ran = run_there(tmp_path / "work", pieces(), sys.executable, site)
+    assert refused(ran) == []
+
+
+def test_what_the_page_shows_of_the_demo_is_what_it_says(wheel, tmp_path):
+    """The lines under `make demo`, word for word but for the path."""
+    shown = re.search(r"(?ms)^    \$ make demo\n(.*?)\n\n", TEXT)
+    site = unpacked(wheel, tmp_path / "site")
+    (ran,) = run_there(tmp_path, [("catseye", json.dumps(["catseye", "demo"]))], sys.executable, site)
+    said = " ".join(ran["said"].split())
+    for line in " ".join(shown[1].split()).split(" ... "):
+        assert line in said
+
+
+@pytest.mark.slow
+def test_every_line_works_where_the_wheel_was_installed(wheel, tmp_path):
+    environment = tmp_path / "venv"
+    venv.create(environment, with_pip=True)
+    python = environment / "bin" / "python"
+    constraints = ROOT / "constraints.txt"
+    subprocess.run([python, "-m", "pip", "install", "-q", "--constraint", constraints, wheel], check=True)
+    (tmp_path / "work").mkdir()
+    (site,) = (environment / "lib").glob("python*/site-packages")
+    assert refused(run_there(tmp_path / "work", pieces(), python, site)) == []
+    shown = subprocess.run(
+        [environment / "bin" / "catseye", "air", *"--temperature-c 20 --pressure-hpa 933 --humidity-percent 50".split()],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "group index" in shown.stdout
