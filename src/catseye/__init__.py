@@ -16,6 +16,7 @@ from catseye.version import __version__
 
 if TYPE_CHECKING:
     from catseye.api.living import replay, simulate
+    from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, reduce
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 FACE = {  # file of catseye.api -> what of it is catseye's
     "living": ("replay", "simulate"),
+    "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "reduce"),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
@@ -36,10 +38,14 @@ __all__ = [
     "InputError",
     "ValidityError",
     "__version__",
+    "adjust",
     "air",
+    "compare",
     "examples",
     "explain",
     "load",
+    "locate",
+    "plan",
     "reduce",
     "replay",
     "save",

@@ -75,8 +75,9 @@ def test_every_line_works_where_the_wheel_was_installed(wheel, tmp_path):
     (tmp_path / "work").mkdir()
     (site,) = (environment / "lib").glob("python*/site-packages")
     assert refused(run_there(tmp_path / "work", pieces(), python, site)) == []
+    weather = "--temperature-c 20 --pressure-hpa 933 --humidity-percent 50"
     shown = subprocess.run(
-        [environment / "bin" / "catseye", "air", *"--temperature-c 20 --pressure-hpa 933 --humidity-percent 50".split()],
+        [environment / "bin" / "catseye", "air", *weather.split()],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -75,13 +75,13 @@ def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
     names = examples.example_names()
     assert {"night-01", "sites/gbt", "networks/ground-ring", "networks/feed-arm.toml"} <= set(names)
     assert all(examples.example(name).exists() for name in names)
-    count = examples.copy_examples(tmp_path / "mine")
+    count = examples.copy_example("", tmp_path / "mine")
     assert count > 200
     assert (tmp_path / "mine/night-01/frames.npy").stat().st_size == (
         ROOT / "examples/night-01/frames.npy"
     ).stat().st_size
     with pytest.raises(InputError, match="is there and not empty"):
-        examples.copy_examples(tmp_path / "mine")
+        examples.copy_example("", tmp_path / "mine")
 
 
 def test_examples_that_were_not_installed_are_refused_in_one_line(monkeypatch, tmp_path):

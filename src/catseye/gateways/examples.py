@@ -1,9 +1,12 @@
 """What comes with catseye under examples/: found by name, listed, and copied out."""
 
+import os
+import secrets
 import shutil
 from pathlib import Path
 
 from catseye.errors import InputError
+from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
 from catseye.records.files.refusal import shown
 
 SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # names that a user may type without the folder
@@ -80,18 +83,27 @@ def located(path: Path | str) -> Path:
         return given
 
 
-def copy_examples(directory: Path) -> int:
-    """Copy all examples into a folder, which is made; how many files.
+def copy_example(name: str, directory: Path) -> int:
+    """Copy a folder of examples, whole or not at all; how many files.
 
+    name        as for `example`, or "" for all
     directory   new or empty
 
     Raises InputError where it holds something or cannot be written.
     """
-    root = examples_directory()
-    try:
-        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-            raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
-        shutil.copytree(root, directory, ignore=shutil.ignore_patterns(*SKIPPED), dirs_exist_ok=True)
-    except OSError as problem:
-        raise InputError(f"{directory}: cannot be written: {problem.strerror or problem}") from problem
+    root = example(name) if name else examples_directory()
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
+    fresh = directory.resolve().parent / f".catseye-{secrets.token_hex(6)}"
+    with undone_when_interrupted(lambda: shutil.rmtree(fresh, ignore_errors=True)):
+        try:
+            shutil.copytree(root, fresh, ignore=shutil.ignore_patterns(*SKIPPED))
+            with deferred():
+                if directory.exists():
+                    directory.rmdir()
+                os.rename(fresh, directory)
+        except OSError as problem:
+            raise InputError(f"{directory}: cannot be written: {problem.strerror or problem}") from problem
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
     return sum(path.is_file() for path in directory.rglob("*"))

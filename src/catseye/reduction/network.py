@@ -4,16 +4,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
-from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, with_datum
+from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near, with_datum
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
 from catseye.estimation.observations.kinds import Distances
+from catseye.estimation.quality.reliability import observation_tests
 from catseye.estimation.quality.robustness import (
     MOST_INFLATION,
     WEIGHTS,
@@ -25,6 +27,8 @@ from catseye.estimation.quality.robustness import (
 )
 from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
 
+FEW = 300  # points up to which a dense solution beside a known one is the quickest
+NEAR = 1e4  # variance factor of the plain solution up to which the search for wrong observations starts from it
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 
 Progress = Callable[[str, int, int], None]
@@ -43,6 +47,8 @@ class AdjustedNetwork:
     rejections   what data snooping says of each it left out
     components   estimated components of variance, where asked
     notes        what a person should know, one line each
+    likely       one (m,) bool a group: what data snooping, one by one, would leave out; all that was left out where
+                 observations were rejected or weighed
     """
 
     solution: NetworkSolution
@@ -53,6 +59,7 @@ class AdjustedNetwork:
     rejections: tuple[Rejection, ...] = ()
     components: Components | None = None
     notes: tuple[str, ...] = ()
+    likely: tuple[np.ndarray, ...] = ()
 
 
 def adjusted(
@@ -89,20 +96,27 @@ def adjusted(
     )
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
-    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing)
-    if not treated or not np.isfinite(plain.covariance).all():
+    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing, likely=nothing)
+    if not np.isfinite(plain.covariance).all():
         return result
     count, engine = 0, _engine(plain)
+    near = plain.status == CONVERGED and plain.variance_factor < NEAR and not plain.replaced
+    fast = fits_near(network, plain) if near and engine is None and len(network.points.names) < FEW else None
 
     def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...]:
         nonlocal count
         count += 1
         if progress is not None:
             progress("adjusting", count, 0)
+        quick = None if fast is None else fast(inflation)
+        if quick is not None:
+            return quick
         return adjust_network(
             network, inflation=inflation, alone=True, settings=NetworkSettings(diagnose=False), engine=engine
         ).fits
 
+    if not treated:
+        return replace(result, likely=_likely(plain, solve, level))
     if robust is not None:
         estimate = estimate_robustly(solve, sizes, options=RobustOptions(method=robust), places=_places(network))
         inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
@@ -121,7 +135,18 @@ def adjusted(
         result = _with_rejections(network, solve, sizes, placed, level)
     if components is not None:
         result = _with_components(network, result, components, progress)
-    return result
+    return replace(result, likely=result.rejected)
+
+
+def _likely(
+    plain: NetworkSolution, solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]], level: float
+) -> tuple[np.ndarray, ...]:
+    """What data snooping, one by one, would leave out of a plain adjustment; nothing is, here."""
+    sizes = [len(fit.residual) for fit in plain.fits]
+    tests = observation_tests(plain.fits, level=level)
+    if not any(np.any(p < level) for p in tests.adjusted):
+        return tuple(np.zeros(m, dtype=bool) for m in sizes)
+    return snoop(solve, sizes, options=SnoopingOptions(level=level), weigh=False).rejected
 
 
 def _with_rejections(
@@ -267,4 +292,5 @@ def measured_on_paper(
     def solve(drawn: ObservationNetwork) -> NetworkSolution:
         return adjusted(drawn, reject=blunders > 0.0).solution
 
-    return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)
+    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+        return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)

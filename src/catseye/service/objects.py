@@ -92,9 +92,7 @@ def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[
 def epoch_line(compared: EpochComparison) -> str:
     """An epoch beside the truth, in one line."""
     low, high = compared.band
-    claim = (
-        "as claimed" if compared.fits else ("better than claimed" if compared.chi2 < low else "worse than claimed")
-    )
+    claim = "as claimed" if compared.fits else ("better than claimed" if compared.chi2 < low else "worse than claimed")
     return (
         f"epoch {compared.number}: {compared.points} points, off by {compared.rms_mm:.3f} mm rms "
         f"({compared.worst} {compared.worst_mm:.2f} mm), claimed u {compared.mean_u_mm:.3f} mm, "

@@ -218,15 +218,15 @@ def test_the_global_test_has_the_printed_chi_square_interval():
     test = r.global_test(10.0, 10.0)
     assert test.lower * 10 == pytest.approx(3.247, abs=6e-4)  # chi-square table, 10 degrees, 2.5 and 97.5 %
     assert test.upper * 10 == pytest.approx(20.483, abs=6e-4)
-    assert test.verdict == r.ACCEPTED
+    assert test.outcome == r.ACCEPTED
 
 
 def test_the_global_test_can_fail_on_either_side():
-    assert r.global_test(21.0, 10.0).verdict == r.TOO_LARGE
-    assert r.global_test(3.0, 10.0).verdict == r.TOO_SMALL
+    assert r.global_test(21.0, 10.0).outcome == r.TOO_LARGE
+    assert r.global_test(3.0, 10.0).outcome == r.TOO_SMALL
     assert r.global_test(3.0, 10.0).p == pytest.approx(2 * stats.chi2.cdf(3.0, 10))
     assert r.global_test(21.0, 10.0).p == pytest.approx(2 * stats.chi2.sf(21.0, 10))
-    assert r.global_test(0.0, 0.0).verdict == r.NO_REDUNDANCY
+    assert r.global_test(0.0, 0.0).outcome == r.NO_REDUNDANCY
     assert np.isnan(r.global_test(0.0, 0.0).p)
 
 
@@ -235,7 +235,7 @@ def test_the_global_test_can_fail_on_either_side():
 def test_the_interval_the_p_value_and_the_verdict_of_the_global_test_agree(pvv, f, level):
     test = r.global_test(pvv, f, level)
     if min(abs(test.factor / test.lower - 1), abs(test.factor / test.upper - 1), abs(test.p / level - 1)) > 1e-6:
-        assert (test.lower < test.factor < test.upper) == (test.p > level) == (test.verdict == r.ACCEPTED)
+        assert (test.lower < test.factor < test.upper) == (test.p > level) == (test.outcome == r.ACCEPTED)
 
 
 # --- what is claimed of the tests, by Monte Carlo
@@ -259,7 +259,7 @@ def check_alarms(trials):
         family = np.mean((p < alpha).any(axis=1))
         # safe, and not much below: tests of one adjustment are correlated
         assert 0.03 - scatter * 0.2 < family < 0.05 + scatter * 0.22, correction
-    verdicts = np.array([r.global_test(value, NETWORK.degrees).verdict for value in pvv[:2000]])
+    verdicts = np.array([r.global_test(value, NETWORK.degrees).outcome for value in pvv[:2000]])
     scatter = 4.0 * np.sqrt(0.025 * 0.975 / len(verdicts))
     assert np.mean(verdicts == r.TOO_LARGE) == pytest.approx(0.025, abs=scatter)
     assert np.mean(verdicts == r.TOO_SMALL) == pytest.approx(0.025, abs=scatter)
@@ -334,10 +334,10 @@ def test_the_unchecked_and_those_left_out_are_named_never_accepted():
     fit = GroupFit("g", active, w / u, np.ones(m), redundancy, w, w * u, NONCENTRALITY * u, 80.0)
     tests = r.observation_tests([fit])
     assert tests.tests == 6
-    assert tests.verdict[0][6] == r.NOT_CHECKED
-    assert tests.verdict[0][7] == r.LEFT_OUT
-    assert tests.verdict[0][5] == r.SUSPECT
-    assert (tests.verdict[0][:5] == r.ACCEPTED).all()
+    assert tests.outcome[0][6] == r.NOT_CHECKED
+    assert tests.outcome[0][7] == r.LEFT_OUT
+    assert tests.outcome[0][5] == r.SUSPECT
+    assert (tests.outcome[0][:5] == r.ACCEPTED).all()
     assert np.isnan(tests.statistic[0][6:]).all()
     assert np.isnan(tests.adjusted[0][6:]).all()
     assert [s.row for s in r.suspects([fit])] == [5]
@@ -351,5 +351,5 @@ def test_an_adjustment_without_any_check_has_no_suspects_and_nothing_accepted():
     )
     tests = r.observation_tests([fit])
     assert tests.tests == 0
-    assert (tests.verdict[0] == r.NOT_CHECKED).all()
+    assert (tests.outcome[0] == r.NOT_CHECKED).all()
     assert r.suspects([fit]) == []

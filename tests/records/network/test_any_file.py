@@ -9,6 +9,7 @@ from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.records.files.columns import columns_of
 from catseye.records.network.any_file import read_network
+from catseye.reduction.network import adjusted
 from repository import ROOT, TESTS
 
 VECTORS = TESTS / "vectors" / "networks"
@@ -103,8 +104,13 @@ BAD_POINTS = {
         "points.csv: line 1, column 'x' is there 2 times (expected the header point,x,y,z, perhaps role,u_x,u_y,u_z)",
     ),
 }
+HEADER = "(expected the header from,to,distance, perhaps sigma)"
 BAD_RANGES = {
-    "S2,T1": ("S2,TT1", "ranges.csv: line 3, to = 'TT1' is no point (expected perhaps 'T1')"),
+    "S2,T1": (
+        "S2,TT1",
+        "ranges.csv: line 3, to = 'TT1' is not in points.csv "
+        "(expected perhaps 'T1'; an unknown point has 3 ranges at least)",
+    ),
     "S3,T1": ("T1,T1", "ranges.csv: line 4, to = 'T1' (expected another point than from)"),
     "94.8683298": ("-94.8", "ranges.csv: line 3, distance = '-94.8' (expected above 0 m)"),
     "94.8683298,": ("nan,", "ranges.csv: line 3, distance = 'nan' (expected a finite number)"),
@@ -113,9 +119,15 @@ BAD_RANGES = {
         "83.6660027,0",
         "ranges.csv: line 4, sigma = '0' (expected above 0 m: nothing is measured without error)",
     ),
-    ",sigma": (",u", "ranges.csv: line 1, column 'u' is not known (expected the header from,to,distance,sigma)"),
+    ",sigma": (
+        ",u",
+        f"ranges.csv: line 1, column 'u' is not known {HEADER}",
+    ),
     "S1,T1,70.7106781,0.0001\n": ("\n", "ranges.csv: line 2, 1 fields = '' (expected 4)"),
-    "\nS1": (",\nS1", "ranges.csv: line 1, column '' is not known (expected the header from,to,distance,sigma)"),
+    "\nS1": (
+        ",\nS1",
+        f"ranges.csv: line 1, column '' is not known {HEADER}",
+    ),
 }
 
 
@@ -168,9 +180,9 @@ def test_every_number_written_is_the_number_read(rows, quoted):
 
 
 def test_the_examples_are_read_and_fit_what_they_claim(solve):
-    files = {"feed-arm.toml", "ground-ring", "total-station.gkf", "total-station.dat"}
+    files = {"feed-arm.toml", "ground-ring", "template", "total-station.gkf", "total-station.dat"}
     assert {path.name for path in EXAMPLES.iterdir()} == files
-    for file in files:
+    for file in files - {"template"}:  # which has points without a place
         answer = solve(read_network(EXAMPLES / file))
         # noise as claimed: [pvv] / f is 1 within five of its standard deviations
         assert abs(answer.pvv / answer.degrees - 1.0) < 5.0 * (2.0 / answer.degrees) ** 0.5, file
@@ -181,3 +193,50 @@ def test_one_survey_in_two_programs_files_has_one_answer(solve):
     assert np.allclose(gama.x, starnet.x, rtol=0, atol=1e-9)
     assert np.allclose(gama.q, starnet.q, rtol=1e-9, atol=1e-15)
     assert gama.degrees == starnet.degrees == 20
+
+
+def test_targets_that_are_not_listed_are_unknown_points():
+    """The template: five stations listed, four targets not; known from where its ranges were made."""
+    made = {"T1": (12.3, 8.7, 3.1), "T2": (30.2, 21.6, 5.4), "T3": (8.9, 27.4, 2.2), "T4": (25.0, 5.5, 6.8)}
+    network = read_network(EXAMPLES / "template")
+    assert network.points.names == ("A", "B", "C", "D", "E", *made)
+    assert np.isnan(network.points.xyz[5:]).all()
+    assert not network.points.fixed[5:].any()
+    answer = adjusted(network).solution
+    for name, place in made.items():
+        np.testing.assert_allclose(answer.x[network.points.names.index(name)], place, rtol=0, atol=4e-3)  # u is 1.2 mm at most
+    assert 0.3 < answer.variance_factor < 2.5
+
+
+def test_semicolons_with_decimal_commas_and_a_byte_order_mark_are_read_as_the_same(tmp_path):
+    (tmp_path / "plain").mkdir()
+    own = folder(tmp_path / "plain")
+    other = tmp_path / "other"
+    other.mkdir()
+    for name in ("points.csv", "ranges.csv"):
+        text = (own / name).read_text().replace(",", ";").replace(".", ",")
+        (other / name).write_text(text, encoding="utf-8-sig")
+    first, second = read_network(own), read_network(other)
+    np.testing.assert_array_equal(first.points.xyz, second.points.xyz)
+    np.testing.assert_array_equal(first.groups[0].observed, second.groups[0].observed)
+    (other / "ranges.csv").write_text("from;to;distance;sigma\nS1;T1;1.070,7;0,001\n")
+    with pytest.raises(InputError, match=r"line 2, distance = '1\.070,7' \(expected a finite number\)"):
+        read_network(other)
+
+
+def test_a_claim_serves_ranges_without_a_sigma(tmp_path):
+    own = folder(tmp_path)
+    lines = (own / "ranges.csv").read_text().splitlines()
+    lines[1] = lines[1].rpartition(",")[0] + ","
+    (own / "ranges.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"ranges.csv: line 2, no sigma \(expected one, m, or --sigma-mm"):
+        read_network(own)
+    (group,) = read_network(own, sigma_mm=1.0, sigma_ppm=2.0).groups[:1]
+    assert np.sqrt(group.covariance[0]) == pytest.approx(1e-3 + 2e-6 * group.observed[0])
+    assert np.sqrt(group.covariance[1]) == pytest.approx(float(lines[2].rpartition(",")[2]))
+    (own / "ranges.csv").write_text("\n".join(line.rpartition(",")[0] for line in lines))
+    assert np.sqrt(read_network(own, sigma_ppm=2.0).groups[0].covariance) == pytest.approx(2e-6 * group.observed)
+    with pytest.raises(InputError, match=r"--sigma-mm = -1 \(expected 0 to 100000\)"):
+        read_network(own, sigma_mm=-1.0)
+    with pytest.raises(InputError, match="says every uncertainty itself"):
+        read_network(EXAMPLES / "feed-arm.toml", sigma_mm=1.0)

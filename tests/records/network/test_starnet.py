@@ -5,6 +5,7 @@ import pytest
 
 from catseye.constants import ARCSECOND
 from catseye.errors import InputError
+from catseye.records.network.claim import RangeClaim
 from catseye.records.network.starnet import FIXED_ANGLE, FIXED_LENGTH, starnet_network
 
 FOOT = 1200 / 3937
@@ -105,8 +106,29 @@ def test_default_standard_errors_come_from_the_comment_and_nowhere_else():
         assert np.sqrt(group(network, kind).covariance) == pytest.approx(seconds * ARCSECOND)
     with pytest.raises(InputError) as refusal:
         read("C 1 0 0 0 ! ! !\nA 1-2-3 45-00-00")
-    wanted = "(expected one in the line, or above it the comment '# catseye: angle_arcsec = ...')"
-    assert str(refusal.value) == f"n.dat: line 3, A: angle has no standard error {wanted}"
+    wanted = "(expected standard errors in the lines, or above them the comment '# catseye: angle_arcsec = ...')"
+    missing = "Angle (1 observation, first line 3)"
+    assert str(refusal.value) == f"n.dat: leaves to the project options, which are not in it: {missing} {wanted}"
+
+
+def test_all_standard_errors_that_are_missing_are_asked_for_at_once_in_the_words_of_the_program():
+    with pytest.raises(InputError) as refusal:
+        read("C 1 0 0 0 ! ! !\nC 2 9 0 0 ! ! !\n.INST TS30 tripod\nA 1-2-3 45-00-00\nDV 1-3 9.5 90-00-00\nD 2-3 8.0")
+    said = str(refusal.value)
+    assert "the project options or the .INSTRUMENT 'TS30 tripod'" in said
+    for words in (
+        "Angle (1 observation, first line 5)",
+        "Distance Constant and PPM (2 observations, first line 6)",
+        "Zenith (1 observation, first line 6)",
+        "'# catseye: angle_arcsec = ..., distance_mm = ..., zenith_arcsec = ...'",
+    ):
+        assert words in said
+
+
+def test_a_claim_from_outside_serves_distances_until_the_file_says_otherwise():
+    text = "C 1 0 0 0 ! ! !\nC 2 9 0 0 ! ! !\nD 1-3 100.0\n# catseye: distance_mm = 5, distance_ppm = 0.001\nD 2-3 95.0"
+    network = starnet_network(text, "n.dat", RangeClaim(1.0, 2.0))
+    assert np.sqrt(group(network, "slope_distance").covariance) == pytest.approx([1.2e-3, 5e-3], rel=1e-4)
 
 
 def test_held_and_left_out_observations_are_told_in_the_description():
@@ -203,9 +225,9 @@ REFUSED = {
         "(expected one of the codes C, E, A, D, V, DV, B, M, BM, DB, DN, DM, DE, L)"
     ),
     "TB 1": "'TB 1' is not known here (expected one of the codes C, E, A, D, V, DV, B, M, BM, DB, DN, DM, DE, L)",
-    ".INSTRUMENT TS1": (
-        "'.INSTRUMENT TS1' is not known here "
-        "(expected one of .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION)"
+    ".ALTERNATE TS1": (
+        "'.ALTERNATE TS1' is not known here "
+        "(expected one of .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION .INSTRUMENT)"
     ),
     ".UNITS Furlong": ".UNITS 'FURLONG' (expected METERS METRES FEETUS FEETINT, DMS, GONS or DD)",
     ".DELTA": ".DELTA '' (expected ON or OFF)",

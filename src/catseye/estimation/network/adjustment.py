@@ -1,12 +1,18 @@
 """A network adjusted: starts found, datum chosen, solved, and what went wrong said in one line."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution, SolverSettings, adjust
+from catseye.estimation.least_squares.adjustment import (
+    CONVERGED,
+    GroupFit,
+    LeastSquaresSolution,
+    SolverSettings,
+    adjust,
+)
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows, variances
 from catseye.estimation.network.datum import (
@@ -131,6 +137,36 @@ def adjust_network(
     if diagnose and np.isfinite(solution.covariance).all():
         return replace(solution, status=diagnosed(solution, _factor_alone))
     return solution
+
+
+def fits_near(
+    network: ObservationNetwork, near: NetworkSolution
+) -> Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...] | None]:
+    """The fits of a network with its observations weighed otherwise, one solution after another, quickly.
+
+    network   with its datum marked
+    near      its solution, where each begins
+
+    What is returned takes an inflation as `adjust_network` does, each observation's alone, and gives one fit a group;
+    None where there is no answer. Coordinates are held against what floats, instead of the datum's conditions: that
+    changes no residual and no test, and the datum is not looked for again and again.
+    """
+    problem = _Problem.of(network, near)
+    rows = [ActiveRows.of(group, None) for group in problem.groups]
+    floating = problem._motions(rows, problem.x0)
+    n = 3 * len(network.points.names)
+    everywhere = problem.free[:n].reshape(-1, 3)
+    conditions, _ = datum_conditions(floating, everywhere, problem.x0[:n].reshape(-1, 3))
+    free = problem.free.copy()
+    free[minimal_coordinates(conditions)] = False
+
+    def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...] | None:
+        _, added = problem._inflated(inflation, True)
+        kept = _padded([np.isfinite(f) for f in inflation], problem.groups, True)
+        solution = adjust(problem.x0, problem.groups, free=free, active=kept, extra_variance=added)
+        return solution.fits[: len(network.groups)] if solution.status == CONVERGED else None
+
+    return solve
 
 
 def _with_reference(network: ObservationNetwork) -> ObservationNetwork:

@@ -260,14 +260,14 @@ class GlobalTest:
     factor        [pvv] / degrees of freedom
     lower, upper  the interval in which it must lie; it depends on the degrees of freedom and the level alone
     p             two-sided p-value; nan without redundancy
-    verdict       "accepted", or what it means
+    outcome       "accepted", or what it means
     """
 
     factor: float
     lower: float
     upper: float
     p: float
-    verdict: str
+    outcome: str
 
 
 def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> GlobalTest:
@@ -281,7 +281,7 @@ def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> G
 
     Source: [BAARDA68] (overall model test); [FOERSTNER16] chapter 4.
 
-    >>> global_test(20.0, 10.0).verdict, round(global_test(20.0, 10.0).upper, 4)
+    >>> global_test(20.0, 10.0).outcome, round(global_test(20.0, 10.0).upper, 4)
     ('accepted', 2.0483)
     """
     f, half = float(degrees_of_freedom), 0.5 * _probability("level", level)
@@ -289,8 +289,8 @@ def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> G
         return GlobalTest(np.nan, np.nan, np.nan, np.nan, NO_REDUNDANCY)
     lower, upper = float(chdtri(f, 1.0 - half)) / f, float(chdtri(f, half)) / f
     below, above = float(chdtr(f, pvv)), float(chdtrc(f, pvv))
-    verdict = TOO_LARGE if above < half else TOO_SMALL if below < half else ACCEPTED
-    return GlobalTest(pvv / f, lower, upper, min(2.0 * min(below, above), 1.0), verdict)
+    outcome = TOO_LARGE if above < half else TOO_SMALL if below < half else ACCEPTED
+    return GlobalTest(pvv / f, lower, upper, min(2.0 * min(below, above), 1.0), outcome)
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,14 +300,14 @@ class ObservationTests:
     statistic   w, or tau where sigma was estimated; nan of the unchecked and of those left out
     p           its p-value; nan likewise
     adjusted    p corrected for the number of tests
-    verdict     (m,) texts: ACCEPTED, SUSPECT, NOT_CHECKED or LEFT_OUT
+    outcome     (m,) texts: ACCEPTED, SUSPECT, NOT_CHECKED or LEFT_OUT
     tests       how many were made
     """
 
     statistic: tuple[np.ndarray, ...]
     p: tuple[np.ndarray, ...]
     adjusted: tuple[np.ndarray, ...]
-    verdict: tuple[np.ndarray, ...]
+    outcome: tuple[np.ndarray, ...]
     tests: int
 
 
@@ -355,11 +355,11 @@ def observation_tests(
     cuts = np.cumsum([np.count_nonzero(t) for t in tested])[:-1]
     spread = [(np.split(values, cuts)) for values in (p, adjusted_probability(p, correction))]
     values = [[_filled(t, part) for t, part in zip(tested, parts, strict=True)] for parts in spread]
-    verdict = [
+    outcome = [
         np.where(~f.active, LEFT_OUT, np.where(~t, NOT_CHECKED, np.where(a < level, SUSPECT, ACCEPTED)))
         for f, t, a in zip(fits, tested, values[1], strict=True)
     ]
-    return ObservationTests(tuple(statistic), tuple(values[0]), tuple(values[1]), tuple(verdict), len(together))
+    return ObservationTests(tuple(statistic), tuple(values[0]), tuple(values[1]), tuple(outcome), len(together))
 
 
 def _filled(where: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -389,6 +389,6 @@ def suspects(
             detectable_error=float(fit.detectable_error[k]),
         )
         for i, fit in enumerate(fits)
-        for k in np.flatnonzero(tests.verdict[i] == SUSPECT)
+        for k in np.flatnonzero(tests.outcome[i] == SUSPECT)
     ]
     return sorted(rejected, key=lambda s: (s.p, -abs(s.statistic)))

@@ -21,8 +21,10 @@ def motions(xyz: np.ndarray, centre: np.ndarray | None = None, size: float | Non
     arm = arm / (figure_size(arm) if size is None else size)
     result = np.zeros((n, 3, 7))
     result[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    for axis in range(3):
-        result[:, :, 3 + axis] = np.cross(np.eye(3)[axis], arm)
+    x, y, z = arm.T
+    result[:, 1, 3], result[:, 2, 3] = 0.0 - z, y  # turn about an axis: its unit vector cross the arm
+    result[:, 0, 4], result[:, 2, 4] = z, 0.0 - x
+    result[:, 0, 5], result[:, 1, 5] = 0.0 - y, x
     result[:, :, 6] = arm
     return result.reshape(3 * n, 7)
 

@@ -12,9 +12,11 @@ from catseye.estimation.deformation.comparison import PointMovements
 from catseye.estimation.deformation.congruence import VarianceFactor
 from catseye.estimation.deformation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network.findings import Findings, in_file_axes
+from catseye.gateways.network.summary import verdict
 from catseye.gateways.network.tables import Formats, cell, table
 from catseye.gateways.writers.objects import plain
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 
 FORMAT = "catseye-comparison-1"
 NAMED = 8  # points told in sentences
@@ -91,6 +93,24 @@ class ComparedEpochs:
         ]
 
 
+def comparison_verdict(compared: ComparedEpochs) -> Verdict:
+    """Whether what is said to have moved rests on two good epochs and on a test.
+
+    compared   two epochs
+    """
+    moved = [name for name, word in zip(compared.deformation.names, compared.verdicts, strict=True) if word == "moved"]
+    for which, epoch in (("first", compared.first), ("second", compared.second)):
+        judged = verdict(epoch)
+        if judged.word != "good":
+            return Verdict(judged.word, f"the {which} epoch: {judged.why}")
+    if not np.isfinite(compared.deformation.p).any():
+        return Verdict("doubtful", "nothing can be tested: no displacement has an uncertainty")
+    if not moved:
+        return Verdict("good", "both epochs are good, and no point moved by more than chance explains")
+    named = ", ".join(moved[:NAMED]) + (f" and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
+    return Verdict("good", f"both epochs are good; by more than chance explains moved {named}")
+
+
 def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
     """What moved, as `catseye adjust A B --json` gives it; SI units.
 
@@ -127,6 +147,7 @@ def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
     return plain(
         {
             "format": FORMAT,
+            "verdict": comparison_verdict(compared).to_object(),
             "status": d.status,
             "axes": list(compared.first.network.axis_names),
             "datum": d.datum,

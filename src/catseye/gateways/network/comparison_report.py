@@ -5,14 +5,13 @@ from datetime import datetime
 from html import escape
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.quality.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.network.comparison import ComparedEpochs, comparison_passages
+from catseye.gateways.network.comparison import ComparedEpochs, comparison_passages, comparison_verdict
 from catseye.gateways.network.figures import (
     CaptionedFigure,
     file_ticks,
@@ -25,8 +24,9 @@ from catseye.gateways.network.figures import (
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.report import network_cards, provenance_section
 from catseye.gateways.network.summary import quantity, verdict
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, STYLE, nice, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, nice, styled
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 
 CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "Epochs", "provenance": "Provenance"}
 CONFIDENCE = 0.95
@@ -51,7 +51,13 @@ def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[
     )
     d = compared.deformation
     settings = {"level of the tests": f"{d.level:g}", "power": f"{d.power:g}", "datums may differ by": d.datum}
-    body = [header, _summary(compared), _displacements(compared), _epochs(compared)]
+    body = [
+        header,
+        verdict_line(comparison_verdict(compared)),
+        _summary(compared),
+        _displacements(compared),
+        _epochs(compared),
+    ]
     return page(f"catseye: {second} against {first}", "\n".join([*body, provenance_section(when, inputs, settings)]))
 
 
@@ -141,10 +147,10 @@ def _cell(value: float, form: str) -> str:
 def _epochs(compared: ComparedEpochs) -> str:
     parts = []
     for title, epoch in (("First epoch", compared.first), ("Second epoch", compared.second)):
-        good, text = verdict(epoch)
+        judged = verdict(epoch)
         parts += [
             f"<h3>{title}: {escape(epoch.network.source)}</h3>",
-            paragraph(text, "" if good else "bad"),
+            paragraph(judged.text, "" if judged.word == "good" else "bad"),
             paragraph(f"Datum: {epoch.solution.datum}."),
             f'<div class="cards">{"".join(network_cards(epoch))}</div>',
         ]
@@ -156,11 +162,9 @@ def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
 
     compared   two epochs
     """
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with styled():
         drawn = {"plan": _view(compared, None), "elevation": _view(compared, looking(compared.first))}
-        return {name: CaptionedFigure(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
 
 
 def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]:

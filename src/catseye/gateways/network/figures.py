@@ -1,9 +1,8 @@
-"""Figures of an adjusted network as SVG text: plan, elevation, residuals, redundancy. Dense parts are rasterised."""
+"""Figures of an adjusted network: plan, elevation, residuals, redundancy. Dense parts are rasterised."""
 
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.quality.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
 from catseye.gateways.network.findings import Findings
-from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, nice, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, nice, styled, svg
 
 STATION, TARGET, HELD, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
 DENSE = 300  # points or marks from which they are rasterised, and only some are named
@@ -30,8 +29,13 @@ ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (0.8, 0.8), (-0.8, 0.8), (0.
 class CaptionedFigure:
     """A figure and what its caption has to say."""
 
-    svg: str
+    figure: Figure
     caption: str
+
+    @property
+    def svg(self) -> str:
+        """The figure as text of an SVG file."""
+        return svg(self.figure)
 
 
 def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
@@ -39,13 +43,11 @@ def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
 
     findings   what is told of a solution
     """
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with styled():
         drawn = {"plan": _view(findings, None), "elevation": _view(findings, looking(findings))}
         if np.isfinite(findings.table.standardised).any():
             drawn |= {"residuals": _residuals(findings), "redundancy": _redundancy(findings)}
-        return {name: CaptionedFigure(svg(figure), caption) for name, (figure, caption) in drawn.items()}
+        return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
 
 
 def looking(findings: Findings) -> float:

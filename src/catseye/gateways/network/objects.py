@@ -11,6 +11,7 @@ import numpy as np
 
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 from catseye.gateways.network.findings import MEASURES, ROLES, Findings
+from catseye.gateways.network.summary import verdict
 from catseye.gateways.writers.objects import plain
 
 if TYPE_CHECKING:
@@ -88,9 +89,11 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
     """All but the points and the observations."""
     solution, whole = findings.solution, findings.whole
     degrees = solution.degrees_of_freedom
+    likely = None if treated is None else findings.in_table(treated.likely)
     return plain(
         {
             "format": FORMAT,
+            "verdict": verdict(findings).to_object(),
             "source": findings.network.source,
             "description": findings.network.description,
             "status": solution.status,
@@ -109,7 +112,7 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
                 "p": whole.p,
                 "passed": whole.lower <= whole.factor <= whole.upper if np.isfinite(whole.p) else None,
                 "level": findings.level,
-                "verdict": whole.verdict,
+                "verdict": whole.outcome,
             },
             "critical": {
                 "test": findings.test,
@@ -131,6 +134,7 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
                 for r in findings.relative
             ],
             "suspects": findings.suspects,
+            "likely": [] if likely is None else np.flatnonzero(likely),
             "unchecked": np.flatnonzero(findings.table.active & ~findings.table.checked),
             "parameters": {
                 p.name: {"value": value, "u": u, "unit": p.unit, "prior_u": p.sigma}

@@ -20,9 +20,11 @@ from catseye.gateways.network.tables import coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 
 FORMAT = "catseye-plan-1"
+LARGEST_RATIO = 1.2  # of departure over claim on paper: what is measured is then worse than claimed
 LISTED = 10  # weakest points, and observations that hold most, in text and report
 CONTENTS = {
     "summary": "Summary",
@@ -65,6 +67,23 @@ class PlanFindings:
         ]
 
 
+def plan_verdict(plan_findings: PlanFindings) -> Verdict:
+    """Whether the network, measured so, would hold every point and check itself."""
+    findings = plan_findings.findings
+    if not findings.answered:
+        return Verdict("failed", findings.solution.status)
+    alone = int(np.isinf(plan_findings.worth).sum())
+    if alone:
+        return Verdict("doubtful", f"{alone} observations are indispensable: without any one of them a point floats")
+    unchecked = int(np.sum(~findings.table.checked))
+    if unchecked:
+        return Verdict("doubtful", f"an error in {unchecked} of {len(findings.table)} observations would not show")
+    if plan_findings.scatter is not None and plan_findings.scatter.ratio > LARGEST_RATIO:
+        ratio = plan_findings.scatter.ratio
+        return Verdict("doubtful", f"measured on paper it is off by {ratio:.2f} times what it claims")
+    return Verdict("good", "every point would be held, and every observation checked by others")
+
+
 def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
     """A plan as `catseye plan --json` gives it: the keys of an adjustment, predicted, and those of the plan."""
     plan, findings = plan_findings.plan, plan_findings.findings
@@ -76,6 +95,7 @@ def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
     names, axes = findings.names, findings.network.axes
     extra = {
         "format": FORMAT,
+        "verdict": plan_verdict(plan_findings).to_object(),
         "status": "planned",
         "suspects": [],
         "variance_factor": None,
@@ -236,6 +256,7 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
     )
     body = [
         header,
+        verdict_line(plan_verdict(plan_findings)),
         section(
             "summary",
             CONTENTS["summary"],

@@ -13,6 +13,7 @@ from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.summary import passages, quantity, treatment_passages, verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 
 if TYPE_CHECKING:
     from catseye.reduction.network import AdjustedNetwork
@@ -61,6 +62,7 @@ def network_report(
     )
     body = [
         header,
+        verdict_line(verdict(findings)),
         _summary(findings, treated),
         _network(drawn),
         _observations(findings, drawn, f"{prefix}observations.csv"),
@@ -77,18 +79,16 @@ def network_report(
 def _summary(findings: Findings, treated: "AdjustedNetwork | None") -> str:
     axis = findings.ellipsoid.semi_axes[:, 0]
     known = axis[np.isfinite(axis) & (axis > 0.0)]
-    good, text = verdict(findings)
     cards = network_cards(findings)
     if len(known):
         usual, worst = quantity(float(np.median(known)), "m"), quantity(float(known.max()), "m")
         cards.insert(1, card("Points known to", usual, f"longest axis of the usual ellipsoid; worst {worst}"))
-    listed = [*passages(findings)[1:], *([] if treated is None else treatment_passages(treated, findings))]
+    listed = [*passages(findings), *([] if treated is None else treatment_passages(treated, findings))]
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in listed)
     own = findings.network.description.strip()
     return section(
         "summary",
         CONTENTS["summary"],
-        paragraph(text, "" if good else "bad"),
         f'<div class="cards">{"".join(cards)}</div>',
         f"<dl>{words}</dl>",
         folded("The file's own words", *(paragraph(part) for part in own.split("\n\n"))) if own else "",

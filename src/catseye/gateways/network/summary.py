@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 
 if TYPE_CHECKING:
     from catseye.reduction.network import AdjustedNetwork
@@ -29,41 +31,40 @@ def quantity(value: float, unit: str) -> str:
     return f"{value / ARCSECOND:.3g}″" if unit == "rad" else f"{value:.3g}"
 
 
-def verdict(findings: Findings) -> tuple[bool, str]:
+def verdict(findings: Findings) -> Verdict:
     """Whether the adjustment can be trusted as it is, and a few plain words why.
 
     findings   what is told of a solution
     """
     status, whole = findings.solution.status, findings.whole
     if not findings.answered:
-        return False, f"No answer: {status}."
-    if status != "converged":
-        return False, f"Not to be trusted: {status}."
+        return Verdict("failed", f"no answer: {status}")
+    if status != CONVERGED:
+        return Verdict("doubtful", status)
     if not np.isfinite(whole.p):
-        return False, "Unchecked: nothing was measured twice, so nothing would show an error."
-    if whole.verdict == TOO_LARGE:
+        return Verdict("doubtful", "unchecked: nothing was measured twice, so nothing would show an error")
+    if whole.outcome == TOO_LARGE:
         more = 100.0 * (np.sqrt(whole.factor) - 1.0)
-        text = f"Doubtful: the observations scatter {more:.0f} % more than their uncertainties claim."
-        return False, text + _suspects(findings)
+        text = f"the observations scatter {more:.0f} % more than their uncertainties claim"
+        return Verdict("doubtful", f"{text}; {_suspects(findings) or 'no single observation stands out'}")
     if len(findings.suspects):
-        return False, "Good but for single observations: the whole agrees with the claimed uncertainties." + _suspects(
-            findings
-        )
-    if whole.verdict == TOO_SMALL:
+        text = "the whole agrees with the claimed uncertainties, single observations do not"
+        return Verdict("doubtful", f"{text}; {_suspects(findings)}")
+    if whole.outcome == TOO_SMALL:
         less = 100.0 * (1.0 - np.sqrt(whole.factor))
-        text = f"Good, and better than claimed: the observations scatter {less:.0f} % less than claimed."
+        text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
     else:
-        text = "Good: the observations agree with each other as their uncertainties claim."
+        text = "the observations agree with each other as their uncertainties claim"
     unchecked = int(np.sum(findings.table.active & ~findings.table.checked))
-    return True, text + (f" But {unchecked} of them are checked by no other." if unchecked else "")
+    return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
 
 
 def _suspects(findings: Findings) -> str:
     count = len(findings.suspects)
     if not count:
-        return " No single observation stands out."
+        return ""
     noun = "observation is" if count == 1 else "observations are"
-    return f" {count} {noun} suspect, first {observation_words(findings, int(findings.suspects[0]))}."
+    return f"{count} {noun} suspect, first {observation_words(findings, int(findings.suspects[0]))}"
 
 
 def observation_words(findings: Findings, row: int) -> str:
@@ -81,11 +82,11 @@ def observation_words(findings: Findings, row: int) -> str:
 
 
 def passages(findings: Findings) -> list[Passage]:
-    """Verdict, network, points, observations, and what is not checked.
+    """Network, points, observations, and what is not checked; the verdict stands before them.
 
     findings   what is told of a solution
     """
-    passages = [Passage("Verdict", verdict(findings)[1]), Passage("The network", _network(findings))]
+    passages = [Passage("The network", _network(findings))]
     if findings.answered:
         passages += [
             Passage("The points", _points(findings)),
@@ -206,9 +207,9 @@ def _observations(findings: Findings) -> str:
         return "Nothing is left over to compare them with."
     text = (
         f"Variance factor {whole.factor:.3f} with {findings.solution.degrees_of_freedom:.0f} degrees of freedom; by "
-        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): {whole.verdict}."
+        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): {whole.outcome}."
     )
-    text += _suspects(findings) if len(findings.suspects) else ""
+    text += f" {_suspects(findings)}." if len(findings.suspects) else ""
     if np.isfinite(table.standardised).any() and not len(findings.suspects):
         text += f" No observation is suspect; the worst is {observation_words(findings, int(table.worst_first[0]))}."
     return text

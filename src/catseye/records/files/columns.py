@@ -23,11 +23,13 @@ class TextColumns:
     file     its name, for refusals
     cells    column name -> cells, one a row
     lines    where each row stands in the file
+    comma    decimals may stand behind a comma: semicolons are between the cells
     """
 
     file: str
     cells: dict[str, list[str]]
     lines: Sequence[int]
+    comma: bool = False
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -39,6 +41,8 @@ class TextColumns:
     def numbers(self, name: str, blank: float | None = None) -> np.ndarray:
         """A column as finite numbers (rows,); a blank cell is `blank`, refused if None."""
         cells = self.cells[name]
+        if self.comma:
+            cells = [cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell for cell in cells]
         if blank is not None and "" in cells:
             cells = [cell or repr(blank) for cell in cells]
         try:
@@ -69,7 +73,7 @@ class TextColumns:
 def columns_of(text: str, file: str, required: Sequence[str], *, optional: Sequence[str] = ()) -> TextColumns:
     """The columns of a CSV text with a header, in any order.
 
-    text       the whole file
+    text       the whole file; where its header has semicolons and no comma, these are between its cells
     file       its name, for refusals
     required   columns that must be there
     optional   columns that may
@@ -80,16 +84,18 @@ def columns_of(text: str, file: str, required: Sequence[str], *, optional: Seque
     ['S1']
     """
     text = text.replace("\r\n", "\n")
+    head = text.partition("\n")[0]
+    between = ";" if ";" in head and "," not in head else ","
 
     def check(header: list[str]) -> None:
         _check_header(file, header, required, optional)
 
-    header, cells, lines = _quoted(text, file, check) if '"' in text else _plain(text, file, check)
+    header, cells, lines = (_quoted if '"' in text else _plain)(text, file, check, between)
     if not lines:
         raise refusal(file, "holds a header and no rows (expected at least one)")
     width, strip = len(header), str.strip
     columns = {name: list(map(strip, cells[at::width])) for at, name in enumerate(header)}
-    return TextColumns(file, columns, lines)
+    return TextColumns(file, columns, lines, comma=between == ";")
 
 
 def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:
@@ -104,24 +110,24 @@ def _check_header(file: str, header: list[str], required: Sequence[str], optiona
             raise refusal(file, f"line 1, column {name!r} is missing {wanted}")
 
 
-def _plain(text: str, file: str, check: Check) -> tuple[list[str], list[str], Sequence[int]]:
+def _plain(text: str, file: str, check: Check, between: str) -> tuple[list[str], list[str], Sequence[int]]:
     """Header, all cells row by row, and the rows' lines; one split of the whole text, as no list a row is made."""
     text = text.rstrip()
     if not text:
         raise refusal(file, "holds no text: empty")
     first, _, body = text.partition("\n")
-    header = [cell.strip() for cell in first.split(",")]
+    header = [cell.strip() for cell in first.split(between)]
     check(header)
     lines = body.split("\n") if body else []
     commas = len(header) - 1
-    if any(line.count(",") != commas for line in lines):
-        row = next(i for i, line in enumerate(lines) if line.count(",") != commas)
-        raise _uneven(file, row + 2, lines[row].split(","), len(header))
-    return header, body.replace("\n", ",").split(",") if body else [], range(2, len(lines) + 2)
+    if any(line.count(between) != commas for line in lines):
+        row = next(i for i, line in enumerate(lines) if line.count(between) != commas)
+        raise _uneven(file, row + 2, lines[row].split(between), len(header))
+    return header, body.replace("\n", between).split(between) if body else [], range(2, len(lines) + 2)
 
 
-def _quoted(text: str, file: str, check: Check) -> tuple[list[str], list[str], Sequence[int]]:
-    reader = csv.reader(io.StringIO(text.rstrip(), newline=""), strict=True)
+def _quoted(text: str, file: str, check: Check, between: str) -> tuple[list[str], list[str], Sequence[int]]:
+    reader = csv.reader(io.StringIO(text.rstrip(), newline=""), strict=True, delimiter=between)
     cells: list[str] = []
     lines: list[int] = []
     try:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from catseye.estimation.network.model import ObservationNetwork
 from catseye.records.files.refusal import refusal, shown
+from catseye.records.network.claim import RangeClaim
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
 from catseye.records.network.starnet import read_starnet
@@ -23,16 +24,25 @@ READERS = {
 }
 
 
-def read_network(path: Path | str) -> ObservationNetwork:
+def read_network(
+    path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None
+) -> ObservationNetwork:
     """The network of a file, by the end of its name, or of a folder.
 
-    path   a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
+    path       a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
+    sigma_mm, sigma_ppm   standard uncertainty a + b D of a distance that has none, of a folder or a .dat; what the file
+                          says counts where it says something
 
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
     path = Path(path)
+    claim = RangeClaim.given(sigma_mm, sigma_ppm)
     if path.is_dir():
-        return read_network_folder(path)
+        return read_network_folder(path, claim)
+    if path.suffix.lower() == ".dat":
+        return read_starnet(path, claim)
+    if claim:
+        raise refusal(path.name, "says every uncertainty itself (expected no --sigma-mm, no --sigma-ppm)")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"

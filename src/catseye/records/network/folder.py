@@ -1,14 +1,16 @@
 """A folder with points.csv and ranges.csv: rangers, targets and the distances between them, in metres.
 
     points.csv   point,x,y,z and, where wanted, role (free, fixed or datum) and u_x,u_y,u_z
-    ranges.csv   from,to,distance,sigma
+    ranges.csv   from,to,distance and sigma, or a claim for those that have none
 
-A point without coordinates has blank ones. A datum point takes part in the inner constraints, relative to the
+A target of ranges.csv that points.csv does not list is an unknown point; a station must be listed. A point without
+coordinates has blank ones. A datum point takes part in the inner constraints, relative to the
 coordinates of the file. u_x, u_y, u_z are standard uncertainties of the coordinates given: a blank is no prior, zero
 holds the coordinate. All ranges are one group, in the order of the file.
 """
 
 import difflib
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -18,24 +20,33 @@ from catseye.estimation.observations.kinds import Distances, ObservationGroup, O
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import shown
+from catseye.records.network.claim import NO_CLAIM, RangeClaim
 
 POINT_COLUMNS = ("point", "x", "y", "z")
 U_COLUMNS = ("u_x", "u_y", "u_z")
-RANGE_COLUMNS = ("from", "to", "distance", "sigma")
+RANGE_COLUMNS = ("from", "to", "distance")
+FEWEST = 3  # ranges that place a point; a target with fewer whose name is nearly a known one is a slip of the pen
+CLOSE = 0.7  # likeness of two names, 1 the same
 ROLES = ("free", "fixed", "datum")
 
 
-def read_network_folder(path: Path) -> ObservationNetwork:
+def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
     """The network of a folder; InputError where it cannot be used.
 
-    path   a folder with points.csv and ranges.csv
+    path    a folder with points.csv and ranges.csv
+    claim   standard uncertainty of a range whose sigma is blank or not there
     """
     folder = Folder(path)
     points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=("role", *U_COLUMNS))
-    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", RANGE_COLUMNS)
+    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", RANGE_COLUMNS, optional=("sigma",))
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)
-    groups: list[ObservationGroup] = [_distances(ranges, names)]
+    unlisted = _unlisted(ranges, names)
+    if unlisted:
+        names |= {name: len(names) + k for k, name in enumerate(unlisted)}
+        xyz, priors = (np.vstack([rows, np.full((len(unlisted), 3), np.nan)]) for rows in (xyz, priors))
+        fixed, datum = (np.vstack([rows, np.zeros((len(unlisted), 3), dtype=bool)]) for rows in (fixed, datum))
+    groups: list[ObservationGroup] = [_distances(ranges, names, claim)]
     places = [ranges.where()]
     if np.any(priors > 0.0):
         row, axis = np.nonzero(priors > 0.0)
@@ -85,12 +96,33 @@ def _places(points: TextColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     return xyz, fixed, datum, np.where(fixed, np.nan, u)
 
 
-def _distances(ranges: TextColumns, names: dict[str, int]) -> Distances:
+def _unlisted(ranges: TextColumns, names: dict[str, int]) -> list[str]:
+    """Targets that points.csv does not list, in the order of ranges.csv: unknown points."""
+    counts = Counter(ranges.cells["to"])
+    strangers = [name for name in counts if name and name not in names]
+    for name in strangers:
+        close = difflib.get_close_matches(name, names, n=1, cutoff=CLOSE) if counts[name] < FEWEST else []
+        if close:
+            row = ranges.cells["to"].index(name)
+            expected = f"expected perhaps {shown(close[0])}; an unknown point has {FEWEST} ranges at least"
+            raise ranges.refuse(row, f"to = {shown(name)} is not in points.csv ({expected})")
+    return strangers
+
+
+def _distances(ranges: TextColumns, names: dict[str, int], claim: RangeClaim) -> Distances:
     origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
     ranges.check("to", origin != target, "another point than from")
-    distance, sigma = ranges.numbers("distance"), ranges.numbers("sigma")
+    distance = ranges.numbers("distance")
     ranges.check("distance", distance > 0.0, "above 0 m")
-    ranges.check("sigma", sigma > 0.0, "above 0 m: nothing is measured without error")
+    sigma = ranges.numbers("sigma", blank=np.nan) if "sigma" in ranges.cells else np.full(len(distance), np.nan)
+    without = np.isnan(sigma)
+    if without.any():
+        if not claim:
+            row = int(np.argmax(without))
+            raise ranges.refuse(row, "no sigma (expected one, m, or --sigma-mm and --sigma-ppm for ranges without)")
+        sigma = np.where(without, claim.of(distance), sigma)
+    if "sigma" in ranges.cells:
+        ranges.check("sigma", sigma > 0.0, "above 0 m: nothing is measured without error")
     return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target)
 
 

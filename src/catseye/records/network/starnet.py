@@ -1,8 +1,9 @@
 """STAR*NET's lines of a three-dimensional survey (.dat), as its reference manual defines them.
 
 Read are the codes C and E (coordinates), A, D, V, DV, B, M, BM (observations), DB DN DM DE (direction sets), L
-(levelling), and the options .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION; the rest is
-refused by name, but for options that only shape the listing. Text after # is a comment, after ' a description.
+(levelling), and the options .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION .INSTRUMENT
+(a name only: its library is not in the file); the rest is refused by name, but for options that only shape the listing.
+Text after # is a comment, after ' a description.
 
 What a project file would say and a .dat cannot is taken as: metres, degrees-minutes-seconds, north before east,
 At-From-To, slope distance and zenith angle, three-dimensional. Standard errors are in the lines, in seconds (with GONS
@@ -30,6 +31,7 @@ from catseye.errors import InputError
 from catseye.estimation.network.model import ObservationNetwork
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import NUMBER, refusal, shown
+from catseye.records.network.claim import NO_CLAIM, RangeClaim
 from catseye.records.network.draft import NetworkDraft
 from catseye.records.network.kinds import LENGTHS, Row
 from catseye.records.network.starnet_lines import (
@@ -50,26 +52,39 @@ DEFAULTS = {  # observation -> the comment's key
     "zenith_angle": "zenith_arcsec",
     "height_difference": "elevation_mm",
 }
+PROJECT_OPTIONS = {  # what STAR*NET calls these among its project options, Instrument
+    "angle_arcsec": "Angle",
+    "direction_arcsec": "Direction",
+    "azimuth_arcsec": "Azimuth / Bearing",
+    "zenith_arcsec": "Zenith",
+    "distance_mm": "Distance Constant and PPM",
+    "elevation_mm": "Elev Diff Constant",
+}
 DISTANCES = ("slope_distance", "horizontal_distance")
 
 
-def read_starnet(path: Path) -> ObservationNetwork:
+def read_starnet(path: Path, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
     """The network of a STAR*NET .dat file; InputError, with its line, for what cannot be used or is not known.
 
-    path   the file
+    path    the file
+    claim   standard error of distances without one, until a comment of the file says otherwise
 
     Source: [STARNET04] chapter 5.
     """
-    return starnet_network(Folder(path.parent).text(path.name), path.name)
+    return starnet_network(Folder(path.parent).text(path.name), path.name, claim)
 
 
-def starnet_network(text: str, file: str) -> ObservationNetwork:
+def starnet_network(text: str, file: str, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
     """The same of the file's text.
 
-    text   lines
-    file   its name, for refusals
+    text    lines
+    file    its name, for refusals
+    claim   as for `read_starnet`
     """
     reader = _Reader(file)
+    for key, value in (("distance_mm", claim.mm), ("distance_ppm", claim.ppm)):
+        if value is not None:
+            reader.settings.defaults[key] = value
     for line in lines_of(text):
         reader.read(line)
     return reader.network()
@@ -84,6 +99,7 @@ class _Reader:
         self.station, self.orientation = "", -1
         self.left_out: list[str] = []
         self.held: list[str] = []
+        self.without: dict[str, list[str]] = {}  # places of observations without standard error, by the comment's key
 
     def refuse(self, line: StarnetLine, problem: str) -> InputError:
         return self.draft.refuse(line.place, problem)
@@ -104,6 +120,8 @@ class _Reader:
         """The network of all lines together."""
         if self.orientation >= 0:
             raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
+        if self.without:
+            raise self._refuse_without()
         for name, known in self.coordinates.items():
             place = next(iter(known.values()))[2]
             xyz = [known[axis][0] if axis in known else np.nan for axis in "xyz"]
@@ -118,6 +136,20 @@ class _Reader:
             rows = self.draft.rows
             self.draft.rows = [replace(row, known=bent) if row.kind == "zenith_angle" else row for row in rows]
         return self.draft.network(hold_untouched=True)
+
+    def _refuse_without(self) -> InputError:
+        """All standard errors that are missing, in the words of STAR*NET's project options."""
+        missing = [
+            f"{PROJECT_OPTIONS[key]} ({len(places)} observation{'s' if len(places) > 1 else ''}, first {places[0]})"
+            for key, places in self.without.items()
+        ]
+        named = f" or the .INSTRUMENT {shown(self.settings.instrument)}" if self.settings.instrument else ""
+        keys = ", ".join(f"{key} = ..." for key in self.without)
+        return refusal(
+            self.draft.file,
+            f"leaves to the project options{named}, which are not in it: {', '.join(missing)} (expected standard "
+            f"errors in the lines, or above them the comment '# catseye: {keys}')",
+        )
 
     def stations(self, line: StarnetLine, count: int) -> list[str]:
         """Names joined by the separator, At-From-To in that order whatever the file's."""
@@ -214,8 +246,8 @@ class _Reader:
             return defaults.get("distance_mm", 0.0) * MILLIMETRE + defaults.get("distance_ppm", 0.0) * PPM * value
         key = DEFAULTS.get(kind, "distance_mm")
         if key not in defaults:
-            wanted = f"expected one in the line, or above it the comment '# catseye: {key} = ...'"
-            raise self.refuse(line, f"{line.code}: {kind.replace('_', ' ')} has no standard error ({wanted})")
+            self.without.setdefault(key, []).append(line.place)
+            return FIXED_LENGTH  # never used: `network` refuses the file, all that is missing at once
         return defaults[key] * (MILLIMETRE if length else np.pi / 648_000.0)
 
     def _distance_and_height(self, ends: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:

@@ -21,7 +21,19 @@ DEFAULT_KEYS = (
     *("distance_mm", "distance_ppm", "elevation_mm"),
 )
 SHAPING = ("RELATIVE", "PTOLERANCE", "ELLIPSE", "COPYINPUT", "LOSTSTATIONS", "PAGE", "TITLE")  # the listing only
-OPTIONS = ("UNITS", "ORDER", "DELTA", "SEPARATOR", "2D", "3D", "DATA", "MULTIPLIER", "REFRACTION", "CATSEYE")
+OPTIONS = (
+    "UNITS",
+    "ORDER",
+    "DELTA",
+    "SEPARATOR",
+    "2D",
+    "3D",
+    "DATA",
+    "MULTIPLIER",
+    "REFRACTION",
+    "INSTRUMENT",
+    "CATSEYE",
+)
 SHORTEST = 3  # letters by which an option may be called
 
 
@@ -52,6 +64,7 @@ class StarnetSettings:
     separator           of stations
     data                lines are read
     refraction          coefficient, or None for a plane network
+    instrument          name that `.INSTRUMENT` gave last
     defaults            standard errors by the comment's key
     """
 
@@ -65,6 +78,7 @@ class StarnetSettings:
     three_d: bool = True
     separator: str = "-"
     data: bool = True
+    instrument: str = ""
     refraction: float | None = None
     defaults: dict[str, float] = field(default_factory=dict)
 
@@ -174,6 +188,8 @@ def set_option(settings: StarnetSettings, line: StarnetLine, refuse: Refuse) -> 
         settings.multiplier = number_of(line, values[0], refuse) if values else 1.0
         if settings.multiplier <= 0.0:
             raise refuse(line, f".MULTIPLIER {shown(values[0])} (expected above 0)")
+    elif name == "INSTRUMENT":
+        settings.instrument = " ".join(line.words[1:])
     elif name == "REFRACTION":
         value = number_of(line, values[0], refuse) if len(values) == 1 else 0.0
         if len(values) != 1 or settings.refraction not in (None, value):
