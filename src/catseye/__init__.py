@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from catseye.api.night import explain, reduce
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.telescope import pose, surface
     from catseye.api.weather import air, sound
 
 FACE = {  # file of catseye.api -> what of it is catseye's
@@ -28,6 +29,7 @@ FACE = {  # file of catseye.api -> what of it is catseye's
     "night": ("explain", "reduce"),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "telescope": ("pose", "surface"),
     "weather": ("air", "sound"),
 }
 
@@ -46,12 +48,14 @@ __all__ = [
     "load",
     "locate",
     "plan",
+    "pose",
     "reduce",
     "replay",
     "save",
     "show",
     "simulate",
     "sound",
+    "surface",
 ]
 
 

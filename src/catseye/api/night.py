@@ -127,13 +127,13 @@ class NightResult(Result):
 def reduce(
     campaign: "str | os.PathLike[str] | Campaign" = "night-01",
     *,
-    air_model: str = "ciddor_hill1999",
+    air_model: str = "rueger1990",
     progress: Progress | None = None,
 ) -> NightResult:
     """A night's samples to coordinates, pose and surface, nothing moving meanwhile.
 
     campaign    directory laid out as the bundled night-01, its bundled name, or what `load` gave
-    air_model   formula for the index of air
+    air_model   formula for the index of air; the working notes' without
     progress    called with (what, done, of how many)
 
     Raises InputError where the campaign cannot be used and EstimationError where the adjustment finds no answer.
@@ -246,7 +246,7 @@ def explain(
     campaign: "str | os.PathLike[str] | Campaign",
     shot: int,
     *,
-    air_model: str = "ciddor_hill1999",
+    air_model: str = "rueger1990",
     monte_carlo: int = 200_000,
     seed: int = 1,
     progress: Progress | None = None,

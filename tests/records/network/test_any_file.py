@@ -204,7 +204,9 @@ def test_targets_that_are_not_listed_are_unknown_points():
     assert not network.points.fixed[5:].any()
     answer = adjusted(network).solution
     for name, place in made.items():
-        np.testing.assert_allclose(answer.x[network.points.names.index(name)], place, rtol=0, atol=4e-3)  # u is 1.2 mm at most
+        np.testing.assert_allclose(
+            answer.x[network.points.names.index(name)], place, rtol=0, atol=4e-3
+        )  # u is 1.2 mm at most
     assert 0.3 < answer.variance_factor < 2.5
 
 

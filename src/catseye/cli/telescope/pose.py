@@ -2,22 +2,18 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import OPTICS, POSE_FRAMES, POSE_GROUPS, POSE_WEIGHTS, one_of
-from catseye.constants import ARCSECOND, DEGREE
-from catseye.errors import InputError
+from catseye.constants import ARCSECOND
 
 if TYPE_CHECKING:
-    from catseye.gateways.pose.objects import PoseResult
-    from catseye.records.network.solved_points import SolvedPoints
-    from catseye.records.site.folder import SiteFolder
-
-CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
+    from catseye.gateways.pose.objects import PoseFindings
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
@@ -123,6 +119,7 @@ def pose(  # noqa: PLR0913 - its options are its command line
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Six degrees of freedom of a part of the antenna between two epochs or against design; beam and focus too."""
     if group is not None and points is not None:
@@ -133,128 +130,54 @@ def pose(  # noqa: PLR0913 - its options are its command line
         raise typer.BadParameter("belongs to --group alidade in the frame alidade.", param_hint="'--tilt'")
     if pointing is not None and (points is not None or frame not in (None, "reflector") or group not in (None, "dish")):
         raise typer.BadParameter("is of the dish in the frame reflector.", param_hint="'--pointing'")
-    from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.records.network.solved_points import read_solved_points
-    from catseye.records.site.folder import read_site
-
     sources = [p for p in (epoch, earlier, site) if p is not None]
     if out is not None:
-        for source in sources:
-            refuse_output(out, source)
+        from catseye.gateways.writers.output import refuse_output
+
+        refuse_output(out, *sources)
     progress = ProgressLine(quiet)
     try:
-        progress("reading", 0, len(sources))
-        later = _with_posture(read_solved_points(epoch), posture)
-        before = None if earlier is None else _with_posture(read_solved_points(earlier), earlier_posture)
-        records = read_site(site)
-        inputs = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
-        progress("fitting", 1, 2)
-        wanted = _Wanted(
-            group=None if points is not None else group or "dish",
+        progress("fitting", 0, 1)
+        from catseye.api.result import save
+        from catseye.api.telescope import pose as posed
+
+        result = posed(
+            epoch,
+            earlier,
+            site=site,
+            group=group,
             points=None if points is None else [p.strip() for p in points.split(",")],
-            frame=frame or ("reflector" if pointing else "alidade" if tilt else "ground"),
+            frame=frame,
             pivot=None if pivot is None else _numbers(pivot, 3, "x,y,z in metres"),
             robust=robust,
-            pointing=pointing,
-            tilt=None if tilt is None else _numbers(tilt, 3, "X,Y,U in arc seconds"),
+            pointing=None if pointing is None else "prime" if pointing == "prime" else "gregorian",
+            tilt_arcsec=None if tilt is None else _numbers(tilt, 3, "X,Y,U in arc seconds"),
+            posture_deg=_angles(posture),
+            earlier_posture_deg=_angles(earlier_posture),
         )
-        result = _result(later, before, records, wanted)
         if out is not None:
-            from catseye.gateways.pose.files import write_pose
-
-            asked = {"group": wanted.group, "points": points, "frame": wanted.frame, "pivot": pivot, "robust": robust}
-            with whole_directory(out, epoch) as directory:
-                write_pose(result, directory, inputs, settings={**asked, "pointing": pointing, "tilt": tilt})
+            save(result, out)
     finally:
         progress.clear()
-    _tell(result, json, quiet, out)
+    written = [] if out is None else [("Written to", f"{out}/: report.html, points.csv, pose.json")]
+    tell(result, json=json, quiet=quiet, strict=strict, rows=_rows(result.found), written=written)
 
 
-def _tell(result: "PoseResult", json: bool, quiet: bool, out: Path | None) -> None:
-    from catseye.gateways.pose.objects import beam_rows, pose_result_object, pose_rows, pose_words
+def _angles(posture: str | None) -> list[float] | None:
+    return None if posture is None else _numbers(posture, 2, "AZ,EL in degrees")
 
-    if json:
-        from catseye.gateways.writers.objects import json_line
 
-        say(json_line(pose_result_object(result)))
-        return
-    if quiet:
-        return
-    for title, text in pose_words(result):
-        say(wrapped(title, text))
-    for name, value, u, unit in pose_rows(result):
-        say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-    if result.beam is not None:
-        say("\nThe beam (its correction is the opposite)")
-        for name, value, u, unit in beam_rows(result.beam):
-            say(f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}")
-        for name, part in result.beam.terms.items():
+def _rows(found: "PoseFindings") -> list[str]:
+    """The six numbers, and the beam's with what they are made of."""
+    from catseye.gateways.pose.objects import beam_rows, pose_rows
+
+    def lines(rows: list[tuple[str, str, str, str]]) -> list[str]:
+        return [f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}" for name, value, u, unit in rows]
+
+    rows = lines(pose_rows(found))
+    if found.beam is not None:
+        rows += ["", "The beam (its correction is the opposite)", *lines(beam_rows(found.beam))]
+        for name, part in found.beam.terms.items():
             a, b, c = part[0] / ARCSECOND, part[1] / ARCSECOND, part[2] * 1e3
-            say(f"{'':<14}{name:<36}{a:+9.3f} {b:+9.3f} arcsec {c:+9.3f} mm")
-    if out is not None:
-        say(wrapped("Written to", f"{out}/: report.html, points.csv, pose.json"))
-
-
-def _with_posture(points: "SolvedPoints", posture: str | None) -> "SolvedPoints":
-    from dataclasses import replace
-
-    if posture is None:
-        return points
-    azimuth, elevation = _numbers(posture, 2, "AZ,EL in degrees")
-    return replace(points, posture=(azimuth * DEGREE, elevation * DEGREE))
-
-
-class _Wanted(NamedTuple):
-    """Which pose is asked for.
-
-    group      what moves as one, or
-    points     the points that do, by name
-    frame      axes of the answer
-    pivot      of the rotation, m, in the frame; None: the usual one
-    robust     how points that moved alone are left out; None: none is
-    pointing   optics whose beam is derived, too
-    tilt       of an inclinometer, joined: x, y and their u, arc seconds
-    """
-
-    group: str | None
-    points: list[str] | None
-    frame: str
-    pivot: list[float] | None
-    robust: str | None
-    pointing: str | None
-    tilt: list[float] | None
-
-
-def _result(
-    later: "SolvedPoints", before: "SolvedPoints | None", records: "SiteFolder", wanted: _Wanted
-) -> "PoseResult":
-    """The pose, with an inclinometer joined or the beam derived where asked for."""
-    import numpy as np
-
-    from catseye.gateways.pose.objects import PoseResult
-    from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
-    from catseye.reduction.pose.pose import at_posture, pose_of_group
-    from catseye.reduction.pose.track_profile import pose_with_tilt
-
-    if later.posture is None:
-        raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
-    site = at_posture(records, *later.posture)
-    group_pose = pose_of_group(
-        later,
-        before,
-        site,
-        group=wanted.group,
-        points=wanted.points,
-        frame=wanted.frame,
-        pivot=None if wanted.pivot is None else np.array(wanted.pivot),
-        robust=wanted.robust,
-    )
-    if wanted.tilt is not None:
-        x, y, u = (v * ARCSECOND for v in wanted.tilt)
-        return PoseResult(pose_with_tilt(group_pose, np.array([x, y]), u), None)
-    optics = wanted.pointing
-    if optics is None:
-        return PoseResult(group_pose, None)
-    carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=wanted.robust)
-    cross = cross_covariance(carried, group_pose, site, earlier=before)
-    return PoseResult(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))
+            rows.append(f"{'':<14}{name:<36}{a:+9.3f} {b:+9.3f} arcsec {c:+9.3f} mm")
+    return rows

@@ -2,21 +2,19 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.option_groups import grouped
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import NUMBERINGS, PARABOLOID_PARTS, PRISM_FRAMES, TRAVELS, one_of
-from catseye.errors import EstimationError, InputError
+from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.gateways.surface.report import SurfaceResult
-    from catseye.records.site.folder import SiteFolder
-    from catseye.reduction.surface.actuators import Travel
-    from catseye.reduction.surface.shape import Prisms, ShapeSettings
+    from catseye.api.telescope import SurfaceResult
 
 TERMS_TOLD = 22  # on a terminal
 
@@ -62,17 +60,15 @@ class _Shape(NamedTuple):
         str, typer.Option("--order", metavar=NUMBERINGS, callback=one_of(NUMBERINGS), help="Their numbering.")
     ] = "noll"
 
-    def settings(self) -> "ShapeSettings":
-        """The same for the recipe, in its words."""
-        from catseye.reduction.surface.shape import ShapeSettings
-
-        return ShapeSettings(
-            tuple(name for name in self.free.split(",") if name),
-            self.taper_db,
-            tuple(f * 1e9 for f in self.frequency_ghz or []),
-            self.zernike,
-            "noll" if self.order == "noll" else "ansi",
-        )
+    def options(self) -> dict[str, Any]:
+        """The same for `catseye.surface`."""
+        return {
+            "free": tuple(name for name in self.free.split(",") if name),
+            "taper_db": self.taper_db,
+            "frequency_ghz": self.frequency_ghz or (),
+            "zernike": self.zernike,
+            "order": "noll" if self.order == "noll" else "ansi",
+        }
 
 
 class _Reading(NamedTuple):
@@ -93,24 +89,14 @@ class _Reading(NamedTuple):
         list[float] | None, typer.Option("--temperature-c", help="Of the structure, °C, once for each input.")
     ] = None
 
-    def of(self, inputs: list[Path], site: "SiteFolder") -> "tuple[list[Prisms], dict[str, str]]":
-        """Each input's prisms, and the SHA-256 of each file read."""
-        from catseye.gateways.surface.inputs import read_prisms
-
-        epochs: list[Prisms] = []
-        hashes: dict[str, str] = {}
-        for k, source in enumerate(inputs):
-            prisms, read = read_prisms(
-                source,
-                site,
-                frame="ground" if self.frame == "ground" else "reflector",
-                azimuth_deg=self.azimuth_deg,
-                elevation_deg=self.elevation_deg[k] if self.elevation_deg else None,
-                temperature_c=self.temperature_c[k] if self.temperature_c else None,
-            )
-            epochs.append(prisms)
-            hashes |= read
-        return epochs, hashes
+    def options(self) -> dict[str, Any]:
+        """The same for `catseye.surface`."""
+        return {
+            "frame": "ground" if self.frame == "ground" else "reflector",
+            "azimuth_deg": self.azimuth_deg,
+            "elevation_deg": self.elevation_deg or (),
+            "temperature_c": self.temperature_c or (),
+        }
 
 
 class _Corrections(NamedTuple):
@@ -147,7 +133,7 @@ class _Corrections(NamedTuple):
     "Tables: docs/formats/surface.md"
 )
 @grouped
-def surface(
+def surface(  # noqa: PLR0913 - its options are its command line
     *,
     inputs: Annotated[
         list[Path],
@@ -165,6 +151,7 @@ def surface(
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """A dish's surface: best paraboloid, half-path errors, Zernike terms, gain, change, elevation, actuators."""
     if wanted.positions is not None and wanted.actuators is None:
@@ -176,103 +163,42 @@ def surface(
     if out is not None:
         from catseye.gateways.writers.output import refuse_output
 
-        for source in inputs:
-            refuse_output(out, source)
+        refuse_output(out, *inputs)
     progress = ProgressLine(quiet)
     try:
-        result, hashes = _result(inputs, site, reading, shape.settings(), wanted, progress)
-        if out is not None:
-            from catseye.gateways.surface.files import write_surface
-            from catseye.gateways.writers.output import whole_directory
+        from catseye.api.telescope import surface as surfaced
+        from catseye.gateways.writers.output import whole_directory
 
-            with whole_directory(out, inputs[0]) as directory:
-                write_surface(result, directory, hashes, progress=progress)
+        result = surfaced(
+            *inputs,
+            site=site,
+            **shape.options(),
+            **reading.options(),
+            actuators=wanted.actuators is not None,
+            positions=wanted.positions,
+            travel="axis" if wanted.travel == "axis" else "normal",
+            progress=progress,
+        )
+        if out is not None:
+            with whole_directory(out, *inputs) as directory:
+                result.write(directory, progress)
                 _keep(result, wanted.actuators)  # no directory without the table that was asked for, too
         else:
             _keep(result, wanted.actuators)
     finally:
         progress.clear()
-    _tell(result, json, quiet, out, wanted.actuators)
+    from catseye.gateways.surface.objects import term_lines
+
+    found = result.found
+    rows = [f"{'':<14}{line}" for line in term_lines(found.shapes, found.change, found.lookup)[:TERMS_TOLD]]
+    files = None if out is None else f"{out}/: report.html, surface.json, tables of prisms and Zernike terms"
+    table = None if wanted.actuators is None else f"{wanted.actuators}: the actuators' corrections"
+    written = [("Written to", files), ("Written to", table)]
+    tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=written)
 
 
 def _keep(result: "SurfaceResult", actuators: Path | None) -> None:
     if actuators is not None:
         from catseye.gateways.surface.files import write_actuators
 
-        write_actuators(result, actuators)
-
-
-def _result(
-    inputs: list[Path],
-    telescope: str,
-    reading: _Reading,
-    settings: "ShapeSettings",
-    wanted: _Corrections,
-    progress: ProgressLine,
-) -> "tuple[SurfaceResult, dict[str, str]]":
-    """What the inputs say, and the SHA-256 of each file read."""
-    from catseye.gateways.examples import located
-    from catseye.gateways.surface.report import SurfaceResult
-    from catseye.records.panels.actuators import read_positions
-    from catseye.records.site.folder import read_site
-    from catseye.reduction.surface.actuators import actuators_of, corrections
-    from catseye.reduction.surface.change import change_between
-    from catseye.reduction.surface.lookup import lookup_of
-    from catseye.reduction.surface.shape import LitAperture, shape_of
-
-    site = read_site(located(telescope))
-    aperture = LitAperture.of(site.site.paraboloid)
-    epochs, hashes = reading.of(inputs, site)
-    shapes = []
-    for k, prisms in enumerate(epochs):
-        progress("fitting epochs", k, len(epochs))
-        try:
-            shapes.append(shape_of(prisms, aperture, settings))
-        except EstimationError as problem:
-            raise EstimationError(f"{prisms.source}: {problem}") from problem
-    change = change_between(epochs[0], epochs[1], aperture, settings=settings) if len(epochs) == 2 else None
-    lookup = lookup_of(shapes) if len(epochs) >= 3 else None
-    table = None
-    if wanted.actuators is not None:
-        progress("actuators", 0, 1)
-        known = None if wanted.positions is None else read_positions(wanted.positions)
-        travel: Travel = "axis" if wanted.travel == "axis" else "normal"
-        table = corrections(shapes[-1], *actuators_of(site), positions=known, travel=travel)
-    return SurfaceResult(tuple(shapes), change, lookup, table), hashes
-
-
-def _tell(result: "SurfaceResult", json: bool, quiet: bool, out: Path | None, actuators: Path | None) -> None:
-    from catseye.gateways.surface.objects import (
-        actuators_passage,
-        change_passages,
-        lookup_passages,
-        shape_passages,
-        term_lines,
-    )
-
-    if json:
-        from catseye.gateways.surface.files import surface_object
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(surface_object(result)))
-        return
-    if quiet:
-        return
-    passages = []
-    if result.lookup is not None:
-        passages += lookup_passages(result.lookup)
-    else:
-        for shape in result.shapes:
-            passages += shape_passages(shape)
-    if result.change is not None:
-        passages += change_passages(result.change)
-    if result.actuators is not None:
-        passages.append(actuators_passage(result.actuators))
-    for passage in passages:
-        say(wrapped(passage.title, passage.text))
-    for line in term_lines(result.shapes, result.change, result.lookup)[:TERMS_TOLD]:
-        say(f"{'':<14}{line}")
-    if out is not None:
-        say(wrapped("Written to", f"{out}/: report.html, surface.json, tables of prisms and Zernike terms"))
-    if actuators is not None:
-        say(wrapped("Written to", f"{actuators}: the actuators' corrections"))
+        write_actuators(result.found, actuators)

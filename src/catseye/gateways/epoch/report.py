@@ -19,6 +19,7 @@ from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
+from catseye.reduction.pose.dish_ways import dish_ways
 
 CONTENTS = {
     "summary": "Summary",
@@ -166,6 +167,7 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
         table(("against the nominal posture", "value", "u"), motion, "tnn"),
         table(("in the ground frame (m)", "x", "y", "z"), places, "tnnn"),
         paragraph(f"Not observed: {UNOBSERVED}.", "faint"),
+        _ways(reduction),
         picture(
             drawn["dish"],
             "Normal deviations of the prisms from that paraboloid in millimetres, "
@@ -173,6 +175,35 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
             f"u {np.min(surface.u_deviation) / MILLIMETRE:.3f} to {np.max(surface.u_deviation) / MILLIMETRE:.3f} mm. "
             "Dashed: the aperture.",
         ),
+    )
+
+
+def _ways(reduction: Reduction) -> str:
+    """The answers of three commands to where the dish is, with why they differ."""
+    rows = [
+        (
+            way.command,
+            way.fitted,
+            *(f"{v / MILLIMETRE:+.2f} ± {u / MILLIMETRE:.2f}" for v, u in zip(way.translation, way.u[:3], strict=True)),
+            *(f"{v / ARCSECOND:+.1f} ± {u / ARCSECOND:.1f}" for v, u in zip(way.rotation, way.u[3:], strict=True)),
+            *(f"{v / ARCSECOND:+.1f} ± {u / ARCSECOND:.1f}" for v, u in zip(way.axis, way.u_axis, strict=True)),
+        )
+        for way in dish_ways(reduction)
+    ]
+    columns = ("command", "what is fitted", *(f"{a} (mm)" for a in "xyz"), *(f"about {a} (″)" for a in "xyz"))
+    return "\n".join(
+        (
+            "<h3>The dish, as each command has it</h3>",
+            paragraph(
+                "All against the nominal posture, ground axes, about the nominal vertex. What is fitted differs, not the "
+                "sign: a paraboloid does not show a turn about the dish's own axis and sets it to zero, points "
+                "held against their design show it, and their places across the surface count, too; a focal length "
+                "that is free takes part of an offset dish's turn with it. Compare the last two columns, how far the "
+                "dish's axis leans: that is what pointing feels. Unless the focal length is free they agree within "
+                "their uncertainties."
+            ),
+            table((*columns, "axis, across elevation (″)", "axis, in elevation (″)"), rows, "ttnnnnnnnn"),
+        )
     )
 
 

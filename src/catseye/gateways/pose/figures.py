@@ -1,30 +1,28 @@
-"""Figures of a pose as SVG text: what the points do beside moving as one, and what makes the pointing offset."""
+"""Figures of a pose: what the points do beside moving as one, and what makes the pointing offset."""
 
 from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.pose.objects import PoseResult
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
+from catseye.gateways.pose.objects import PoseFindings
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, nice, styled
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 
 NAMED = 14  # points up to which each is named
 LENGTH = 0.12  # of the group's size, drawn for the largest residual
 
 
-def pose_figures(result: PoseResult) -> dict[str, str]:
+def pose_figures(result: PoseFindings) -> dict[str, Figure]:
     """Every figure of the report by its name."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        drawn = {"residuals": svg(_residuals(result))}
+    with styled():
+        drawn = {"residuals": _residuals(result)}
         if result.beam is not None:
-            drawn["terms"] = svg(_terms(result.beam))
+            drawn["terms"] = _terms(result.beam)
         return drawn
 
 
-def _residuals(result: PoseResult) -> Figure:
+def _residuals(result: PoseFindings) -> Figure:
     """Arrows in the two longer extents of the group, colour across them."""
     pose, places = result.pose.pose, result.pose.places
     residual = pose.motion.residual / MILLIMETRE

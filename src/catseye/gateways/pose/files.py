@@ -12,10 +12,19 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
-from catseye.gateways.pose.objects import FORMAT, PoseResult, beam_rows, pose_result_object, pose_rows, pose_words
+from catseye.gateways.pose.objects import (
+    FORMAT,
+    PoseFindings,
+    beam_rows,
+    pose_result_object,
+    pose_rows,
+    pose_verdict,
+    pose_words,
+)
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 
@@ -34,7 +43,9 @@ HEADER = (
 )
 
 
-def write_pose(result: PoseResult, directory: Path, inputs: Mapping[str, str], *, settings: Mapping[str, Any]) -> None:
+def write_pose(
+    result: PoseFindings, directory: Path, inputs: Mapping[str, str], *, settings: Mapping[str, Any]
+) -> None:
     """Every file, and last the provenance.
 
     result      a pose
@@ -66,7 +77,7 @@ def write_pose(result: PoseResult, directory: Path, inputs: Mapping[str, str], *
     join_tables(directory, frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
-def points_csv(result: PoseResult) -> str:
+def points_csv(result: PoseFindings) -> str:
     """Each point: first place, what the pose moves it by, what is left, its largest |w|."""
     pose, places = result.pose.pose, result.pose.places
     moved, _ = pose.displacement(places)
@@ -79,11 +90,12 @@ def points_csv(result: PoseResult) -> str:
     return stream.getvalue()
 
 
-def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -> str:
+def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page of a pose, HTML."""
     from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svgs
 
-    drawn = pose_figures(result)
+    drawn = svgs(pose_figures(result))
     group = result.pose
     title = f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}"
     header = (
@@ -94,6 +106,7 @@ def pose_report(result: PoseResult, when: datetime, inputs: Mapping[str, str]) -
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
     body = [
         header,
+        verdict_line(pose_verdict(result)),
         section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
         section(
             "pose",

@@ -7,6 +7,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.shapes.pose import COMPONENTS
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.files.reading import Folder
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
@@ -16,20 +17,43 @@ FORMAT = "catseye-pose-1"
 WEAK_LEVEL = 0.01  # chance below which a group is said not to move as one
 
 
-class PoseResult(NamedTuple):
+class PoseFindings(NamedTuple):
     """What `catseye pose` found: the group's pose, and the beam where it was asked for."""
 
     pose: GroupPose
     beam: PointingOffset | None
 
 
-def pose_result_object(result: PoseResult) -> dict[str, Any]:
+def pose_status(result: PoseFindings) -> str:
+    """ "converged", or what speaks against the pose: of the fit, or of its own test, in words."""
+    pose = result.pose.pose
+    if pose.motion.status != "converged":
+        return pose.motion.status
+    if pose.motion.degrees_of_freedom and pose.p < WEAK_LEVEL:
+        what = "the pose, and the beam that follows from it," if result.beam is not None else "the pose"
+        return f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of what its points do; see residuals"
+    return "converged"
+
+
+def pose_verdict(result: PoseFindings) -> Verdict:
+    """Whether the group moved as one body, which is what a pose says of it."""
+    pose, status = result.pose.pose, pose_status(result)
+    if status != "converged":
+        return Verdict("doubtful", status)
+    if not pose.motion.degrees_of_freedom:
+        return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group moved as one")
+    left = f", {len(pose.left_out)} left out" if pose.left_out else ""
+    return Verdict("good", f"{len(pose.names)} points move as one{left} (p {pose.p:.2g})")
+
+
+def pose_result_object(result: PoseFindings) -> dict[str, Any]:
     """A pose as `catseye pose --json` gives it: m and rad."""
     group, pose = result.pose, result.pose.pose
     posture = group.epoch.posture
     moved, _ = pose.displacement(group.places)
     return {
         "format": FORMAT,
+        "verdict": pose_verdict(result).to_object(),
         "group": group.group,
         "epoch": group.epoch.campaign,
         "against": group.against,
@@ -45,7 +69,7 @@ def pose_result_object(result: PoseResult) -> dict[str, Any]:
         "covariance": pose.covariance,
         "covariance_order": list(COMPONENTS),
         "matrix": pose.motion.matrix,
-        "status": pose.motion.status,
+        "status": pose_status(result),
         "chi2": pose.motion.pvv,
         "degrees_of_freedom": pose.motion.degrees_of_freedom,
         "p": pose.p,
@@ -77,7 +101,7 @@ def beam_object(beam: PointingOffset) -> dict[str, Any]:
     }
 
 
-def pose_rows(result: PoseResult) -> list[tuple[str, str, str, str]]:
+def pose_rows(result: PoseFindings) -> list[tuple[str, str, str, str]]:
     """Component, value, standard uncertainty, unit, as people read them."""
     pose = result.pose.pose
     values = [*(pose.translation / MILLIMETRE), *(pose.rotation / ARCSECOND)]
@@ -97,7 +121,7 @@ def beam_rows(beam: PointingOffset) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def pose_words(result: PoseResult) -> list[tuple[str, str]]:
+def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
     """Titles and sentences for people, in order."""
     group, pose = result.pose, result.pose.pose
     pivot = ", ".join(f"{v:.3f}" for v in pose.pivot)
@@ -114,8 +138,8 @@ def pose_words(result: PoseResult) -> list[tuple[str, str]]:
                 f"p {pose.p:.2g}: the group {fits}",
             )
         )
-    if pose.motion.status != "converged":
-        passages.append(("Status", pose.motion.status))
+    if pose_status(result) != "converged":
+        passages.append(("Status", pose_status(result)))
     for name, w in pose.left_out.items():
         passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved on its own"))
     if group.missing:

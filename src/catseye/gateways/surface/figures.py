@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, Figure, styled
 from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import HYSTERESIS, Lookup
-from catseye.reduction.surface.shape import Expansion, LitAperture, ShapeSettings
+from catseye.reduction.surface.shape import Expansion, LitAperture, ShapeSettings, SurfaceShape
 
 LEVELS = 21
 MOST_NAMED = 60  # prisms whose names fit
@@ -18,7 +19,7 @@ PANELS = 6  # terms of an elevation figure
 
 def surface_map(
     local: np.ndarray, value: np.ndarray, aperture: LitAperture, *, label: str, names: tuple[str, ...] = ()
-) -> str:
+) -> Figure:
     """Values at prisms, and between them by plain triangles.
 
     local      (k, 2 or 3) m, dish's frame
@@ -26,7 +27,7 @@ def surface_map(
     label      of the scale, with mm
     names      of the prisms, where there are few
     """
-    with mpl.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(9.0, 6.8), layout="constrained")
         ax = figure.add_subplot()
         x, y, shown = local[:, 0], local[:, 1], value / MILLIMETRE
@@ -44,12 +45,25 @@ def surface_map(
         ax.set_xlabel("x in the dish's frame (m)")
         ax.set_ylabel("y in the dish's frame, from the vertex (m)")
         figure.colorbar(dots, ax=ax, label=label, shrink=0.85)
-        return svg(figure)
+        return figure
 
 
-def actuator_map(actuators: Actuators, aperture: LitAperture) -> str:
+def shape_map(shape: SurfaceShape) -> Figure:
+    """Half-path errors of one epoch, off its fitted paraboloid."""
+    fit = shape.fit
+    return surface_map(fit.local, fit.half_path, shape.aperture, label="half-path error (mm)", names=shape.prisms.names)
+
+
+def change_map(change: Change) -> Figure:
+    """Change of the half path between two epochs."""
+    return surface_map(
+        change.local, change.half_path, change.aperture, label="change of half path (mm)", names=change.names
+    )
+
+
+def actuator_map(actuators: Actuators, aperture: LitAperture) -> Figure:
     """Corrections of all actuators, and their standard uncertainty."""
-    with mpl.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
         correction, u = actuators.correction / MILLIMETRE, actuators.u_correction / MILLIMETRE
         limit = max(float(np.max(np.abs(correction))), 1e-6)
@@ -64,7 +78,7 @@ def actuator_map(actuators: Actuators, aperture: LitAperture) -> str:
             ax.set_xlabel("x (m)")
             ax.set_ylabel("y (m)" if k == 0 else "")
             figure.colorbar(dots, ax=ax, shrink=0.8)
-        return svg(figure)
+        return figure
 
 
 def _edge(ax: Any, aperture: LitAperture) -> None:
@@ -76,9 +90,9 @@ def _edge(ax: Any, aperture: LitAperture) -> None:
     ax.margins(0.04)
 
 
-def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> str:
+def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> Figure:
     """Terms with their standard uncertainties, piston and tilts left to the table."""
-    with mpl.rc_context(STYLE):
+    with styled():
         shown = [k for k, term in enumerate(expansion.terms) if term.n >= 2] or list(range(len(expansion.terms)))
         figure = Figure(figsize=(9.4, 0.9 + 0.27 * len(shown)), layout="constrained")
         ax = figure.add_subplot()
@@ -90,12 +104,12 @@ def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> str:
         ax.invert_yaxis()
         ax.axvline(0.0, color=FAINT, lw=0.8)
         ax.set_xlabel("half-path error of the term, rms over the aperture (mm), bars: 1σ")
-        return svg(figure)
+        return figure
 
 
-def elevation_terms(lookup: Lookup) -> str:
+def elevation_terms(lookup: Lookup) -> Figure:
     """The terms that move most, measured and modelled, up and down apart."""
-    with mpl.rc_context(STYLE):
+    with styled():
         span = np.ptp(lookup.table[:, :, 1], axis=0)
         order = [k for k in np.argsort(span)[::-1] if lookup.models[k].term.n >= 2][:PANELS] or [0]
         rows = (len(order) + 1) // 2
@@ -110,7 +124,7 @@ def elevation_terms(lookup: Lookup) -> str:
                 ax.set_ylabel("half-path (mm rms)")
             if place == 0:
                 ax.legend()
-        return svg(figure)
+        return figure
 
 
 def _elevation_panel(ax: Any, lookup: Lookup, k: int) -> None:

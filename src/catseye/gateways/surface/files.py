@@ -7,8 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.surface.objects import FORMAT, actuators_object, change_object, lookup_object, shape_object
-from catseye.gateways.surface.report import SurfaceResult, surface_report
+from catseye.gateways.surface.objects import (
+    FORMAT,
+    SurfaceFindings,
+    actuators_object,
+    change_object,
+    lookup_object,
+    shape_object,
+    surface_verdict,
+)
+from catseye.gateways.surface.report import surface_report
 from catseye.gateways.surface.tables import (
     ACTUATOR_MARK,
     actuators_csv,
@@ -26,9 +34,9 @@ from catseye.gateways.writers.written import Files, Progress, origin, write_file
 from catseye.reduction.surface.actuators import rows_of
 
 
-def surface_object(result: SurfaceResult) -> dict[str, Any]:
+def surface_object(result: SurfaceFindings) -> dict[str, Any]:
     """A surface as `catseye surface --json` gives it: the epoch's keys, or `epochs`, `change`, `lookup`."""
-    answer: dict[str, Any] = {"format": FORMAT}
+    answer: dict[str, Any] = {"format": FORMAT, "verdict": surface_verdict(result).to_object()}
     if len(result.shapes) == 1:
         answer |= shape_object(result.shapes[0])
     else:
@@ -40,7 +48,7 @@ def surface_object(result: SurfaceResult) -> dict[str, Any]:
 
 
 def write_surface(
-    result: SurfaceResult, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
+    result: SurfaceFindings, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
     """Tables, object, report, and last the provenance with the hashes of the others.
 
@@ -71,7 +79,7 @@ def write_surface(
     join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 
-def write_actuators(result: SurfaceResult, path: Path) -> None:
+def write_actuators(result: SurfaceFindings, path: Path) -> None:
     """The actuators' table by the ending of its name, .csv or .fits; whole or not at all.
 
     Raises InputError for another ending and where another's file would be lost.

@@ -15,6 +15,7 @@ from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.surface.shape import Prisms
 
 Frame = Literal["reflector", "ground"]
@@ -58,6 +59,20 @@ def read_prisms(
             raise InputError(f"{source}: knows its own azimuth (expected --azimuth-deg with tables only)")
         return _reduced(source, site, elevation_deg, temperature_c)
     return _table(source, site, frame, (azimuth_deg, elevation_deg), temperature_c)
+
+
+def prisms_of(reduction: Reduction) -> Prisms:
+    """The dish prisms of a reduced night; InputError where it saw no dish."""
+    surface, coordinates, campaign = reduction.surface, reduction.coordinates, reduction.campaign
+    name = campaign.site.campaign.name
+    if surface is None:
+        raise InputError(f"{name}: the reduction found no dish (expected a night that saw its prisms)")
+    rows = [coordinates.index(each) for each in surface.names]
+    posture = campaign.site.campaign
+    nominal = _frame(campaign, posture.azimuth_deg, posture.elevation_deg)
+    azimuth, elevation = posture.azimuth_deg, posture.elevation_deg
+    block = coordinates.block(surface.names)
+    return Prisms(surface.names, coordinates.x[rows], block, nominal, name, elevation, azimuth)
 
 
 def _frame(site: SiteFolder, azimuth_deg: float, elevation_deg: float) -> Transform:

@@ -1,18 +1,27 @@
 """The report of a surface: one HTML page that needs nothing else."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from html import escape
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.surface.figures import actuator_map, elevation_terms, surface_map, zernike_bars
-from catseye.gateways.surface.objects import actuators_passage, change_passages, lookup_passages, root, shape_passages
+from catseye.gateways.surface.figures import actuator_map, change_map, elevation_terms, shape_map, zernike_bars
+from catseye.gateways.surface.objects import (
+    SurfaceFindings,
+    actuators_passage,
+    change_passages,
+    lookup_passages,
+    root,
+    shape_passages,
+    surface_verdict,
+)
+from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
@@ -20,23 +29,13 @@ from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceResult:
-    """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators."""
-
-    shapes: tuple[SurfaceShape, ...]
-    change: Change | None = None
-    lookup: Lookup | None = None
-    actuators: Actuators | None = None
-
-
-def surface_report(result: SurfaceResult, when: datetime, inputs: Mapping[str, str]) -> str:
+def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page.
 
     when     UTC
     inputs   SHA-256 of each file read, by its name
     """
-    body = [_header(result, when)]
+    body = [_header(result, when), verdict_line(surface_verdict(result))]
     if result.lookup is not None:
         body.append(_lookup(result.lookup))
     if result.change is not None:
@@ -50,7 +49,7 @@ def surface_report(result: SurfaceResult, when: datetime, inputs: Mapping[str, s
     return page("catseye: surface", "\n".join(body))
 
 
-def _header(result: SurfaceResult, when: datetime) -> str:
+def _header(result: SurfaceFindings, when: datetime) -> str:
     names = ", ".join(shape.prisms.source for shape in result.shapes)
     return (
         f"<header><h1>The surface</h1><div class='faint'>{escape(names)}; by catseye on {when:%Y-%m-%d %H:%M} UTC; "
@@ -77,16 +76,13 @@ def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
         for g in shape.gains
     ]
     u = float(np.median(np.sqrt(np.diag(shape.fit.deviation_covariance)))) / MILLIMETRE
-    local = shape.fit.local
     return section(
         f"epoch-{epoch}",
         title,
         _cards(shape.square, gains),
         _definitions(shape_passages(shape)),
         picture(
-            surface_map(
-                local, shape.fit.half_path, shape.aperture, label="half-path error (mm)", names=shape.prisms.names
-            ),
+            svg(shape_map(shape)),
             f"Half-path errors off the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
             "prisms are plain interpolation in triangles. Dashed: the aperture.",
         ),
@@ -101,9 +97,7 @@ def _change(change: Change) -> str:
         _cards(change.square, []),
         _definitions(change_passages(change)),
         picture(
-            surface_map(
-                change.local, change.half_path, change.aperture, label="change of half path (mm)", names=change.names
-            ),
+            svg(change_map(change)),
             "Second epoch less first, after the dish's motion as its prisms show it in all three coordinates.",
         ),
         *_terms(change.expansion, change.settings),
@@ -125,7 +119,9 @@ def _terms(expansion: Expansion, settings: ShapeSettings) -> list[str]:
     ]
     columns = (settings.numbering, "term", "left (mm)", "u (mm)", "taken by the fit", "term itself (mm)", "u (mm)")
     return [
-        picture(zernike_bars(expansion, settings), "Zernike terms of the half-path errors as the fit leaves them."),
+        picture(
+            svg(zernike_bars(expansion, settings)), "Zernike terms of the half-path errors as the fit leaves them."
+        ),
         table(columns, rows, "ntnnnnn"),
         paragraph(
             "Left: what the errors hold of a term. Taken: what of the term's square the fitted paraboloid, or the "
@@ -160,7 +156,7 @@ def _lookup(lookup: Lookup) -> str:
         "Terms by elevation",
         _definitions(lookup_passages(lookup)),
         picture(
-            elevation_terms(lookup),
+            svg(elevation_terms(lookup)),
             "The terms that elevation moves most. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
         ),
         table(columns, rows, "nt" + "n" * (len(lookup.columns) + 1)),
@@ -177,5 +173,5 @@ def _actuators(actuators: Actuators, shape: SurfaceShape) -> str:
         "actuators",
         "Actuators",
         _definitions([actuators_passage(actuators)]),
-        picture(actuator_map(actuators, shape.aperture), "Corrections, and how well they are known."),
+        picture(svg(actuator_map(actuators, shape.aperture)), "Corrections, and how well they are known."),
     )

@@ -1,0 +1,449 @@
+"""`pose` and `surface`: where the antenna's parts are, and what shape its dish has."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from catseye.api.night import NightResult
+from catseye.api.reading import place_of
+from catseye.api.result import Progress, Result, quantities
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.errors import EstimationError, InputError
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+    from matplotlib.figure import Figure
+
+    from catseye.gateways.pose.objects import PoseFindings
+    from catseye.gateways.surface.objects import SurfaceFindings
+    from catseye.gateways.writers.passage import Passage
+    from catseye.records.network.solved_points import SolvedPoints
+    from catseye.records.site.folder import SiteFolder
+    from catseye.reduction.surface.shape import Prisms
+
+Optics = Literal["prime", "gregorian"]
+CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseResult(Result):
+    """Six degrees of freedom of a group of points: second = pivot + translation + rotation (first - pivot).
+
+    frame         axes of the answer: "ground", "alidade" or "reflector"
+    pivot         (3,) m, in that frame
+    translation   (3,) m, of the pivot
+    rotation      (3,) rad, rotation vector, right-handed
+    covariance    (6, 6) m², m rad, rad²: translation then rotation
+    u             (6,) standard uncertainties
+    names         of the points that count
+    residuals     (n, 3) m, second place less first place moved by the pose
+    status        "converged", or what speaks against the pose
+    beam          (3,) rad, rad, m: beam off in azimuth times cos E and in elevation, focus; None unless asked for
+    beam_covariance   (3, 3) of it
+    found         everything else
+    settings      what was asked for
+    hashes        SHA-256 of each file read, by its name
+    read          files and folders that were read
+    """
+
+    frame: str
+    pivot: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    covariance: np.ndarray
+    u: np.ndarray
+    names: tuple[str, ...]
+    residuals: np.ndarray
+    status: str
+    beam: np.ndarray | None
+    beam_covariance: np.ndarray | None
+    found: "PoseFindings"
+    settings: dict[str, Any] = field(default_factory=dict)
+    hashes: dict[str, str] = field(default_factory=dict)
+    read: tuple[Path, ...] = ()
+
+    def passages(self) -> "Sequence[Passage]":
+        """The group, its frame, whether it is rigid, what was left out."""
+        from catseye.gateways.pose.objects import pose_words
+        from catseye.gateways.writers.passage import Passage
+
+        return [Passage(title, text) for title, text in pose_words(self.found)]
+
+    def headline(self) -> "Sequence[Passage]":
+        """The group and its frame, and the six numbers in one passage."""
+        from catseye.gateways.pose.objects import pose_rows
+        from catseye.gateways.writers.passage import Passage
+
+        six = "; ".join(f"{name} {value} {unit} (u {u})" for name, value, u, unit in pose_rows(self.found))
+        return [*self.passages()[:2], Passage("Pose", six + ".")]
+
+    def to_object(self) -> dict[str, Any]:
+        """As `catseye pose --json`."""
+        from catseye.gateways.pose.objects import pose_result_object
+
+        return pose_result_object(self.found)
+
+    def tables(self) -> "dict[str, QTable]":
+        """`pose`: a row a component, translations in mm and rotations in arc seconds; `points`: a row a point."""
+        scale = np.array([MILLIMETRE] * 3 + [ARCSECOND] * 3)
+        values = np.concatenate([self.translation, self.rotation])
+        six = {
+            "component": (["translation x", "y", "z", "rotation x", "y", "z"], ""),
+            "value": (values / scale, ""),
+            "u": (self.u / scale, ""),
+            "unit": (["mm"] * 3 + ["arcsec"] * 3, ""),
+        }
+        points = {
+            "point": (self.names, ""),
+            **{axis: (self.found.pose.places[:, k], "m") for k, axis in enumerate("xyz")},
+            **{f"residual_{axis}": (self.residuals[:, k] / MILLIMETRE, "mm") for k, axis in enumerate("xyz")},
+            "w": (self.found.pose.pose.w, ""),
+        }
+        return {"pose": quantities(six, frame=self.frame), "points": quantities(points, frame=self.frame)}
+
+    def figures(self) -> "dict[str, Figure]":
+        """Residuals of the points and, with a beam, what its offset is made of."""
+        from catseye.gateways.pose.figures import pose_figures
+
+        return pose_figures(self.found)
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """As `catseye pose --out`."""
+        from catseye.gateways.pose.files import write_pose
+
+        write_pose(self.found, directory, self.hashes, settings=self.settings)
+
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 of each file read."""
+        return self.hashes
+
+    def sources(self) -> tuple[Path, ...]:
+        """Files and folders that were read."""
+        return self.read
+
+
+def pose(
+    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult",
+    earlier: "str | os.PathLike[str] | SolvedPoints | NightResult | None" = None,
+    *,
+    site: "str | os.PathLike[str] | SiteFolder",
+    group: str | None = None,
+    points: Sequence[str] | None = None,
+    frame: str | None = None,
+    pivot: Sequence[float] | np.ndarray | None = None,
+    robust: str | None = None,
+    pointing: Optics | None = None,
+    tilt_arcsec: Sequence[float] | None = None,
+    posture_deg: Sequence[float] | None = None,
+    earlier_posture_deg: Sequence[float] | None = None,
+) -> PoseResult:
+    """Six degrees of freedom of a part of the antenna between two epochs or against design; beam and focus too.
+
+    epoch         what `reduce` gave or wrote, or its coordinates.json
+    earlier       the epoch to count from; the site's design without
+    site          site or campaign whose records say what stands where
+    group         "dish" (usual), "feed-arm", "alidade" or "subreflector", or
+    points        names of points that move as one
+    frame         "ground" (usual), "alidade" or "reflector"
+    pivot         (3,) m, of the rotation, in the frame; vertex, focus or mean of the points without
+    robust        how points that moved alone are left out, as `catseye pose --robust`
+    pointing      optics whose beam and focus are derived; then frame and group are the reflector's and the dish
+    tilt_arcsec   x, y and their u of an inclinometer on the alidade, its zero taken out
+    posture_deg, earlier_posture_deg   azimuth and elevation of the epochs, where their files do not say
+
+    Raises InputError where points, postures or files are missing and EstimationError where nothing can be fitted.
+    """
+    from catseye.gateways.pose.objects import pose_status, pose_verdict
+    from catseye.records.site.folder import SiteFolder, read_site
+    from catseye.reduction.pose.pose import at_posture
+
+    records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
+    later, before = _solved(epoch, posture_deg), None if earlier is None else _solved(earlier, earlier_posture_deg)
+    if later.posture is None:
+        raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
+    chosen = {
+        "group": None if points is not None else group or "dish",
+        "points": None if points is None else list(points),
+        "frame": frame or ("reflector" if pointing else "alidade" if tilt_arcsec is not None else "ground"),
+        "pivot": None if pivot is None else np.array(pivot, dtype=float),
+        "robust": robust,
+    }
+    found = _posed(later, before, at_posture(records, *later.posture), chosen, pointing, tilt_arcsec)
+    fit = found.pose.pose
+    hashes = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
+    given = [each for each in (epoch, earlier, site) if isinstance(each, str | os.PathLike)]
+    return PoseResult(
+        pose_verdict(found),
+        fit.frame,
+        fit.pivot,
+        fit.translation,
+        fit.rotation,
+        fit.covariance,
+        fit.u,
+        tuple(fit.names),
+        fit.motion.residual,
+        pose_status(found),
+        None if found.beam is None else found.beam.offset,
+        None if found.beam is None else found.beam.covariance,
+        found,
+        {**chosen, "pivot": pivot, "pointing": pointing, "tilt": tilt_arcsec},
+        hashes,
+        tuple(place_of(each) for each in given),
+    )
+
+
+def _posed(
+    later: "SolvedPoints",
+    before: "SolvedPoints | None",
+    site: "SiteFolder",
+    chosen: dict[str, Any],
+    optics: Optics | None,
+    tilt_arcsec: Sequence[float] | None,
+) -> "PoseFindings":
+    """The pose, with an inclinometer joined or the beam derived where asked for."""
+    from catseye.gateways.pose.objects import PoseFindings
+    from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
+    from catseye.reduction.pose.pose import pose_of_group
+    from catseye.reduction.pose.track_profile import pose_with_tilt
+
+    group_pose = pose_of_group(later, before, site, **chosen)
+    if tilt_arcsec is not None:
+        x, y, u = (v * ARCSECOND for v in tilt_arcsec)
+        return PoseFindings(pose_with_tilt(group_pose, np.array([x, y]), u), None)
+    if optics is None:
+        return PoseFindings(group_pose, None)
+    robust = chosen["robust"]
+    carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=robust)
+    cross = cross_covariance(carried, group_pose, site, earlier=before)
+    return PoseFindings(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))
+
+
+def _solved(
+    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult", posture_deg: Sequence[float] | None
+) -> "SolvedPoints":
+    """The points of an epoch, with the posture that was told for it."""
+    from catseye.records.network.solved_points import SolvedPoints, read_solved_points
+    from catseye.reduction.pose.dish_ways import solved_points
+
+    if isinstance(epoch, NightResult):
+        solved = solved_points(epoch.reduction)
+    else:
+        solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch))
+    if posture_deg is None:
+        return solved
+    azimuth, elevation = posture_deg
+    return replace(solved, posture=(azimuth * DEGREE, elevation * DEGREE))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceResult(Result):
+    """A dish's surface, of the last epoch where there were several: k prisms.
+
+    names           of the prisms
+    deviations      (k,) m, along the normal off the fitted paraboloid, above zero towards the focus
+    u               (k,) m, standard uncertainties
+    covariance      (k, k) m² of the deviations
+    half_path       (k,) m, half of what each shortens the path by
+    places          (k, 3) m, in the dish's frame
+    translation     (3,) m, of the vertex off nominal, ground axes
+    rotation        (3,) rad, of the dish off nominal
+    focal_length    m
+    u_focal_length  m, zero where it was held
+    found           everything else: Zernike terms, gain, change, look-up table, actuators
+    hashes          SHA-256 of each file read, by its name
+    read            files and folders that were read
+    """
+
+    names: tuple[str, ...]
+    deviations: np.ndarray
+    u: np.ndarray
+    covariance: np.ndarray
+    half_path: np.ndarray
+    places: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    focal_length: float
+    u_focal_length: float
+    found: "SurfaceFindings"
+    hashes: dict[str, str] = field(default_factory=dict)
+    read: tuple[Path, ...] = ()
+
+    def passages(self) -> "Sequence[Passage]":
+        """The dish, its paraboloid, half path and gain; the change; the look-up table; the actuators."""
+        from catseye.gateways.surface.objects import surface_passages
+
+        return surface_passages(self.found)
+
+    def to_object(self) -> dict[str, Any]:
+        """As `catseye surface --json`."""
+        from catseye.gateways.surface.files import surface_object
+
+        return surface_object(self.found)
+
+    def tables(self) -> "dict[str, QTable]":
+        """`prisms`: a row a prism; `zernike`: a row a term; `actuators` where they were asked for."""
+        from catseye.optics.zernike import number
+
+        shape = self.found.shapes[-1]
+        prisms = {
+            "point": (self.names, ""),
+            **{axis: (self.places[:, k], "m") for k, axis in enumerate("xyz")},
+            "deviation": (self.deviations / MILLIMETRE, "mm"),
+            "u_deviation": (self.u / MILLIMETRE, "mm"),
+            "half_path": (self.half_path / MILLIMETRE, "mm"),
+        }
+        terms = shape.expansion
+        zernike = {
+            shape.settings.numbering: ([number(term, shape.settings.numbering) for term in terms.terms], ""),
+            "name": ([term.name for term in terms.terms], ""),
+            "value": (terms.value / MILLIMETRE, "mm"),
+            "u": (np.sqrt(np.diag(terms.covariance)) / MILLIMETRE, "mm"),
+            "taken": (100.0 * terms.share, "%"),
+        }
+        tables = {"prisms": quantities(prisms), "zernike": quantities(zernike)}
+        actuators = self.found.actuators
+        if actuators is not None:
+            columns = {
+                "correction": (actuators.correction / MILLIMETRE, "mm"),
+                "u_correction": (actuators.u_correction / MILLIMETRE, "mm"),
+            }
+            tables["actuators"] = quantities(columns)
+        return tables
+
+    def figures(self) -> "dict[str, Figure]":
+        """Map of half-path errors, Zernike terms; change, terms by elevation, actuators where there are such."""
+        from catseye.gateways.surface.figures import (
+            actuator_map,
+            change_map,
+            elevation_terms,
+            shape_map,
+            zernike_bars,
+        )
+
+        found, shape = self.found, self.found.shapes[-1]
+        drawn = {"map": shape_map(shape), "zernike": zernike_bars(shape.expansion, shape.settings)}
+        if found.change is not None:
+            drawn["change"] = change_map(found.change)
+        if found.lookup is not None:
+            drawn["elevation"] = elevation_terms(found.lookup)
+        if found.actuators is not None:
+            drawn["actuators"] = actuator_map(found.actuators, shape.aperture)
+        return drawn
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """As `catseye surface --out`."""
+        from catseye.gateways.surface.files import write_surface
+
+        write_surface(self.found, directory, self.hashes, progress=progress)
+
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 of each file read."""
+        return self.hashes
+
+    def sources(self) -> tuple[Path, ...]:
+        """Files and folders that were read."""
+        return self.read
+
+
+def surface(
+    *epochs: "str | os.PathLike[str] | NightResult",
+    site: "str | os.PathLike[str] | SiteFolder" = "gbt",
+    free: Sequence[str] = ("vertex", "axis", "focal-length"),
+    taper_db: float = 0.0,
+    frequency_ghz: Sequence[float] = (),
+    zernike: int = 15,
+    order: Literal["noll", "ansi"] = "noll",
+    frame: Literal["reflector", "ground"] = "reflector",
+    azimuth_deg: float | None = None,
+    elevation_deg: Sequence[float] = (),
+    temperature_c: Sequence[float] = (),
+    actuators: bool = False,
+    positions: "str | os.PathLike[str] | None" = None,
+    travel: Literal["normal", "axis"] = "normal",
+    progress: Progress | None = None,
+) -> SurfaceResult:
+    """A dish's surface: best paraboloid, half-path errors, Zernike terms, gain, change, elevation, actuators.
+
+    epochs          what `reduce` gave or wrote, or tables of prisms (docs/formats/surface.md), in the order measured.
+                    One: its shape. Two: second less first as well. From three on: a look-up table by elevation
+    site            the telescope's records
+    free            what is fitted: of "vertex", "axis", "focal-length"
+    taper_db        illumination's edge below its middle
+    frequency_ghz   gain there
+    zernike, order  how many terms, and their numbering
+    frame           of tables; azimuth_deg for those in the ground frame
+    elevation_deg, temperature_c   once for each epoch; a reduction knows its elevation
+    actuators       corrections of all actuators, from the last epoch
+    positions       where the actuators stand; their middle without
+    travel          of an actuator: along the normal or the axis
+    progress        called with (what, done, of how many)
+
+    Raises InputError for what cannot be used, EstimationError for too few prisms, ValidityError for settings.
+    """
+    from catseye.gateways.surface.inputs import prisms_of, read_prisms
+    from catseye.gateways.surface.objects import SurfaceFindings, surface_verdict
+    from catseye.records.panels.actuators import read_positions
+    from catseye.records.site.folder import SiteFolder, read_site
+    from catseye.reduction.surface.actuators import actuators_of, corrections
+    from catseye.reduction.surface.change import change_between
+    from catseye.reduction.surface.lookup import lookup_of
+    from catseye.reduction.surface.shape import LitAperture, ShapeSettings, shape_of
+
+    if not epochs:
+        raise InputError("surface needs an epoch: what reduce gave or wrote, or a table of prisms")
+    records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
+    aperture = LitAperture.of(records.site.paraboloid)
+    settings = ShapeSettings(tuple(free), taper_db, tuple(f * 1e9 for f in frequency_ghz), zernike, order)  # type: ignore[arg-type]
+    prisms: list[Prisms] = []
+    hashes: dict[str, str] = {}
+    for k, epoch in enumerate(epochs):
+        if isinstance(epoch, NightResult):
+            prisms.append(prisms_of(epoch.reduction))
+            hashes |= epoch.reduction.campaign.hashes
+            continue
+        table, read = read_prisms(
+            place_of(epoch),
+            records,
+            frame=frame,
+            azimuth_deg=azimuth_deg,
+            elevation_deg=elevation_deg[k] if elevation_deg else None,
+            temperature_c=temperature_c[k] if temperature_c else None,
+        )
+        prisms.append(table)
+        hashes |= read
+    shapes = []
+    for k, each in enumerate(prisms):
+        if progress is not None:
+            progress("fitting epochs", k, len(prisms))
+        try:
+            shapes.append(shape_of(each, aperture, settings))
+        except EstimationError as problem:
+            raise EstimationError(f"{each.source}: {problem}") from problem
+    change = change_between(prisms[0], prisms[1], aperture, settings=settings) if len(prisms) == 2 else None
+    lookup = lookup_of(shapes) if len(prisms) >= 3 else None
+    moved = None
+    if actuators:
+        known = None if positions is None else read_positions(place_of(positions))
+        moved = corrections(shapes[-1], *actuators_of(records), positions=known, travel=travel)
+    found = SurfaceFindings(tuple(shapes), change, lookup, moved)
+    fit = shapes[-1].fit
+    return SurfaceResult(
+        surface_verdict(found),
+        shapes[-1].prisms.names,
+        fit.deviation,
+        np.sqrt(np.maximum(np.diag(fit.deviation_covariance), 0.0)),
+        fit.deviation_covariance,
+        fit.half_path,
+        fit.local,
+        fit.translation,
+        fit.rotation,
+        fit.focal_length,
+        fit.u_focal_length,
+        found,
+        hashes,
+        tuple(place_of(each) for each in epochs if not isinstance(each, NightResult)),
+    )

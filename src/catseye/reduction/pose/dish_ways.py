@@ -1,0 +1,102 @@
+"""Where the dish is, in the ways that catseye says it, beside each other: what is fitted makes the difference.
+
+All in ground axes about the nominal vertex. What a paraboloid and a rigid body say in common is the direction of the
+dish's axis; a turn about that axis only points show, and a free focal length takes part of an offset dish's turn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.errors import EstimationError, InputError
+from catseye.records.network.solved_points import SolvedPoints
+from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.pose.pose import pose_of_group
+from catseye.reduction.site.places import nominal_frame
+from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, shape_of
+
+
+@dataclass(frozen=True, eq=False)
+class DishWay:
+    """One answer to where the dish is.
+
+    command       that gives it
+    fitted        to what, with what free
+    translation   (3,) m, of the nominal vertex, ground axes
+    rotation      (3,) rad, rotation vector, ground axes
+    u             (6,) their standard uncertainties; zero for a turn that is not observed
+    axis          (2,) rad, how far the dish's axis leans: across elevation, towards larger azimuth, and in elevation
+    u_axis        (2,) rad
+    """
+
+    command: str
+    fitted: str
+    translation: np.ndarray
+    rotation: np.ndarray
+    u: np.ndarray
+    axis: np.ndarray
+    u_axis: np.ndarray
+
+
+def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
+    """Every way that the night's points allow; none where no dish was seen."""
+    surface, campaign = reduction.surface, reduction.campaign
+    if surface is None:
+        return ()
+    lean = _lean(campaign.site.campaign.azimuth_deg, campaign.site.campaign.elevation_deg)
+    names = surface.names
+    prisms = Prisms(
+        names,
+        reduction.coordinates.x[[reduction.coordinates.index(n) for n in names]],
+        reduction.coordinates.block(names),
+        nominal_frame(campaign),
+        campaign.site.campaign.name,
+    )
+    aperture = LitAperture.of(campaign.site.paraboloid)
+    many = f"paraboloid through {len(names)} prisms"
+    fit = surface.fit
+    ways = [_way("catseye reduce", f"{many}, focal length held", fit.translation, fit.rotation, fit.covariance, lean)]
+    for free, text in (
+        (("vertex", "axis"), f"{many}, focal length held, each weighed by the aperture it stands for"),
+        (("vertex", "axis", "focal-length"), f"{many}, focal length free"),
+    ):
+        try:
+            shape = shape_of(prisms, aperture, ShapeSettings(free)).fit  # type: ignore[arg-type]
+        except EstimationError:
+            continue
+        command = "catseye surface" + ("" if "focal-length" in free else " --free vertex,axis")
+        ways.append(_way(command, text, shape.translation, shape.rotation, shape.covariance[:6, :6], lean))
+    try:
+        group = pose_of_group(solved_points(reduction), None, campaign, group="dish")
+    except (InputError, EstimationError):
+        return tuple(ways)
+    body = group.pose
+    text = f"{len(body.names)} points as one body against their design"
+    return (*ways, _way("catseye pose", text, body.translation, body.rotation, body.covariance, lean))
+
+
+def solved_points(reduction: Reduction) -> SolvedPoints:
+    """The points of a reduced night, as `catseye reduce --out` writes them and `catseye pose` reads them."""
+    coordinates, posture = reduction.coordinates, reduction.campaign.site.campaign
+    angles = (float(np.radians(posture.azimuth_deg)), float(np.radians(posture.elevation_deg)))
+    names = tuple(coordinates.points)
+    return SolvedPoints(
+        posture.name, posture.name, names, coordinates.x, coordinates.covariance, angles, reduction.campaign.hashes
+    )
+
+
+def _way(
+    command: str, fitted: str, translation: np.ndarray, rotation: np.ndarray, covariance: np.ndarray, lean: np.ndarray
+) -> DishWay:
+    u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    u_axis = np.sqrt(np.einsum("ai,ij,aj->a", lean, covariance[3:6, 3:6], lean))
+    return DishWay(command, fitted, translation, rotation, u, lean @ rotation, u_axis)
+
+
+def _lean(azimuth_deg: float, elevation_deg: float) -> np.ndarray:
+    """(2, 3): how a small turn w of the dish moves its axis a, as w x a along larger azimuth and elevation."""
+    az, el = np.radians([azimuth_deg, elevation_deg])
+    along = np.array([np.sin(az) * np.cos(el), np.cos(az) * np.cos(el), np.sin(el)])
+    across = np.array([np.cos(az), -np.sin(az), 0.0])
+    up = np.array([-np.sin(az) * np.sin(el), -np.cos(az) * np.sin(el), np.cos(el)])
+    return np.stack([np.cross(along, across), np.cross(along, up)])  # e . (w x a) = w . (a x e)
