@@ -15,20 +15,24 @@ from catseye.errors import CatseyeError, EstimationError, FrameError, InputError
 from catseye.version import __version__
 
 if TYPE_CHECKING:
+    from catseye.api.laboratory import baseline, calibrate, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, reduce
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.steering import point, track
     from catseye.api.telescope import pose, surface
     from catseye.api.weather import air, sound
 
 FACE = {  # file of catseye.api -> what of it is catseye's
+    "laboratory": ("baseline", "calibrate", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "reduce"),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "steering": ("point", "track"),
     "telescope": ("pose", "surface"),
     "weather": ("air", "sound"),
 }
@@ -42,12 +46,15 @@ __all__ = [
     "__version__",
     "adjust",
     "air",
+    "baseline",
+    "calibrate",
     "compare",
     "examples",
     "explain",
     "load",
     "locate",
     "plan",
+    "point",
     "pose",
     "reduce",
     "replay",
@@ -56,6 +63,8 @@ __all__ = [
     "simulate",
     "sound",
     "surface",
+    "track",
+    "triplet",
 ]
 
 

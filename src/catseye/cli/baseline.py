@@ -10,15 +10,16 @@ import typer
 from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.networks import Out, _level
 from catseye.cli.option_groups import grouped
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
-    from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.api.laboratory import BaselineResult
     from catseye.reduction.baseline.lengths import BaselineSettings
 
+FEW = 12  # pillars whose distances a terminal is told
 UNKNOWN = "unknown in the record where not given"
 LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
 
@@ -177,84 +178,57 @@ def baseline(
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
     if out is not None:
         from catseye.gateways.writers.output import refuse_output
 
-        for source in read.files:
-            refuse_output(out, source)
+        refuse_output(out, *read.files)
     if write is not None and any(write.resolve() == source.resolve() for source in read.files):
         raise InputError(f"--write {write}: is an input (expected another file: the same shots would count twice)")
     progress = ProgressLine(quiet)
-
-    def keep() -> None:
-        if write is not None:
-            from catseye.gateways.baseline.files import write_record
-
-            day = None if origin.measured_on is None else date.fromisoformat(origin.measured_on)
-            write_record(
-                calibration,
-                write,
-                inputs,
-                serial=origin.serial,
-                measured_on=day,
-                by=origin.by,
-                report=origin.report,
-            )
-
     try:
-        calibration, inputs = _calibrated(read, asked.settings(), progress)
-        if out is not None:
-            from catseye.gateways.baseline.files import write_calibration
-            from catseye.gateways.writers.output import whole_directory
+        from catseye.api.laboratory import baseline as calibrated
+        from catseye.gateways.writers.output import whole_directory
 
-            with whole_directory(out, read.observations) as directory:
-                write_calibration(calibration, directory, inputs, progress=progress)
-                keep()  # no directory without the record that was asked for, too
+        result = calibrated(
+            read.observations,
+            heights=read.heights,
+            against=read.against,
+            settings=asked.settings(),
+            progress=progress,
+        )
+        if out is not None:
+            with whole_directory(out, *read.files) as directory:
+                result.write(directory, progress)
+                _keep(result, write, origin)  # no directory without the record that was asked for, too
         else:
-            keep()
+            _keep(result, write, origin)
     finally:
         progress.clear()
-    _tell(calibration, json, quiet, out, write)
+    from catseye.gateways.baseline.objects import spans
+
+    few = spans(result.calibration) if len(result.pillars) <= FEW else []
+    rows = [f"{'':<14}{s.start:>6} - {s.end:<6} {s.distance:12.5f} m   u {s.u * 1e3:.3f} mm" for s in few]
+    files = None if out is None else f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"
+    kept = None if write is None else f"{write}: the pillars with their full covariance"
+    written = [("Written to", files), ("Written to", kept)]
+    tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=written)
 
 
-def _calibrated(
-    read: _Inputs, settings: "BaselineSettings", progress: ProgressLine
-) -> "tuple[BaselineCalibration, dict[str, str]]":
-    """The calibration, and the SHA-256 of each file that was read."""
-    from catseye.records.laboratory.baseline import digest_of, read_baseline, read_heights, read_observations
-    from catseye.reduction.baseline.instrument import calibrate_baseline
-
-    shots: BaselineShots = read_observations(read.observations)
-    inputs = {read.observations.name: shots.digest}
-    tops: Heights | None = None
-    if read.heights is not None:
-        tops = read_heights(read.heights)
-        inputs[read.heights.name] = tops.digest
-    known: Baseline | None = None
-    if read.against is not None:
-        known = read_baseline(read.against)
-        inputs[read.against.name] = digest_of(read.against)
-    return calibrate_baseline(shots, tops, known, settings=settings, progress=progress), inputs
-
-
-def _tell(calibration: "BaselineCalibration", json: bool, quiet: bool, out: Path | None, write: Path | None) -> None:
-    from catseye.gateways.baseline.objects import baseline_object, passages, spans
-
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(baseline_object(calibration)))
+def _keep(result: "BaselineResult", write: Path | None, origin: _Provenance) -> None:
+    if write is None:
         return
-    if quiet:
-        return
-    for passage in passages(calibration):
-        say(wrapped(passage.title, passage.text))
-    if len(calibration.names) <= 12:
-        for a, b, d, u in spans(calibration):
-            say(f"{'':<14}{a:>6} - {b:<6} {d:12.5f} m   u {u * 1e3:.3f} mm")
-    if out is not None:
-        say(wrapped("Written to", f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"))
-    if write is not None:
-        say(wrapped("Written to", f"{write}: the pillars with their full covariance"))
+    from catseye.gateways.baseline.files import write_record
+
+    day = None if origin.measured_on is None else date.fromisoformat(origin.measured_on)
+    write_record(
+        result.calibration,
+        write,
+        result.hashes,
+        serial=origin.serial,
+        measured_on=day,
+        by=origin.by,
+        report=origin.report,
+    )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.terminal import say, wrapped
+from catseye.cli.results import Strict, tell
 from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 from catseye.errors import InputError
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     epilog="\b\nExample: catseye calibrate linearity examples/calibrations/linearity.csv --certificate zp103.html\n"
     "Columns and keys of every KIND: docs/formats/calibrations.md"
 )
-def calibrate(
+def calibrate(  # noqa: PLR0913 - its options are its command line
     kind: Annotated[
         str,
         typer.Argument(
@@ -44,23 +44,21 @@ def calibrate(
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """A calibration from a table of readings: record with uncertainties, residuals, tests and a certificate."""
-    from catseye.reduction.calibrations.kinds import calibrate as calibrated
+    from catseye.api.laboratory import calibrate as calibrated
 
     _refuse_outputs(readings, sheet, write, certificate)
-    calibration = calibrated(kind, readings, sheet, reject=reject)
-    _write(calibration, write, certificate)
-    if json:
-        from catseye.gateways.calibrations.certificate_record import calibration_object
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(calibration_object(calibration)))
-    elif not quiet:
-        _tell(calibration)
-        for what, path in (("Record", write), ("Certificate", certificate)):
-            if path is not None:
-                say(wrapped(what, str(path)))
+    result = calibrated(kind, readings, sheet, reject=reject)
+    _write(result.calibration, write, certificate)
+    tell(
+        result,
+        json=json,
+        quiet=quiet,
+        strict=strict,
+        written=[("Record", write), ("Certificate", certificate)],
+    )
 
 
 def _refuse_outputs(readings: Path, sheet: Path | None, write: Path | None, certificate: Path | None) -> None:
@@ -93,10 +91,3 @@ def _write(calibration: "Calibration", write: Path | None, certificate: Path | N
     with ExitStack() as files:
         for path, option, mark, text in pages:
             files.enter_context(whole_file(path, option, mark)).append(text)
-
-
-def _tell(calibration: "Calibration") -> None:
-    from catseye.gateways.calibrations.certificate import passages
-
-    for title, text in passages(calibration):
-        say(wrapped(title, text))

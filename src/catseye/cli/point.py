@@ -9,20 +9,14 @@ import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.option_groups import grouped
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import say
 from catseye.cli.vocabularies import REFLECTORS, one_of
-from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from catseye.geometry.mirror.pointing import MirrorStation
+    from catseye.api.steering import PointingResult
     from catseye.records.site.keep_out import KeepOut
-    from catseye.records.site.monument import MonumentGeometry
-    from catseye.reduction.site.stations import Pointings
-    from catseye.reduction.steering.visibility import Visibility
 
 
 def time_text(text: str | None) -> str | None:
@@ -66,14 +60,14 @@ def _posture(text: str | None) -> str | None:
 
 
 def _angles(text: str) -> tuple[float, float]:
-    """Azimuth and elevation, rad, of "AZ,EL" in degrees."""
+    """Azimuth and elevation of "AZ,EL", degrees."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) != 2 or not (abs(numbers[0]) <= 540.0 and -5.0 <= numbers[1] <= 95.0):
         raise typer.BadParameter(f"{text!r} is not AZ,EL in degrees, elevation -5 to 95.")
-    return numbers[0] * DEGREE, numbers[1] * DEGREE
+    return numbers[0], numbers[1]
 
 
 def _cone(value: float | None) -> float | None:
@@ -157,29 +151,6 @@ class _View(NamedTuple):
         if self.solids is None:
             _refuse_alone({"--posture": self.posture}, "--solids")
 
-    def seen(
-        self, station: "MirrorStation", stands: "MonumentGeometry", where: "NDArray[np.float64]", pointings: "Pointings"
-    ) -> "Visibility | None":
-        """Whether the mirror sees each point's reflector; None where nobody asked."""
-        if not (self.reflector or self.facing or self.solids):
-            return None
-        import numpy as np
-
-        from catseye.records.files.reading import read_record
-        from catseye.records.site.solids import Solids
-        from catseye.reduction.steering.sighting import seen_from
-
-        return seen_from(
-            station,
-            stands.monument,
-            where,
-            kind=self.reflector or "prism",
-            facing=None if self.facing is None else np.array(_triple(self.facing)),
-            solids=Solids() if self.solids is None else read_record(self.solids, Solids),
-            posture=None if self.posture is None else _angles(self.posture),
-            reachable=pointings.allowed | pointings.prime_allowed,
-        )
-
 
 @app.command(
     epilog="\b\nExample: catseye point --monument examples/night-01/monuments/ZY103.toml "
@@ -187,7 +158,7 @@ class _View(NamedTuple):
     "With the Sun: add --at 2003-09-10T14:00:00Z --longitude-deg=-79.84"
 )
 @grouped
-def point(
+def point(  # noqa: PLR0913 - its options are its command line
     *,
     monument: Annotated[Path, typer.Option("--monument", metavar="M.toml", help="Record of the monument.")],
     mirror: Annotated[Path, typer.Option("--mirror", metavar="Z.toml", help="Record of the mirror on it.")],
@@ -206,50 +177,52 @@ def point(
     forbidden: _Forbidden,
     view: _View,
     json: Json = False,
+    strict: Strict = False,
 ) -> None:
     """Encoder counts of a mirror for points: CAL.EQ, both pointings, stops, Sun, keep-out boxes, visibility."""
-    import numpy as np
-
-    from catseye.gateways.steering.pointing_objects import pointing_objects, pointing_remarks, pointing_table
-    from catseye.gateways.writers.objects import json_line
+    from catseye.api.steering import point as pointed
     from catseye.geometry.sky.time_tag import mjd_of
-    from catseye.records.files.reading import read_record
-    from catseye.records.laboratory.coordinate_list import read_coordinates
-    from catseye.records.site.mirror import MirrorGeometry
-    from catseye.records.site.monument import MonumentGeometry
-    from catseye.reduction.site.stations import point as pointed
-    from catseye.reduction.site.stations import station_of
-    from catseye.reduction.steering.sighting import place_of_monument, sightings
 
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
     forbidden.refuse()
     view.refuse()
-    stands, mirrors = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
-    where = np.array([_triple(text) for text in to or []]) if file is None else read_coordinates(file)
-    zones = forbidden.zones()
-    mjd = None if forbidden.at is None else mjd_of(forbidden.at)
-    place = None if mjd is None else place_of_monument(stands, forbidden.longitude_deg, forbidden.latitude_deg)
-    pointings = pointed(stands, mirrors, where)
-    station = station_of(stands, mirrors)
-    sights = []
-    if mjd is not None or zones.box:
-        sights = sightings(
-            station, mirrors, pointings.counts, name=stands.monument, mjd=mjd, place=place, keep_out=zones
-        )
-    visible = view.seen(station, stands, where, pointings)
+    result = pointed(
+        monument,
+        mirror,
+        [_triple(text) for text in to or []] if file is None else file,
+        at_mjd=None if forbidden.at is None else mjd_of(forbidden.at),
+        latitude_deg=forbidden.latitude_deg,
+        longitude_deg=forbidden.longitude_deg,
+        keep_out=forbidden.zones(),
+        reflector=view.reflector,
+        facing=None if view.facing is None else _triple(view.facing),
+        solids=view.solids,
+        posture_deg=None if view.posture is None else _angles(view.posture),
+    )
     if write is not None:
         from catseye.gateways.steering.pointing_objects import MARK, output_dat
         from catseye.gateways.writers.output import whole_file
 
         with whole_file(write, "--write", MARK) as page:
-            page.append(output_dat(pointings, f"{mirrors.zp} on {stands.monument}"))
+            page.append(output_dat(result.pointings, f"{result.names['mirror']} on {result.names['monument']}"))
     if json:
-        names = {"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp}
-        say(json_line([{**item, **names} for item in pointing_objects(pointings, sights, visible)]))
-        return
-    say(pointing_table(pointings))
-    if stands.zp is not None and stands.zp != mirrors.zp:
-        say(f"{mirrors.zp} is not the mirror that the record of {stands.monument} names, {stands.zp}")
-    for remark in pointing_remarks(pointings, sights, visible):
+        from catseye.gateways.writers.objects import json_line
+
+        say(json_line(result.to_object()))
+    else:
+        _tell(result)
+    judge(result.verdict, strict=strict)
+
+
+def _tell(result: "PointingResult") -> None:
+    """The verdict, the table of counts, and what it does not show."""
+    from catseye.gateways.steering.pointing_objects import pointing_remarks, pointing_table
+
+    say(f"{result.verdict.text}\n")
+    say(pointing_table(result.pointings))
+    named, used = result.names["mirror_of_monument"], result.names["mirror"]
+    if named is not None and named != used:
+        say(f"{used} is not the mirror that the record of {result.names['monument']} names, {named}")
+    for remark in pointing_remarks(result.pointings, result.sightings, result.visibility):
         say(remark)

@@ -7,12 +7,11 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.networks import Out
+from catseye.cli.results import Strict, judge, tell
 from catseye.cli.terminal import ProgressLine, say, wrapped
 
 if TYPE_CHECKING:
-    from catseye.reduction.triplet.result import TripletReduction
-
-    Units = list[tuple[Path, TripletReduction]]
+    from catseye.api.laboratory import TripletsResult
 
 
 @app.command(
@@ -31,50 +30,55 @@ def triplet(
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not."""
     if not files and blank is None:
         raise typer.BadParameter("at least one is needed, or --blank.", param_hint="'FILE.toml ...'")
     if not files and (out is not None or json):
         raise typer.BadParameter("are needed with --out and --json.", param_hint="'FILE.toml ...'")
-    units = _reduced(files or [], out, quiet)
+    result = _reduced(files, out, quiet) if files else None
     if blank is not None:
         _write_blank(blank)
-    if json:
-        _say_objects(units)
-    elif not quiet:
-        _tell(units, out, blank)
+    blanks = None if blank is None else f"{blank}: the blank form"
+    if result is None:
+        if not quiet:
+            say(wrapped("Written to", str(blanks)))
+        return
+    files_of = None if out is None else f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"
+    written = [("Written to", files_of), ("Written to", blanks)]
+    if len(result.units) == 1 and not json and not quiet:
+        from catseye.gateways.triplet.sheet import text_sheet
+
+        ((path, unit),) = result.units
+        say(text_sheet(unit, path.name).rstrip())
+        for title, text in written:
+            if text is not None:
+                say(wrapped(title, text))
+        judge(result.verdict, strict=strict)
+        return
+    tell(result, json=json, quiet=quiet, strict=strict, written=written)
 
 
-def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "Units":
+def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResult":
     """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
-    if not files:
-        return []
-    from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
-    from catseye.gateways.writers.output import refuse_output, whole_directory
-    from catseye.records.files.reading import Folder
-    from catseye.records.laboratory.triplet_measurement import TripletMeasurement
-    from catseye.reduction.triplet.unit import reduce_triplet
+    from catseye.api.laboratory import triplet as reduced
+    from catseye.api.result import save
 
     if out is not None:
+        from catseye.gateways.triplet.files import refuse_namesakes
+        from catseye.gateways.writers.output import refuse_output
+
         refuse_namesakes(files)
-        for path in files:
-            refuse_output(out, path)
+        refuse_output(out, *files)
     progress = ProgressLine(quiet)
-    units: Units = []
-    hashes: dict[Path, str] = {}
     try:
-        for done, path in enumerate(files):
-            progress("reducing", done, len(files))
-            folder = Folder(path.parent)
-            units.append((path, reduce_triplet(folder.record(path.name, TripletMeasurement))))
-            hashes[path] = folder.hashes[path.name]
+        result = reduced(*files, progress=progress)
         if out is not None:
-            with whole_directory(out, files[0]) as directory:
-                write_triplets(dict(units), directory, hashes, progress=progress)
+            save(result, out, progress=progress)
     finally:
         progress.clear()
-    return units
+    return result
 
 
 def _write_blank(path: Path) -> None:
@@ -83,29 +87,3 @@ def _write_blank(path: Path) -> None:
 
     with whole_file(path, "--blank", MARK) as pieces:
         pieces.append(blank_form())
-
-
-def _say_objects(units: "Units") -> None:
-    """One object, or a list of them for several files."""
-    from catseye.gateways.triplet.objects import triplet_object
-    from catseye.gateways.writers.objects import json_line
-
-    objects = [triplet_object(reduction, path.name) for path, reduction in units]
-    say(json_line(objects[0] if len(objects) == 1 else objects))
-
-
-def _tell(units: "Units", out: Path | None, blank: Path | None) -> None:
-    """The whole sheet of one unit; of several, what each comes to."""
-    from catseye.gateways.triplet.sheet import text_sheet, verdict
-
-    if len(units) == 1:
-        ((path, reduction),) = units
-        say(text_sheet(reduction, path.name).rstrip())
-    for path, reduction in units if len(units) > 1 else ():
-        say(f"{path.name}: triplet {reduction.measurement.triplet}")
-        for title, text in verdict(reduction):
-            say(wrapped(title, text))
-    if out is not None:
-        say(wrapped("Written to", f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"))
-    if blank is not None:
-        say(wrapped("Written to", f"{blank}: the blank form"))

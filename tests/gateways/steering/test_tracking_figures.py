@@ -7,6 +7,7 @@ import pytest
 
 from catseye.gateways.steering import tracking_figures
 from catseye.gateways.steering.tracking_figures import miss_figure, search_figure, visibility_figure
+from catseye.gateways.writers.drawing import svg
 from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.records.site.solids import Solids
@@ -26,24 +27,22 @@ from catseye.reduction.steering.visibility import Sight, frames_at, retroreflect
 STATION = MirrorStation([[112.99, 44.28, 0.0]], [[-1.2, 0, 0]], [[0.0, 0.25, 0.0]], [[0.0, 0.0]], [[0.0, 0.0]])
 
 
-def drawn(text):
-    root = ET.fromstring(text)
-    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+KEPT = []
+
+
+def drawn(figure):
+    """The figure as text; itself is kept for a look at what it shows."""
+    KEPT.append(figure)
+    text = svg(figure)
+    assert ET.fromstring(text).tag == "{http://www.w3.org/2000/svg}svg"
     return text
 
 
 @pytest.fixture
-def kept(monkeypatch):
-    """The matplotlib figures, kept before they become text."""
-    figures = []
-
-    def keep(figure):
-        figures.append(figure)
-        return original(figure)
-
-    original = tracking_figures.svg
-    monkeypatch.setattr(tracking_figures, "svg", keep)
-    return figures
+def kept():
+    """The matplotlib figures, as they are drawn."""
+    KEPT.clear()
+    return KEPT
 
 
 def test_the_worst_pair_is_drawn_in_millimetres_over_the_time_of_the_track(kept):
@@ -53,7 +52,7 @@ def test_the_worst_pair_is_drawn_in_millimetres_over_the_time_of_the_track(kept)
     shares = np.array([0.25, 0.5, 0.75])
     off = misses(track, mounted(STATION), targets, shares=shares)
     first = drawn(miss_figure(track, off, shares))
-    assert first == miss_figure(track, off, shares)
+    assert first == svg(miss_figure(track, off, shares))
     worst = kept[0].axes[0].lines[0]
     assert worst.get_ydata().max() == pytest.approx(1e3 * off.max())
     assert worst.get_xdata()[-1] == pytest.approx((19 + 0.75) * 0.128)

@@ -14,9 +14,10 @@ from catseye.gateways.triplet.figure import triplet_figure
 from catseye.gateways.triplet.files import triplets_csv
 from catseye.gateways.triplet.form import DATA_SHEET, HEAD, PLATE, RANGES, blank_form
 from catseye.gateways.triplet.objects import triplet_object
-from catseye.gateways.triplet.sheet import cell, html_sheet, text_sheet, verdict
+from catseye.gateways.triplet.sheet import cell, html_sheet, results, text_sheet
 from catseye.gateways.triplet.symbols import PLACEMENT, UNIT, point_places, symbol_values
 from catseye.gateways.triplet.symbols import PLATE as PLATE_SYMBOLS
+from catseye.gateways.writers.drawing import svg as svg_of
 from catseye.gateways.writers.objects import json_line, plain
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
@@ -152,10 +153,10 @@ def test_a_slip_is_named_at_the_edge_of_the_figure_and_a_refusal_in_the_words():
     values = {"placement__1__phi_bcfp_rad": 4.0}
     found = reduce_triplet(measurement(**values))
     assert found.status[1] == "whole cycles doubtful"
-    svg = triplet_figure(found)
+    svg = svg_of(triplet_figure(found))
     assert svg.startswith("<?xml")
-    assert svg == triplet_figure(found)  # the same picture for the same calibration
-    words = dict(line for line in verdict(found) if line[0])
+    assert svg == svg_of(triplet_figure(found))  # the same picture for the same calibration
+    words = dict(line for line in results(found) if line[0])
     assert "NOT ACCEPTED" in words["Difference"]
     assert "DO NOT AGREE" in words["Placements"]
 

@@ -1,4 +1,4 @@
-"""Figures of an EDM baseline as SVG text."""
+"""Figures of an EDM baseline."""
 
 from typing import TYPE_CHECKING
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.gateways.baseline.tables import shot_residuals
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, styled
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline.instrument import BaselineCalibration
@@ -14,11 +14,9 @@ if TYPE_CHECKING:
 MARKERS = "osD^vP"
 
 
-def baseline_figures(calibration: "BaselineCalibration") -> dict[str, str]:
-    """Every figure of the report by its name, as SVG text."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+def baseline_figures(calibration: "BaselineCalibration") -> dict[str, Figure]:
+    """Every figure of the report by its name."""
+    with styled():
         drawn = {
             "line": _line(calibration),
             "residuals": _residuals(calibration),
@@ -27,7 +25,7 @@ def baseline_figures(calibration: "BaselineCalibration") -> dict[str, str]:
         }
         if calibration.cyclic:
             drawn["cyclic"] = _cyclic(calibration)
-        return {name: svg(figure) for name, figure in drawn.items()}
+        return drawn
 
 
 def _setups(calibration: "BaselineCalibration"):

@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 from catseye.records.laboratory.baseline import FORMAT
 
 if TYPE_CHECKING:
@@ -38,6 +39,26 @@ def spans(calibration: "BaselineCalibration") -> list[Span]:
     return spans
 
 
+def baseline_verdict(calibration: "BaselineCalibration") -> Verdict:
+    """Whether the tests of ISO 17123-4 and of the shots bear the calibration out."""
+    failed = [d.name for d in calibration.decisions if d.passed is False]
+    if failed:
+        return Verdict("failed", f"tests failed: {'; '.join(failed)}")
+    if calibration.suspects:
+        return Verdict(
+            "doubtful", f"{len(calibration.suspects)} suspects among the shots, first {_suspect(calibration)}"
+        )
+    if not isinstance(calibration.test, FullTest):
+        return Verdict("doubtful", f"ISO 17123-4's full test was not possible: {calibration.test}")
+    passed = sum(d.passed is True for d in calibration.decisions)
+    return Verdict("good", f"every test that could be made passed ({passed})")
+
+
+def _suspect(calibration: "BaselineCalibration") -> str:
+    first = calibration.suspects[0]
+    return f"{first.kind} of row {', '.join(str(r + 1) for r in first.rows[:4])} (w {first.w:.1f})"
+
+
 def baseline_object(calibration: "BaselineCalibration") -> dict[str, Any]:
     """A baseline as `catseye baseline --json` gives it."""
     s, test = calibration.solution, calibration.test
@@ -48,6 +69,7 @@ def baseline_object(calibration: "BaselineCalibration") -> dict[str, Any]:
     n = len(calibration.names)
     return {
         "format": FORMAT,
+        "verdict": baseline_verdict(calibration).to_object(),
         "observations": {"shots": len(calibration.keep), "used": int(calibration.keep.sum()), "sets": len(s.residual)},
         "sign": "observed = (1 + scale) distance + zero + cyclic; zero_correction is added to what is shown",
         "zero": zero,

@@ -11,10 +11,12 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.baseline.figures import baseline_figures
-from catseye.gateways.baseline.objects import baseline_object, passages, spans
+from catseye.gateways.baseline.objects import baseline_object, baseline_verdict, passages, spans
 from catseye.gateways.baseline.tables import shot_residuals
+from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline.instrument import BaselineCalibration
@@ -37,7 +39,7 @@ def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: 
     when          UTC
     inputs        SHA-256 of each file read, by its name
     """
-    drawn = baseline_figures(calibration)
+    drawn = svgs(baseline_figures(calibration))
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
         f"<header><h1>{escape(Path(calibration.observations.file).name)}: EDM baseline</h1>"
@@ -46,6 +48,7 @@ def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: 
     )
     body = [
         header,
+        verdict_line(baseline_verdict(calibration)),
         _summary(calibration),
         _pillars(calibration, drawn),
         _residuals(drawn),

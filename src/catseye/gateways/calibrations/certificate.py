@@ -7,9 +7,11 @@ from html import escape
 from typing import Any, cast
 
 from catseye.gateways.calibrations.certificate_figure import calibration_figure
-from catseye.gateways.calibrations.certificate_record import record_lines
+from catseye.gateways.calibrations.certificate_record import calibration_verdict, record_lines
+from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
 
 TITLE = "Certificate of calibration"
@@ -43,11 +45,12 @@ def certificate(calibration: Calibration, when: datetime) -> str:
     body = [
         LINES,
         f'<header><h1>{TITLE}</h1><div class="faint">{escape(calibration.title)}</div></header>',
+        verdict_line(calibration_verdict(calibration)),
         f'<dl class="head">{rows}</dl>',
         _results(calibration),
         section("method", "Method", paragraph(calibration.method)),
         _tests(calibration),
-        section("figure", "Readings and residuals", picture(calibration_figure(calibration), calibration.title)),
+        section("figure", "Readings and residuals", picture(svg(calibration_figure(calibration)), calibration.title)),
         _notes(calibration),
         _readings(calibration),
         _inputs(calibration, when),

@@ -2,18 +2,16 @@
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
 from catseye.reduction.calibrations.calibration import Calibration
 
 PANELS = {"residuals": "residual", "spectrum": "amplitude of residuals"}
 
 
-def calibration_figure(calibration: Calibration) -> str:
-    """The figure of a calibration as SVG text."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        return svg(_drawn(calibration))
+def calibration_figure(calibration: Calibration) -> Figure:
+    """Readings, fit and residuals of a calibration."""
+    with styled():
+        return _drawn(calibration)
 
 
 def _drawn(calibration: Calibration) -> Figure:

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from catseye.gateways.writers.objects import plain
+from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import PROVENANCE
 from catseye.version import __version__
@@ -19,11 +20,28 @@ MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
+def calibration_verdict(calibration: Calibration) -> Verdict:
+    """Whether the calibration's own tests bear it out; what failed is named, and nothing found is dropped."""
+    failed = [decision.name for decision in calibration.decisions if decision.passed is False]
+    if failed:
+        plural = "s" if len(failed) > 1 else ""
+        return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {'; '.join(failed)}")
+    if calibration.degrees_of_freedom < 1 and not any(d.passed for d in calibration.decisions):
+        return Verdict("doubtful", "nothing was measured twice and no test could be made")
+    suspects = [number for number, state in enumerate(calibration.states, start=1) if state == "suspect"]
+    if suspects:
+        named = ", ".join(map(str, suspects[:8])) + (" ..." if len(suspects) > 8 else "")
+        return Verdict("doubtful", f"suspect readings: {named}")
+    passed = sum(decision.passed is True for decision in calibration.decisions)
+    return Verdict("good", f"its own tests passed ({passed})" if passed else "nothing speaks against it")
+
+
 def calibration_object(calibration: Calibration) -> dict[str, Any]:
     """A calibration as `catseye calibrate --json` gives it; units are in the keys, null stands for undefined."""
     return plain(
         {
             "format": FORMAT,
+            "verdict": calibration_verdict(calibration).to_object(),
             "kind": calibration.kind,
             "title": calibration.title,
             **calibration.provenance,
@@ -60,6 +78,7 @@ def calibration_toml(calibration: Calibration) -> str:
         "title": calibration.title,
         **{key: provenance[key] for key in PROVENANCE},
         "made_by": f"catseye {__version__}",
+        "verdict": calibration_verdict(calibration).text,
         "variance_factor": calibration.variance_factor,
         "degrees_of_freedom": calibration.degrees_of_freedom,
         "method": calibration.method,

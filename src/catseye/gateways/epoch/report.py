@@ -195,8 +195,8 @@ def _ways(reduction: Reduction) -> str:
         (
             "<h3>The dish, as each command has it</h3>",
             paragraph(
-                "All against the nominal posture, ground axes, about the nominal vertex. What is fitted differs, not the "
-                "sign: a paraboloid does not show a turn about the dish's own axis and sets it to zero, points "
+                "All against the nominal posture, ground axes, about the nominal vertex. What is fitted differs, not "
+                "the sign: a paraboloid does not show a turn about the dish's own axis and sets it to zero, points "
                 "held against their design show it, and their places across the surface count, too; a focal length "
                 "that is free takes part of an offset dish's turn with it. Compare the last two columns, how far the "
                 "dish's axis leans: that is what pointing feels. Unless the focal length is free they agree within "

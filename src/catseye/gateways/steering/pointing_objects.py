@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.gateways.writers.verdict import Verdict, worst
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.stations import Pointings
 from catseye.reduction.steering.guard import GuardAnswer
@@ -16,6 +17,37 @@ HEADINGS = ("x", "y", "z", "range", "N_a", "N_e", "autocoll.", "back retro", "N_
 UNITS = ("m", "m", "m", "m", "counts", "counts", "counts", "counts", "counts", "counts", "")
 
 
+def point_verdict(
+    pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None, point: int
+) -> Verdict:
+    """Whether a mirror may look at one of the points, and sees what stands there."""
+    if not (pointings.allowed[point] or pointings.prime_allowed[point]):
+        return Verdict("failed", "beyond the mirror's stops in both pointings")
+    if sightings:
+        refused = [a for a in (sightings[point].sun, sightings[point].keep_out) if a is not None and not a.allowed]
+        if refused:
+            return Verdict("failed", refused[0].reason.rstrip("."))
+    if visibility is not None and not visibility.seen[0, point]:
+        return Verdict("failed", visibility.reason(0, point).rstrip("."))
+    if pointings.lacking:
+        return Verdict(
+            "doubtful", f"u of the counts is unknown: the records do not have {', '.join(pointings.lacking)}"
+        )
+    which = "direct" if pointings.allowed[point] else "prime"
+    return Verdict("good", f"allowed in the {which} pointing")
+
+
+def pointing_verdict(pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None) -> Verdict:
+    """The worst of all points, with its place where there are several."""
+    each = [point_verdict(pointings, sightings, visibility, k) for k in range(len(pointings.to))]
+    found = worst(each)
+    if len(each) < 2 or found.word == "good":
+        return found
+    place = ", ".join(f"{v:g}" for v in pointings.to[each.index(found)])
+    bad = sum(v.word == found.word for v in each)
+    return Verdict(found.word, f"{bad} of {len(each)} points, first ({place}): {found.why}")
+
+
 def pointing_objects(
     pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None = None
 ) -> list[dict[str, Any]]:
@@ -23,6 +55,7 @@ def pointing_objects(
     answer = []
     for k, to in enumerate(pointings.to):
         item: dict[str, Any] = {
+            "verdict": point_verdict(pointings, sightings, visibility, k).to_object(),
             "to": to.tolist(),
             "range": float(pointings.aim.range[k]),
             "theta": float(pointings.aim.theta[k]),
@@ -58,7 +91,7 @@ def _sighting_object(sighting: Sighting) -> dict[str, Any]:
     item: dict[str, Any] = {}
     if sighting.sun is not None:
         item["sun"] = {
-            **_verdict_object(sighting.sun),
+            **_answer_object(sighting.sun),
             "separation": sighting.separation,
             "altitude": sighting.altitude,
             "azimuth": sighting.azimuth,
@@ -66,16 +99,16 @@ def _sighting_object(sighting: Sighting) -> dict[str, Any]:
             "earth_rotation": sighting.earth_rotation,
         }
     if sighting.keep_out is not None:
-        item["keep_out"] = _verdict_object(sighting.keep_out)
+        item["keep_out"] = _answer_object(sighting.keep_out)
     return item
 
 
-def _verdict_object(verdict: GuardAnswer) -> dict[str, Any]:
+def _answer_object(answer: GuardAnswer) -> dict[str, Any]:
     return {
-        "allowed": verdict.allowed,
-        "reason": verdict.reason,
-        "clearance": verdict.clearance,
-        "free_at_mjd": verdict.free_at_mjd,
+        "allowed": answer.allowed,
+        "reason": answer.reason,
+        "clearance": answer.clearance,
+        "free_at_mjd": answer.free_at_mjd,
     }
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, SERIES, Figure, mpl, styled
 from catseye.geometry.mirror.search_pattern import count_size
 from catseye.reduction.steering.spot_fit import Spot
 from catseye.reduction.steering.tracking import CountTrack, Following
@@ -20,8 +20,8 @@ MOST_LABELS = 60  # on an axis
 ELLIPSE = 3.0  # standard deviations drawn
 
 
-def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, limit: float = 1e-3) -> str:
-    """SVG: how far the beams pass their targets, over the track; the worst pair, the median, and the limit.
+def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, limit: float = 1e-3) -> Figure:
+    """How far the beams pass their targets, over the track; the worst pair, the median, and the limit.
 
     track     that was followed
     misses    (s, k, r, p) m, of `reduction.steering.tracking.misses`
@@ -30,9 +30,7 @@ def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, li
     """
     good = track.status == Following.FOLLOWED
     when = (track.since[:-1, None] + np.asarray(shares) * np.diff(track.since)[:, None]).ravel()
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with styled():
         figure = Figure(figsize=(8.6, 3.2), layout="constrained")
         ax = figure.subplots()
         if good.any():
@@ -44,19 +42,17 @@ def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, li
         ax.set_xlabel("time (s)")
         ax.set_ylabel("beam past the target (mm)")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return svg(figure)
+        return figure
 
 
-def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> str:
-    """SVG: the places that a search looked at, in order, coloured by what came back, and the spot's centre if found.
+def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> Figure:
+    """The places that a search looked at, in order, coloured by what came back, and the spot's centre if found.
 
     spot     of `reduction.steering.finding.find`
     zeros    (na0, ne0) counts, for the size of counts on the sky: the picture is as the sky is
     title    instead of the status
     """
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with styled():
         figure = Figure(figsize=(7.4, 5.2), layout="constrained")
         ax = figure.subplots()
         na, ne = spot.looked_at.T if len(spot.looked_at) else (np.zeros(0), np.zeros(0))
@@ -75,7 +71,7 @@ def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> st
         ax.ticklabel_format(useOffset=False)
         shown = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
         ax.set_title(f"{shown}: {_centre_text(spot)}" if spot.found else shown, fontsize=8.5)
-        return svg(figure)
+        return figure
 
 
 def _mark(ax, spot: Spot) -> None:
@@ -87,17 +83,15 @@ def _mark(ax, spot: Spot) -> None:
     ax.plot(*(spot.counts[:, None] + ring), color=BAD, lw=1.0, zorder=4, label=f"centre, {ELLIPSE:g} u")
 
 
-def _centre_text(spot: Spot) -> str:
+def _centre_text(spot: Spot) -> Figure:
     (na, ne), (u_na, u_ne) = spot.counts, spot.u_counts
     return f"{na:.2f} ± {u_na:.2f}, {ne:.2f} ± {u_ne:.2f} counts; {spot.amplitude:.2f} V, flatness {spot.flatness:.1f}"
 
 
-def visibility_figure(visibility: Visibility) -> str:
-    """SVG: rangers by retroreflectors, each cell coloured by whether it is seen, or why not."""
+def visibility_figure(visibility: Visibility) -> Figure:
+    """Rangers by retroreflectors, each cell coloured by whether it is seen, or why not."""
     rangers, targets = visibility.code.shape
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+    with styled():
         figure = Figure(figsize=(min(12.0, 3.2 + 0.16 * targets), 1.6 + 0.22 * rangers), layout="constrained")
         ax = figure.subplots()
         colours = mpl.colors.ListedColormap([SIGHTS[Sight(k)][0] for k in range(len(Sight))])
@@ -117,4 +111,4 @@ def visibility_figure(visibility: Visibility) -> str:
         counts = {sight: int(np.sum(visibility.code == sight)) for sight in there}
         handles = [mpl.patches.Patch(color=SIGHTS[s][0], label=f"{SIGHTS[s][1]}: {counts[s]}") for s in there]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        return svg(figure)
+        return figure

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
 from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
 MICROMETRES = 1e6
@@ -12,16 +12,14 @@ NEAREST, FARTHEST = 1.6, 4.0  # tolerances from L_MPBC to the edge; what is fart
 MANY = 12  # placements from which on the axis has no room for their spacers
 
 
-def triplet_figure(reduction: TripletReduction) -> str:
-    """H_corr of each placement against the surface plate and the limits, and the budget of the best, as SVG text."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+def triplet_figure(reduction: TripletReduction) -> Figure:
+    """H_corr of each placement against the surface plate and the limits, and the budget of the best."""
+    with styled():
         figure = Figure(figsize=(9.4, 4.0), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
         _draw_placements(left, reduction)
         _draw_budget(right, reduction)
-        return svg(figure)
+        return figure
 
 
 def _draw_placements(ax: Any, reduction: TripletReduction) -> None:

@@ -6,9 +6,11 @@ from datetime import datetime
 from html import escape
 from typing import Any
 
+from catseye.gateways.triplet.objects import triplet_verdict
 from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, POINTS, UNIT, Symbol, point_places, symbol_values
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.reduction.triplet.result import TripletReduction
 from catseye.reduction.triplet.unit import NOT_A_TRIANGLE, SLIPPED
 
@@ -21,8 +23,8 @@ FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "H
         "dPc_1": 7, "dPc_2": 7, "margin": 1}  # fmt: skip
 
 
-def verdict(reduction: TripletReduction) -> list[tuple[str, str]]:
-    """(title, text) of each paragraph about a calibration, for a terminal or the head of a page."""
+def results(reduction: TripletReduction) -> list[tuple[str, str]]:
+    """(title, text) of each paragraph about a calibration, for a terminal or the head of a page, after the verdict."""
     u_h = _plain(reduction.u_h_corr * 1e3, ".4f")
     low, high = reduction.plate.paint or (math.nan, math.nan)
     lines = [
@@ -99,7 +101,8 @@ def text_sheet(reduction: TripletReduction, file: str) -> str:
         f"TRIPLET {m.triplet}   prisms {m.left_prism.serial} (left), {m.right_prism.serial} (right)   {file}",
         f"measured on {m.measured_on} by {m.by}; lengths mm, angles rad; air by {m.air_model}",
         "",
-        *(f"{title:<12}{text}" for title, text in verdict(reduction)),
+        f"{'Verdict':<12}{triplet_verdict(reduction).text}",
+        *(f"{title:<12}{text}" for title, text in results(reduction)),
         "",
         "UNIT",
         *_text_rows(UNIT, reduction, slice(0, 1)),
@@ -146,20 +149,22 @@ def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: s
     when        UTC, of the computation
     """
     from catseye.gateways.triplet.figure import triplet_figure  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svg
 
     m = reduction.measurement
-    words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in verdict(reduction))
+    words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in results(reduction))
     body = [
         WHOLE,
         f"<header><h1>{TITLE}: {escape(m.triplet)}</h1>"
         f'<div class="faint">prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on '
         f"{m.measured_on} by {escape(m.by)}; air by {m.air_model}; u = standard uncertainty, 1σ</div></header>",
+        verdict_line(triplet_verdict(reduction)),
         '<div class="cards">' + "".join(_cards(reduction)) + "</div>",
         f"<dl>{words}</dl>",
         section(
             "figure",
             "Placements",
-            picture(triplet_figure(reduction), "H_corr of each placement, its limits, the budget"),
+            picture(svg(triplet_figure(reduction)), "H_corr of each placement, its limits, the budget"),
         ),
         section("unit", "Unit", _table(UNIT, reduction)),
         section("plate", "Surface plate", _table(PLATE, reduction), _paint(reduction)),

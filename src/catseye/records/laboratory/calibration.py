@@ -64,6 +64,7 @@ class CalibrationRecord(Record):
     by: Words
     report: Words
     made_by: Words
+    verdict: Words | None = None
     variance_factor: Positive | None = None
     degrees_of_freedom: Annotated[int, Field(ge=0)]
     method: str
