@@ -61,7 +61,7 @@ def test_the_worst_pair_is_drawn_in_millimetres_over_the_time_of_the_track(kept)
     none = follow(mounted(STATION), targets, TimeTag(52889, 0), intervals=20, limits=(at + 9000.0, at + 9010.0))
     assert np.all(none.status == Following.BEYOND_STOPS)
     drawn(miss_figure(none, off, shares))
-    assert [line.get_label() for line in kept[2].axes[0].lines] == ["1 mm"]
+    assert [line.get_label() for line in kept[1].axes[0].lines] == ["1 mm"]
 
 
 def test_a_search_shows_its_places_and_its_centre(kept):

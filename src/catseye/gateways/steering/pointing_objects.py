@@ -29,12 +29,9 @@ def point_verdict(
             return Verdict("failed", refused[0].reason.rstrip("."))
     if visibility is not None and not visibility.seen[0, point]:
         return Verdict("failed", visibility.reason(0, point).rstrip("."))
-    if pointings.lacking:
-        return Verdict(
-            "doubtful", f"u of the counts is unknown: the records do not have {', '.join(pointings.lacking)}"
-        )
     which = "direct" if pointings.allowed[point] else "prime"
-    return Verdict("good", f"allowed in the {which} pointing")
+    unknown = "; u of the counts is unknown: the records lack what it needs" if pointings.lacking else ""
+    return Verdict("good", f"allowed in the {which} pointing{unknown}")
 
 
 def pointing_verdict(pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None) -> Verdict:
