@@ -310,7 +310,8 @@ def track(
     fastest = (AZIMUTH_SLEW, ELEVATION_SLEW)
     rates = [most if rate is None else rate * DEGREE for rate, most in zip(given, fastest, strict=True)]
     ends = zip(start_deg, end_deg, rates, strict=True)
-    path = AntennaPath(*(Drive(a * DEGREE, b * DEGREE, rate=rate) for a, b, rate in ends))
+    azimuth, elevation = (Drive(a * DEGREE, b * DEGREE, rate=rate) for a, b, rate in ends)
+    path = AntennaPath(azimuth, elevation)
     intervals = max(1, int(np.ceil(max(path.azimuth.duration, path.elevation.duration) / interval_s)))
     limits = (mirrors.az_low_limit, mirrors.az_high_limit)
     stations, targets = mounted(station_of(stands, mirrors)[None]), fixed(where, frame, path)

@@ -397,7 +397,7 @@ def surface(
         raise InputError("surface needs an epoch: what reduce gave or wrote, or a table of prisms")
     records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
     aperture = LitAperture.of(records.site.paraboloid)
-    settings = ShapeSettings(tuple(free), taper_db, tuple(f * 1e9 for f in frequency_ghz), zernike, order)  # type: ignore[arg-type]
+    settings = ShapeSettings(tuple(free), taper_db, tuple(f * 1e9 for f in frequency_ghz), zernike, order)
     prisms: list[Prisms] = []
     hashes: dict[str, str] = {}
     for k, epoch in enumerate(epochs):

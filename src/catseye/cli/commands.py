@@ -3,12 +3,14 @@
 import math
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+from catseye.cli.inputs import prepare
 from catseye.cli.results import Strict, tell
-from catseye.cli.terminal import ProgressLine, say
+from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.version import __version__
@@ -22,21 +24,49 @@ ROOMS = (
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.replay", "live.export"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
 )
+SUBJECTS = {  # as `catseye --help` groups the commands
+    "Begin here": ("demo", "examples"),
+    "A night of ranges": ("reduce", "explain"),
+    "Networks": ("adjust", "plan", "baseline"),
+    "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
+    "Laboratory": ("calibrate", "certificate", "triplet"),
+    "Air": ("air", "sound", "refractometer", "acoustic"),
+    "Light": ("point", "link", "beam", "glass", "safety"),
+    "A living site": ("simulate", "serve", "zy", "ziy", "replay", "export"),
+    "Figures": ("plot",),
+}
+
+
+class SubjectGroup(TyperGroup):
+    """The commands of `catseye --help`, by subject."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a section a subject, a line a command; what has no subject comes last."""
+        told = {name for names in SUBJECTS.values() for name in names}
+        rest = tuple(name for name in self.list_commands(ctx) if name not in told)
+        for subject, names in (*SUBJECTS.items(), ("More", rest)):
+            commands = [(name, self.get_command(ctx, name)) for name in names]
+            lines = [(name, c.get_short_help_str(200)) for name, c in commands if c is not None]
+            if lines:
+                with formatter.section(subject):
+                    formatter.write_dl(lines)
+
 
 app = typer.Typer(
     name="catseye",
+    cls=SubjectGroup,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    add_completion=False,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 
 
 def join_commands() -> None:
-    """Import the modules whose commands join the app."""
+    """Import the modules whose commands join the app, and prepare what all commands share."""
     for name in ROOMS:
         import_module(f"catseye.cli.{name}")
+    prepare(app)
 
 
 def main() -> None:
@@ -66,7 +96,10 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for pr
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
 
 
-@app.callback(epilog="\b\nExample: catseye demo")
+@app.callback(
+    epilog="\b\nExample: catseye demo\n"
+    "A path may be an example's name: night-01, gbt, networks/feed-arm.toml (catseye examples lists them)"
+)
 def catseye(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
@@ -114,6 +147,31 @@ def demo(
     _tell(night, None, json=json, quiet=quiet)
     if not json and not quiet:
         say(f"\nReport: {directory / 'report.html'}")
+
+
+@app.command(epilog="\b\nExample: catseye examples my-examples")
+def examples(
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="Where to write them all: new or empty; listed without.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """What comes with catseye, listed, or written into a folder to change."""
+    from catseye.gateways.examples import copy_example, example_names
+    from catseye.gateways.writers.objects import json_line
+
+    names = example_names()
+    written = None if directory is None else copy_example("", directory)
+    if json:
+        say(json_line({"examples": names, "written": None if directory is None else str(directory)}))
+    elif directory is None:
+        for folder in dict.fromkeys(name.rpartition("/")[0] for name in names):
+            inside = [name.rpartition("/")[2] for name in names if name.rpartition("/")[0] == folder]
+            say(wrapped(f"{folder}/" if folder else "", ", ".join(inside)))
+        say("\nEach name stands wherever a path does: catseye reduce night-01 --out night")
+    else:
+        say(f"Written: {written} files in {directory}/")
+        say(f"Next:    catseye reduce {directory / 'night-01'} --out night")
 
 
 def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "NightResult":

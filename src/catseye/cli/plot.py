@@ -9,7 +9,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.point import time_text
-from catseye.cli.terminal import say
+from catseye.cli.terminal import say, wrapped
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import InputError
@@ -222,11 +222,11 @@ def _finish(
     with whole_file(out, "--out", MARK) as pieces:
         pieces.append(text.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
     if json:
-        say(json_line({"kind": kind, "written": str(out), **summary}))
+        verdict = {"word": "good", "why": "the figure is drawn from these inputs"}
+        say(json_line({"verdict": verdict, "kind": kind, "written": str(out), **summary}))
     elif not quiet:
-        for line in (*_lines(summary), f"written to {out}"):
-            say(line)
+        from catseye.gateways.plots import plot_passages
 
-
-def _lines(summary: dict[str, Any]) -> list[str]:
-    return [f"{key.replace('_', ' ')}: {value}" for key, value in summary.items() if value not in (None, "")]
+        for passage in plot_passages(kind, summary):
+            say(wrapped(passage.title, passage.text))
+        say(wrapped("Written to", str(out)))

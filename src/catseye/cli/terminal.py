@@ -13,6 +13,8 @@ from catseye.errors import CatseyeError
 
 WIDTH = 100  # columns; longer lines are hard to read
 INTERVAL = 0.1  # s between two refreshes of the progress line
+FIRST_LINE, BETWEEN_LINES = 10.0, 10.0  # s until progress is told where stderr is no terminal, and between its lines
+SURE = 2.0  # s of a step before an end is foretold
 
 
 def finish(command: Callable[[], None]) -> int:
@@ -68,33 +70,70 @@ def complain(text: str) -> None:
 def wrapped(title: str, text: str) -> str:
     """A paragraph under its title, indented, for a terminal."""
     width = WIDTH if not sys.stdout or not sys.stdout.isatty() else min(WIDTH, os.get_terminal_size().columns)
-    return textwrap.fill(text, max(width, 40), initial_indent=f"{title:<14}", subsequent_indent=" " * 14)
+    return textwrap.fill(text, max(width, 40), initial_indent=f"{title:<13} ", subsequent_indent=" " * 14)
 
 
 class ProgressLine:
-    """One line on stderr that says what is being done, when stderr is a terminal; nothing otherwise."""
+    """What is being done, on stderr, with an estimate of the end.
+
+    On a terminal one line that changes; elsewhere plain lines, few and only of long work, and none at all with
+    `--json`, whose reader expects stderr empty unless something is wrong.
+    """
 
     def __init__(self, quiet: bool) -> None:
-        self._shown = not quiet and sys.stderr is not None and sys.stderr.isatty()
+        here = sys.stderr is not None
+        self._shown = not quiet and here and sys.stderr.isatty()
+        self._plain = not quiet and here and not self._shown and not _asks_for_json()
         self._last = ""
-        self._next = 0.0
+        self._start = self._next = time.monotonic()
+        self._next_line = self._start + FIRST_LINE
 
     def __call__(self, what: str, done: int, total: int) -> None:
         now = time.monotonic()
-        if not self._shown or (what == self._last and now < self._next):
-            return
-        self._last, self._next = what, now + INTERVAL
-        bar = "█" * (20 * done // total if total else done % 21)  # without a known end it fills again and again
-        self._write(f"{bar:·<20} {what} {done}{f'/{total}' if total else ''}")
+        if what.partition(" ")[0] != self._last.partition(" ")[0]:
+            self._start = now  # of this step: files that are written one by one are one
+        changed, self._last = what != self._last, what
+        if self._shown and (changed or now >= self._next):
+            self._next = now + INTERVAL
+            bar = "█" * (20 * done // total if total else done % 21)  # without a known end it fills again and again
+            self._write(f"\r\x1b[K{bar:·<20} {what} {done}{f'/{total}' if total else ''}{self._left(now, done, total)}")
+        elif self._plain and now >= self._next_line:
+            self._next_line = now + BETWEEN_LINES
+            self._write(f"{what} {done}{f' of {total}' if total else ''}{self._left(now, done, total)}\n")
 
     def clear(self) -> None:
         if self._shown:
-            self._write("")
+            self._write("\r\x1b[K")
+
+    def _left(self, now: float, done: int, total: int) -> str:
+        """How long the step has taken and may still take, once that can be told."""
+        passed = now - self._start
+        if not 0 < done < total or passed < SURE:
+            return ""
+        return f", {duration(passed)}, some {duration(passed * (total - done) / done)} left"
 
     def _write(self, text: str) -> None:
         with suppress(OSError):
-            sys.stderr.write(f"\r\x1b[K{text}")
+            sys.stderr.write(text)
             sys.stderr.flush()
+
+
+def duration(seconds: float) -> str:
+    """A time for people.
+
+    >>> duration(4.2), duration(75), duration(7300)
+    ('4 s', '1 min 15 s', '2 h 2 min')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def _asks_for_json() -> bool:
+    return "--json" in sys.argv
 
 
 def _silence_stdout() -> None:

@@ -218,6 +218,7 @@ ROWS = (
     _row(
         "HLP", "commands, or one command's forms", (), (CommandParameter("command", "name"),), asks=(0, 1), chosen=True
     ),
+    _row("HELP", "the same as HLP", (), (CommandParameter("command", "name"),), asks=(0, 1), chosen=True),
 )
 COMMANDS = {row.name: row for row in ROWS}
 

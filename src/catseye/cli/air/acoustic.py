@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import say, wrapped
 from catseye.cli.vocabularies import THERMOMETRY_MODELS, one_of
 from catseye.errors import InputError
@@ -16,7 +17,7 @@ from catseye.errors import InputError
     epilog="\b\nExample: catseye acoustic examples/acoustic/evening-1.wav --sheet examples/acoustic/evening.toml\n"
     "Layouts of FILE and SHEET: docs/formats/acoustic.md"
 )
-def acoustic(
+def acoustic(  # noqa: PLR0913 - its options are its command line
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="Recordings .wav or .csv, or travel times .csv.")
     ],
@@ -43,9 +44,16 @@ def acoustic(
     air_model: AirModel = "ciddor_hill1999",
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Temperature of the air along a path from the travel time of sound."""
-    from catseye.gateways.air.acoustic_objects import MARK, acoustic_object, path_temperatures_csv, words
+    from catseye.gateways.air.acoustic_objects import (
+        MARK,
+        acoustic_object,
+        acoustic_verdict,
+        path_temperatures_csv,
+        words,
+    )
     from catseye.gateways.writers.output import refuse_output, whole_directory, whole_file
     from catseye.reduction.air.acoustic_recording import reduce_acoustic
 
@@ -67,12 +75,14 @@ def acoustic(
 
         say(json_line(acoustic_object(paths)))
     elif not quiet:
+        say(wrapped("Verdict", acoustic_verdict(paths).text))
         for path in paths:
             for title, text in words(path):
                 say(wrapped(title, text))
         for place in (out, write):
             if place is not None:
                 say(wrapped("Written to", str(place)))
+    judge(acoustic_verdict(paths), strict=strict)
 
 
 def _refuse_outputs(files: list[Path], sheet: Path | None, out: Path | None, write: Path | None) -> None:

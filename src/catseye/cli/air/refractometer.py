@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 
@@ -77,6 +78,7 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase."""
     from catseye.gateways.writers.output import refuse_output, whole_directory
@@ -111,16 +113,16 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
                 write_refractometer(calibration, directory, progress)
     finally:
         progress.clear()
-    from catseye.gateways.air.refractometer_report import passages, refractometer_object
+    from catseye.gateways.air.refractometer_report import passages, refractometer_object, refractometer_verdict
 
     if json:
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(refractometer_object(calibration)))
-        return
-    if quiet:
-        return
-    for passage in passages(calibration):
-        say(wrapped(passage.title, passage.text))
-    if out is not None:
-        say(wrapped("Written to", f"{out}/: report.html, group_index.csv, refractometer.json, night.svg"))
+    elif not quiet:
+        say(wrapped("Verdict", refractometer_verdict(calibration).text))
+        for passage in passages(calibration):
+            say(wrapped(passage.title, passage.text))
+        if out is not None:
+            say(wrapped("Written to", f"{out}/: report.html, group_index.csv, refractometer.json, night.svg"))
+    judge(refractometer_verdict(calibration), strict=strict)

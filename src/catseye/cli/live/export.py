@@ -61,7 +61,14 @@ def export(
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        summary = {"run": number, "out": str(out), "format": to, "rows": counts, "notes": list(notes)}
+        summary = {
+            "verdict": {"word": "good", "why": f"{sum(counts.values())} rows written"},
+            "run": number,
+            "out": str(out),
+            "format": to,
+            "rows": counts,
+            "notes": list(notes),
+        }
         say(json_line(summary))
     elif not quiet:
         rows = ", ".join(f"{count} {name}" for name, count in counts.items())

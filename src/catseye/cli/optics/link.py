@@ -73,7 +73,16 @@ def link(  # noqa: PLR0913 - its options are its command line
 
 
 def _object(budget: "LinkBudget", head: Link, distance: float) -> dict[str, object]:
+    word = {"word": "doubtful", "why": "the return is more than the converter takes: it clips"}
+    if not budget.clipped:
+        word = {
+            "word": "good",
+            "why": f"a return of {budget.amplitude_volt:.3g} V, noise of a range below 1 mm",
+        }
+        if budget.u_range > 1e-3:
+            word = {"word": "doubtful", "why": f"the range's noise is {1e3 * budget.u_range:.2g} mm"}
     return {
+        "verdict": word,
         "distance": distance,
         "factors": budget.factors,
         "received_power": budget.received,

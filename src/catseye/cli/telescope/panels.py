@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import ProgressLine, say, wrapped
 
 if TYPE_CHECKING:
@@ -53,9 +54,10 @@ def panels(  # noqa: PLR0913 - its options are its command line
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Panel corners from the panel setting instrument: heights, turns of screws, a crew's statistics."""
-    from catseye.gateways.panels.objects import panels_object, passages
+    from catseye.gateways.panels.objects import panels_object, panels_verdict, passages
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.reduction.panels.job import PanelFiles, panel_work
 
@@ -78,11 +80,13 @@ def panels(  # noqa: PLR0913 - its options are its command line
 
         say(json_line(panels_object(work)))
     elif not quiet:
+        say(wrapped("Verdict", panels_verdict(work).text))
         for title, text in passages(work):
             say(wrapped(title, text))
         if out is not None:
             files_written = "report.html, screws.csv, actuators.csv, panels.csv, readings.csv, crew.csv, panels.json"
             say(wrapped("Written to", f"{out}/: {files_written}"))
+    judge(panels_verdict(work), strict=strict)
 
 
 def _layout(given: str, focal_length: float) -> "PanelLayout":
@@ -92,5 +96,5 @@ def _layout(given: str, focal_length: float) -> "PanelLayout":
     from catseye.records.site.folder import read_site
 
     if given.endswith(".csv"):
-        return read_layout(Path(given), focal_length)
+        return read_layout(located(given), focal_length)
     return layout_of_site(read_site(located(given)))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import say, wrapped
 from catseye.cli.vocabularies import POINTING_TERMS
 from catseye.constants import ARCSECOND, DEGREE
@@ -90,10 +91,11 @@ def fit(  # noqa: PLR0913 - its options are its command line
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """The eight-term series by least squares, with covariance and what it cannot tell apart."""
     from catseye.gateways.pose.pointing_series_files import write_fit, write_model
-    from catseye.gateways.pose.pointing_series_objects import fit_object, fit_rows, fit_words
+    from catseye.gateways.pose.pointing_series_objects import fit_object, fit_verdict
     from catseye.gateways.writers.output import refuse_output, whole_directory
 
     if out is not None:
@@ -118,9 +120,18 @@ def fit(  # noqa: PLR0913 - its options are its command line
         from catseye.gateways.writers.objects import json_line
 
         say(json_line(fit_object(pointing_fit, observed, compared)))
-        return
-    if quiet:
-        return
+    elif not quiet:
+        _tell_fit(pointing_fit, observed, compared, out)
+    judge(fit_verdict(pointing_fit), strict=strict)
+
+
+def _tell_fit(
+    pointing_fit: "PointingFit", observed: "Observed", compared: "SeriesComparison | None", out: Path | None
+) -> None:
+    """The fit in sentences, and its terms."""
+    from catseye.gateways.pose.pointing_series_objects import fit_rows, fit_verdict, fit_words
+
+    say(wrapped("Verdict", fit_verdict(pointing_fit).text))
     for title, text in fit_words(pointing_fit, observed, compared):
         say(wrapped(title, text))
     heads = ("term", "arcsec", "u", *(("difference", "u") if compared is not None else ()))

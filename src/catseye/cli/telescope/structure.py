@@ -8,6 +8,7 @@ import typer
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.live.replay import RunName, run_of
 from catseye.cli.networks import Out
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import OWN_FUNCTIONS, SERIES_FRAMES, one_of
 from catseye.errors import InputError
@@ -103,11 +104,12 @@ def structure(  # noqa: PLR0913 - its options are its command line
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """Gravity and temperature: how a group of points moves, foretold; and its vibration."""
     if not points:
         raise typer.BadParameter("is needed: a name or a pattern such as 'ZEG*'.", param_hint="'--points'")
-    to = _Answer(out, json, quiet, ProgressLine(quiet))
+    to = _Answer(out, json, quiet, ProgressLine(quiet), strict)
     _refuse(out, [*(sources or []), *([epochs] if epochs else []), *(Path(j) for j in (journal, vibration) if j)])
     try:
         if vibration is not None:
@@ -137,6 +139,7 @@ class _Answer(NamedTuple):
     json: bool
     quiet: bool
     progress: ProgressLine
+    strict: bool
 
 
 def _refuse(out: Path | None, inputs: list[Path]) -> None:
@@ -174,7 +177,7 @@ def _structure(
     import numpy as np
 
     from catseye.constants import DEGREE
-    from catseye.gateways.structure.objects import structure_object
+    from catseye.gateways.structure.objects import structure_object, structure_verdict
     from catseye.reduction.structure.check import left_out
     from catseye.reduction.structure.series import fit_structure
 
@@ -211,7 +214,9 @@ def _structure(
 
         say(json_line(answer))
     elif not to.quiet:
+        say(wrapped("Verdict", structure_verdict(fit, check).text))
         _tell(fit, answer, predicted, to.out)
+    judge(structure_verdict(fit, check), strict=to.strict)
 
 
 def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:

@@ -26,9 +26,10 @@ HELP = {
     "TAKE": ("TAKE ranger", "use a ranger again"),
     "STREAM": ("STREAM ranger, target | STREAM ranger", "one target again and again; without a target it ends"),
     "VER": ("VER", "name and version; sent behind a command of many lines it ends them"),
-    "HLP": ("HLP | HLP command", "commands, or one command's forms"),
+    "HLP": ("HLP | HLP command", "commands, or one command's forms; HELP is the same"),
     "BYE": ("BYE", "close this connection"),
 }
+ALIASES = {"HELP": "HLP"}
 
 
 class Board:
@@ -60,12 +61,13 @@ class Board:
 
         Raises InputError: parameters that do not fit, or what was asked cannot be.
         """
-        command = self._commands.get(request.command)
+        name = ALIASES.get(request.command, request.command)
+        command = self._commands.get(name)
         if command is None:
             return None
         counts, handler = command
         if len(request.parameters) not in counts:
-            raise InputError(f"{len(request.parameters)} parameters do not fit (expected {HELP[request.command][0]})")
+            raise InputError(f"{len(request.parameters)} parameters do not fit (expected {HELP[name][0]})")
         return handler(request.parameters)
 
     def _status(self) -> Rows:
@@ -113,9 +115,10 @@ class Board:
     def _help(self, name: str | None = None) -> Rows:
         if name is None:
             return [(" ".join(HELP),)]
-        if name.upper() not in HELP:
+        known = ALIASES.get(name.upper(), name.upper())
+        if known not in HELP:
             raise InputError(f"{name[:20]!a} is no command (expected one that HLP lists)")
-        return [tuple(plain(word) for word in HELP[name.upper()])]
+        return [tuple(plain(word) for word in HELP[known])]
 
     def _done(self, action: Callable[[str], None], ranger: str) -> Rows:
         action(ranger.upper())

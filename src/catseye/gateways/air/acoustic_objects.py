@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.constants import PPM
+from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import csv_text
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ TIMES = (
     "snr_ba_db", "temperature_c", "u_temperature_c", "wind_m_per_s", "u_wind_m_per_s", "group_refractivity_ppm",
     "u_group_refractivity_ppm", "status",
 )  # fmt: skip
+
+MOST_USED = 0.8  # share of a path's shots; with fewer something is wrong with the rest
 
 
 class Mean(NamedTuple):
@@ -47,9 +50,23 @@ def mean(path: "AcousticPath") -> Mean:
     )
 
 
+def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
+    """Whether every path has a temperature, and most of its shots had a part in it."""
+    lost = [path for path in paths if not path.used.any()]
+    if lost and len(lost) == len(paths):
+        return Verdict("failed", "no shot of any path could be used")
+    if lost:
+        return Verdict("doubtful", f"no shot could be used of {lost[0].sheet.ranger} to {lost[0].sheet.target}")
+    thin = [path for path in paths if path.used.mean() < MOST_USED]
+    if thin:
+        share = 100.0 * float(thin[0].used.mean())
+        return Verdict("doubtful", f"only {share:.0f} % of the shots of {thin[0].sheet.ranger} could be used")
+    return Verdict("good", f"{sum(int(path.used.sum()) for path in paths)} shots used of {len(paths)} paths")
+
+
 def acoustic_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
     """What `catseye acoustic --json` gives."""
-    return {"paths": [_path(path) for path in paths]}
+    return {"verdict": acoustic_verdict(paths).to_object(), "paths": [_path(path) for path in paths]}
 
 
 def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
@@ -61,7 +78,7 @@ def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
             "covariance_group": path.temperatures.covariance_group,
         }
         items.append({**_path(path), **covariances})
-    return {"format": "catseye-acoustic-1", "paths": items}
+    return {"format": "catseye-acoustic-1", "verdict": acoustic_verdict(paths).to_object(), "paths": items}
 
 
 def _path(path: "AcousticPath") -> dict[str, Any]:

@@ -15,6 +15,7 @@ from catseye.constants import PPM, TWO_PI
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
@@ -28,11 +29,25 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
           "u_temperature_c", "weather_refractivity_ppm", "residual_ppm", "standardised", "status")  # fmt: skip
 
 
+def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
+    """Whether phases and weather scatter as claimed, and the phase follows the index as it must."""
+    if not calibration.slope.agrees:
+        ratio = calibration.slope.ratio
+        return Verdict("doubtful", f"the phase follows the weather's index {ratio:.3f} times, not once")
+    factor, degrees = calibration.variance_factor, calibration.degrees_of_freedom
+    if not degrees >= 1.0:
+        return Verdict("doubtful", "nothing checks the calibration")
+    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
+        return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
+    return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
+
+
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """A calibrated path as `catseye refractometer --json` gives it."""
     sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
     counts = Counter(calibration.status)
     return {
+        "verdict": refractometer_verdict(calibration).to_object(),
         "path": sheet.path,
         "path_length": sheet.path_length_m,
         "modulation_hz": sheet.modulation_hz,

@@ -13,6 +13,7 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
 from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
 from catseye.records.files.reading import Folder
@@ -185,7 +186,10 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
+    good = beam_path.status == "ok"
+    why = "every element passes the beam" if good else beam_path.status
     return {
+        "verdict": Verdict("good" if good else "doubtful", why).to_object(),
         "name": beam_path.train.name,
         "distance": beam_path.train.distance_m,
         "status": beam_path.status,

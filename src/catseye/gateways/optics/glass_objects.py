@@ -5,6 +5,7 @@ from typing import Any
 from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
+from catseye.gateways.writers.verdict import Verdict
 from catseye.optics.glass import (
     GLASSES,
     absolute_index,
@@ -47,6 +48,7 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, *, heigh
     }
     per_c = (float(by_temperature.group), glass.expansion)
     return {
+        "verdict": Verdict("good", f"within the limits of {name}'s dispersion formula, {glass.source}").to_object(),
         "name": name,
         "what": glass.what,
         "formula": glass.formula,
@@ -154,6 +156,7 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
 def table_object() -> dict[str, Any]:
     """All glasses as `catseye glass --json` gives them."""
     return {
+        "verdict": Verdict("good", "the makers' formulas, each with its source and limits").to_object(),
         "glasses": {
             name: {
                 "what": glass.what,
@@ -165,7 +168,7 @@ def table_object() -> dict[str, Any]:
                 "expansion_per_c": glass.expansion,
             }
             for name, glass in GLASSES.items()
-        }
+        },
     }
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from catseye.gateways.writers.verdict import Verdict
 from catseye.optics.safety.hazard import (
     AVERSION,
     BINOCULARS,
@@ -55,13 +56,14 @@ def safety_object(asked: Question) -> dict[str, Any]:
     """What `catseye safety --json` gives; SI units unless a key says otherwise."""
     beam, seconds = asked.beam, asked.seconds
     viewer = BINOCULARS if asked.aided else NAKED
-    verdict = classify(beam, edition=asked.edition, subtense=asked.subtense)
+    outcome = classify(beam, edition=asked.edition, subtense=asked.subtense)
     others = {name: classify(beam, edition=name, subtense=asked.subtense).laser_class for name in EDITIONS}
     limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
     governing = eye_mpe(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
     skin = skin_limit(beam.wavelength_um, seconds)
     known = factors(beam.wavelength_um, seconds, asked.subtense)
     return {
+        "verdict": _verdict(outcome.laser_class).to_object(),
         "notice": NOTICE,
         "edition": asked.edition,
         "power": beam.power,
@@ -75,11 +77,11 @@ def safety_object(asked: Question) -> dict[str, Any]:
         "mpe_eye": governing.irradiance,
         "mpe_eye_protects_from": governing.name,
         "mpe_skin": skin.irradiance,
-        "class": verdict.laser_class,
+        "class": outcome.laser_class,
         "class_by_edition": others,
-        "reasons": list(verdict.reasons),
-        "emissions": verdict.emissions,
-        "class_limits": verdict.limits,
+        "reasons": list(outcome.reasons),
+        "emissions": outcome.emissions,
+        "class_limits": outcome.limits,
         "viewer": viewer.name,
         "hazard_from": hazard_zone(beam, limits, viewer)[0],
         "nohd": hazard_zone(beam, limits)[1],
@@ -89,6 +91,13 @@ def safety_object(asked: Question) -> dict[str, Any]:
         "returned": _returned(asked),
         "what_if": [_what_if(asked, t) for t in DURATIONS],
     }
+
+
+def _verdict(laser_class: str) -> Verdict:
+    """Never more than that nothing is exceeded: this is a warning, and no certificate."""
+    if laser_class == "1":
+        return Verdict("good", "class 1 as described; this is a computation, never a certificate")
+    return Verdict("doubtful", f"class {laser_class}: a hazard, as described; a warning, never a certificate")
 
 
 def _what_if(asked: Question, seconds: float) -> dict[str, float]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.panels.crew import members, sessions, standing, zeros
 from catseye.reduction.panels.heights import surface_rms
 from catseye.reduction.panels.job import verdicts
@@ -60,11 +61,21 @@ def screws(heights: "PanelHeights") -> Iterable[Screw]:
             )
 
 
+def panels_verdict(work: "PanelWork") -> Verdict:
+    """Whether the readings are in control; how many screws are to be turned is the answer, not its worth."""
+    if work.notes:
+        return Verdict("doubtful", work.notes[0].rstrip("."))
+    told = list(screws(work.latest))
+    turn = sum(screw.verdict == "turn" for screw in told)
+    return Verdict("good", f"{turn} of {len(told)} screws are to be turned, and the readings are in control")
+
+
 def panels_object(work: "PanelWork") -> dict[str, Any]:
     """What `catseye panels --json` prints: SI units."""
     last = work.latest
     return {
         "format": FORMAT,
+        "verdict": panels_verdict(work).to_object(),
         "instrument": {"name": work.sheet.name, "serial": work.sheet.serial},
         "layout": {"panels": len(work.layout.panels), "corners": len(work.layout.corners)},
         "goal": work.sheet.goal_um * 1e-6,

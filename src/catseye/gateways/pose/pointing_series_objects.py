@@ -11,6 +11,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.pose.objects import FORMAT as POSE
+from catseye.gateways.writers.verdict import Verdict
 from catseye.geometry.antenna.pointing_series import PointingSeries, published
 from catseye.records.files.reading import Folder, read_record
 from catseye.records.laboratory.star_offsets import StarOffsets, read_star_offsets
@@ -114,10 +115,25 @@ def series_object(series: PointingSeries) -> dict[str, Any]:
     }
 
 
+def fit_verdict(fit: PointingFit) -> Verdict:
+    """Whether the observations hold the terms apart and scatter as they claim, where they claim anything."""
+    if fit.degrees_of_freedom < 1:
+        return Verdict("doubtful", "as many observations as terms: nothing checks the series")
+    if fit.weak:
+        return Verdict("doubtful", f"the observations do not tell {fit.weak[0].parts} apart")
+    if not fit.scaled and fit.variance_factor > 1.0 + 3.0 * (2.0 / fit.degrees_of_freedom) ** 0.5:
+        return Verdict(
+            "doubtful", f"observations scatter more than claimed (variance factor {fit.variance_factor:.2f})"
+        )
+    rms = fit.sky_rms / ARCSECOND
+    return Verdict("good", f"{int(fit.used.sum())} observations hold the terms, {rms:.2f} arc seconds rms on the sky")
+
+
 def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> dict[str, Any]:
     """A fit as `catseye pointing fit --json` gives it."""
     return {
         "format": FORMAT,
+        "verdict": fit_verdict(fit).to_object(),
         "source": observed.source,
         "sign": "correction: encoders less sky; azimuth times cos E and elevation",
         **series_object(fit.series),

@@ -83,7 +83,7 @@ def _mark(ax, spot: Spot) -> None:
     ax.plot(*(spot.counts[:, None] + ring), color=BAD, lw=1.0, zorder=4, label=f"centre, {ELLIPSE:g} u")
 
 
-def _centre_text(spot: Spot) -> Figure:
+def _centre_text(spot: Spot) -> str:
     (na, ne), (u_na, u_ne) = spot.counts, spot.u_counts
     return f"{na:.2f} ± {u_na:.2f}, {ne:.2f} ± {u_ne:.2f} counts; {spot.amplitude:.2f} V, flatness {spot.flatness:.1f}"
 

@@ -158,6 +158,7 @@ HANDLERS: dict[str, Handler] = {
     "LST": _lst,
     "CLR": _clr,
     "HLP": _hlp,
+    "HELP": _hlp,
     "INITZY": _initzy,
     "BYE": lambda z, _: ("Closing Connection",),  # the server puts the port before it
 }

@@ -61,7 +61,7 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
         (("vertex", "axis", "focal-length"), f"{many}, focal length free"),
     ):
         try:
-            shape = shape_of(prisms, aperture, ShapeSettings(free)).fit  # type: ignore[arg-type]
+            shape = shape_of(prisms, aperture, ShapeSettings(free)).fit
         except EstimationError:
             continue
         command = "catseye surface" + ("" if "focal-length" in free else " --free vertex,axis")

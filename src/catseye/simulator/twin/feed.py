@@ -29,6 +29,7 @@ POSTURES_A_SECOND = 10
 MOST_CLIENTS = 32
 MOST_UNSENT = 2**20  # bytes that a client does not take: an hour and a half of lines
 VERSION = "1"
+HELP = "WX and TEL lines come unasked; HLP or HELP says this; BYE closes the connection"
 LOG = logging.getLogger(__name__)
 
 
@@ -117,6 +118,11 @@ class SiteFeed:
         connected = Reply("CONNECT", True, (str(self.port),), 0, ticks)
         return b"".join([_line(hello), _line(connected), *self._weather(ticks)])
 
+    def help_line(self, command: str) -> bytes:
+        """What HLP and HELP answer: the lines that come unasked, and the commands."""
+        ticks = nanoseconds_to_ticks(self.clock.now_ns())
+        return _line(Reply(command, True, (HELP,), 0, ticks))
+
     def _joining(self) -> "FeedConnection":
         return FeedConnection(self)
 
@@ -170,7 +176,11 @@ class FeedConnection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         *lines, rest = (self._unread + data).split(b"\n")
-        if any(line.strip().lower() == b"bye" for line in lines):
+        words = [line.strip().upper().decode("ascii", "replace") for line in lines]
+        for word in words:
+            if word in ("HLP", "HELP"):
+                self.write(self._feed.help_line(word))
+        if "BYE" in words:
             self.close()
         self._unread = rest[-LONGEST_REQUEST:]
 

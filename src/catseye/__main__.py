@@ -1,0 +1,6 @@
+"""`python -m catseye` is `catseye`."""
+
+from catseye.cli.main import run
+
+if __name__ == "__main__":
+    run()

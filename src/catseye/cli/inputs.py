@@ -1,0 +1,75 @@
+"""What all commands share at their door: paths that may be examples, and words that a shell completes."""
+
+import functools
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import typer
+
+WRITTEN = frozenset(  # options and arguments whose path is made, not read
+    {"actuators", "blank", "certificate", "directory", "out", "page", "template", "write"}
+)
+
+
+def prepare(app: typer.Typer) -> None:
+    """Let every command of an app take examples by name where it reads a path, and complete the words of its options.
+
+    A second call changes nothing.
+    """
+    for group in [app, *(each.typer_instance for each in app.registered_groups if each.typer_instance is not None)]:
+        for command in group.registered_commands:
+            callback = command.callback
+            if callback is None or hasattr(callback, "__prepared__"):
+                continue
+            for parameter in inspect.signature(callback).parameters.values():
+                _complete(parameter)
+            command.callback = _with_examples(callback)
+
+
+def paths_of(callback: Callable[..., Any]) -> Iterator[str]:
+    """Names of a command's parameters that are paths, or lists of paths."""
+    for name, parameter in inspect.signature(callback).parameters.items():
+        if "Path" in str((get_args(parameter.annotation) or (parameter.annotation,))[0]):
+            yield name
+
+
+def _with_examples(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """The command with each path that it reads located: as it stands, or the example of that name."""
+    read = [name for name in paths_of(callback) if name not in WRITTEN]
+
+    @functools.wraps(callback)
+    def run(**given: Any) -> Any:
+        if read:
+            from catseye.gateways.examples import located
+
+            for name in read:
+                value = given.get(name)
+                if isinstance(value, Path):
+                    given[name] = located(value)
+                elif isinstance(value, list):
+                    given[name] = [located(each) for each in value]
+        return callback(**given)
+
+    run.__signature__ = inspect.signature(callback)  # type: ignore[attr-defined]
+    run.__prepared__ = True  # type: ignore[attr-defined]
+    return run
+
+
+def _complete(parameter: inspect.Parameter) -> None:
+    """Give an option with a list of words a completion of these."""
+    for info in get_args(parameter.annotation)[1:]:
+        words = str(getattr(info, "metavar", None) or "").split("|")
+        if len(words) > 1 and info.autocompletion is None and all(re.fullmatch(r"[a-z][\w-]*", w) for w in words):
+            info.autocompletion = _beginning_of(words)
+
+
+def _beginning_of(words: list[str]) -> Callable[[str], list[str]]:
+    """A completion: those of the words that begin as what was typed."""
+
+    def beginning(incomplete: str) -> list[str]:
+        return [word for word in words if word.startswith(incomplete)]
+
+    return beginning

@@ -1,0 +1,90 @@
+"""What the figures of `catseye plot` show, in sentences for people."""
+
+from collections.abc import Callable
+from typing import Any
+
+from catseye.gateways.writers.passage import Passage
+
+Summary = dict[str, Any]
+
+
+def plot_passages(kind: str, summary: Summary) -> list[Passage]:
+    """The numbers behind a figure, told; of a kind without sentences of its own a line each.
+
+    kind      as `catseye plot` calls it
+    summary   what its `--json` gives
+    """
+    return TOLD.get(kind, _each)(summary)
+
+
+def _servo(s: Summary) -> list[Passage]:
+    settled = (
+        "it does not settle" if s["settled_after_s"] is None else f"it has settled after {s['settled_after_s']:.3f} s"
+    )
+    off = " The motor switched itself off: the error grew beyond its limit." if s["motor_off"] else ""
+    return [
+        Passage(
+            "The filter",
+            f"kp {s['kp']}, ki {s['ki']}, kd {s['kd']}, il {s['il']}, interval {s['interval']}: phase margin "
+            f"{s['phase_margin_deg']:.0f}°.",
+        ),
+        Passage("The move", f"it follows within {s['following_error_counts']:.1f} counts, and {settled}.{off}"),
+        Passage("The axis", f"{s['axis']}."),
+    ]
+
+
+def _air(s: Summary) -> list[Passage]:
+    parts = {name: s[f"u_of_{name}_ppm"] for name in ("formula", "temperature", "pressure", "humidity")}
+    given = ", ".join(f"{name} {value:.3f}" for name, value in parts.items() if value)
+    others = "; ".join(f"{name} {value:+.3f}" for name, value in s["other_less_this_ppm"].items())
+    passages = [
+        Passage(
+            "The air",
+            f"group refractivity {s['group_refractivity_ppm']:.3f} ppm by {s['model']}, u "
+            f"{s['u_group_refractivity_ppm']:.3f} ppm: {given} ppm.",
+        ),
+        Passage("The others", f"less this one: {others} ppm."),
+    ]
+    if s["not_drawn"]:
+        passages.append(Passage("Not drawn", f"{', '.join(map(str, s['not_drawn']))}: outside the limits."))
+    return passages
+
+
+def _polarization(s: Summary) -> list[Passage]:
+    corners = [
+        Passage(
+            name,
+            f"returns {100 * c['returned']:.1f} % of the light, {_span(c['crossed_least'], c['crossed_most'])} of it "
+            f"across; on the axis far away {100 * c['far_field_axis']:.1f} %, back through splitter and quarter "
+            f"wave {100 * c['through_splitter_and_quarter_wave']:.1f} %.",
+        )
+        for name, c in s["corners"].items()
+    ]
+    return [Passage("The light", f"{s['wavelength_um']:g} µm; {s['glass']} has the index {s['index']:.6f}."), *corners]
+
+
+def _span(low: float, high: float) -> str:
+    first, last = (f"{100 * v:.2g}" for v in (low, high))
+    return f"{first} %" if first == last else f"{first} to {last} %"
+
+
+def _each(s: Summary) -> list[Passage]:
+    """A line for each number; what is a table in itself has its names before its numbers."""
+    return [
+        Passage(key.replace("_", " "), _text(value))
+        for key, value in s.items()
+        if value is not None and value != "" and value != []
+    ]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "; ".join(f"{str(name).replace('_', ' ')} {_text(each)}" for name, each in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(each) for each in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+TOLD: dict[str, Callable[[Summary], list[Passage]]] = {"servo": _servo, "air": _air, "polarization": _polarization}
