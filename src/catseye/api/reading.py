@@ -41,11 +41,14 @@ def examples(name: str | None = None) -> Any:
     return example_names() if name is None else example(name)
 
 
-def place_of(source: "str | os.PathLike[str]") -> Path:
-    """The path that a name means: a path as it stands, or the example of that name."""
+def place_of(source: "str | os.PathLike[str]", *, output: bool = False) -> Path:
+    """The path that a name means: a path as it stands, or the example of that name.
+
+    output   what a command wrote is wanted, such as an epoch
+    """
     from catseye.gateways.examples import located
 
-    return located(Path(source))
+    return located(Path(source), output=output)
 
 
 def load(source: "str | os.PathLike[str]") -> "Loaded":

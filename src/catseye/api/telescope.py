@@ -175,7 +175,8 @@ def pose(
     found = _posed(later, before, at_posture(records, *later.posture), chosen, pointing, tilt_arcsec)
     fit = found.pose.pose
     hashes = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
-    given = [each for each in (epoch, earlier, site) if isinstance(each, str | os.PathLike)]
+    read = [place_of(each, output=True) for each in (epoch, earlier) if isinstance(each, str | os.PathLike)]
+    read += [place_of(site)] if isinstance(site, str | os.PathLike) else []
     return PoseResult(
         pose_verdict(found),
         fit.frame,
@@ -192,7 +193,7 @@ def pose(
         found,
         {**chosen, "pivot": pivot, "pointing": pointing, "tilt": tilt_arcsec},
         hashes,
-        tuple(place_of(each) for each in given),
+        tuple(read),
     )
 
 
@@ -232,7 +233,7 @@ def _solved(
     if isinstance(epoch, NightResult):
         solved = solved_points(epoch.reduction)
     else:
-        solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch))
+        solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch, output=True))
     if posture_deg is None:
         return solved
     azimuth, elevation = posture_deg
@@ -406,7 +407,7 @@ def surface(
             hashes |= epoch.reduction.campaign.hashes
             continue
         table, read = read_prisms(
-            place_of(epoch),
+            place_of(epoch, output=True),
             records,
             frame=frame,
             azimuth_deg=azimuth_deg,
@@ -445,5 +446,5 @@ def surface(
         fit.u_focal_length,
         found,
         hashes,
-        tuple(place_of(each) for each in epochs if not isinstance(each, NightResult)),
+        tuple(place_of(each, output=True) for each in epochs if not isinstance(each, NightResult)),
     )

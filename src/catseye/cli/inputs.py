@@ -10,8 +10,10 @@ from typing import Any, get_args
 import typer
 
 WRITTEN = frozenset(  # options and arguments whose path is made, not read
-    {"actuators", "blank", "certificate", "directory", "out", "page", "template", "write"}
+    {"actuators", "blank", "certificate", "directory", "out", "page", "template", "write", "write_stars"}
 )
+
+OUTPUTS = frozenset({"earlier", "epoch", "inputs", "sources"})  # read, and written by a command before
 
 
 def prepare(app: typer.Typer) -> None:
@@ -48,9 +50,9 @@ def _with_examples(callback: Callable[..., Any]) -> Callable[..., Any]:
             for name in read:
                 value = given.get(name)
                 if isinstance(value, Path):
-                    given[name] = located(value)
+                    given[name] = located(value, output=name in OUTPUTS)
                 elif isinstance(value, list):
-                    given[name] = [located(each) for each in value]
+                    given[name] = [located(each, output=name in OUTPUTS) for each in value]
         return callback(**given)
 
     run.__signature__ = inspect.signature(callback)  # type: ignore[attr-defined]

@@ -63,17 +63,18 @@ def bundled_site(name: str) -> Path:
     return example(name)
 
 
-def located(path: Path | str) -> Path:
+def located(path: Path | str, *, output: bool = False) -> Path:
     """What a user's path means: the path as it stands, or the example of that name where nothing stands there.
 
-    path   as the user wrote it. A folder of one's own called night-01 or gbt goes before the bundled one where it is a
-           site's or a campaign's; what a command wrote under that name does not.
+    path     as the user wrote it. A folder of one's own called night-01 or gbt goes before the bundled one where it is
+             a site's or a campaign's; what a command wrote under that name does not,
+    output   unless what a command wrote is wanted
 
     >>> located("elsewhere/gbt").as_posix()
     'elsewhere/gbt'
     """
     given, name = Path(path), str(path)
-    if name in SHORT:
+    if name in SHORT and not (output and given.exists()):
         return given if (given / MARK[name]).exists() else example(name)
     if given.exists() or given.is_absolute():
         return given
