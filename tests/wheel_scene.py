@@ -12,7 +12,7 @@ from repository import ROOT
 RUNNER = """
 import json, sys, time
 from contextlib import redirect_stdout
-from io import StringIO
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 import catseye
 assert Path(catseye.__file__).is_relative_to(Path(sys.argv[1])), catseye.__file__
@@ -20,7 +20,7 @@ from catseye.cli.commands import main
 from catseye.cli.terminal import finish
 names = {}
 for kind, text in json.load(sys.stdin):
-    said, start = StringIO(), time.monotonic()
+    said, start = TextIOWrapper(BytesIO(), encoding='utf-8'), time.monotonic()
     with redirect_stdout(said):
         if kind == "python":
             exec(text, names)
@@ -28,7 +28,9 @@ for kind, text in json.load(sys.stdin):
         else:
             sys.argv = json.loads(text)
             status = finish(main)
-    print(json.dumps({"status": status, "said": said.getvalue(), "seconds": time.monotonic() - start}), flush=True)
+    said.flush()
+    text = said.buffer.getvalue().decode()
+    print(json.dumps({"status": status, "said": text, "seconds": time.monotonic() - start}), flush=True)
 """
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
     from catseye.api.telescope import pose, surface
-    from catseye.api.weather import air, sound
+    from catseye.api.weather import air, refractometer, sound
 
 FACE = {  # file of catseye.api -> what of it is catseye's
     "laboratory": ("baseline", "calibrate", "triplet"),
@@ -34,7 +34,7 @@ FACE = {  # file of catseye.api -> what of it is catseye's
     "result": ("save", "show"),
     "steering": ("point", "track"),
     "telescope": ("pose", "surface"),
-    "weather": ("air", "sound"),
+    "weather": ("air", "refractometer", "sound"),
 }
 
 __all__ = [
@@ -57,6 +57,7 @@ __all__ = [
     "point",
     "pose",
     "reduce",
+    "refractometer",
     "replay",
     "save",
     "show",

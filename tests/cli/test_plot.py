@@ -29,7 +29,7 @@ def test_a_slew_through_the_sun_is_refused_and_led_round(catseye, tmp_path):
     assert len(found["waypoints"]) >= 3
     assert ET.fromstring(out.read_text(encoding="utf-8")).tag.endswith("svg")
     status, said, _ = catseye("plot", *SKY, "--out", out)  # its own file may be written again
-    assert (status, "written to" in said) == (0, True)
+    assert (status, "Written to" in said) == (0, True)
 
 
 def test_a_servo_move_takes_a_mirrors_settings(catseye, tmp_path):

@@ -5,11 +5,11 @@ from typing import get_args
 import pytest
 import typer
 
+from catseye.api.telescope import CARRIED
 from catseye.atmosphere.index import air
 from catseye.atmosphere.sound import speed
 from catseye.cli import vocabularies
 from catseye.cli.live.options import PORT_BASE
-from catseye.cli.telescope.pose import CARRIED
 from catseye.cli.vocabularies import one_of
 from catseye.coordinator.modes import Mode
 from catseye.errors import EstimationError

@@ -219,11 +219,11 @@ class TripletsResult(Result):
         write_triplets(dict(self.units), directory, self.hashes, progress=progress)
 
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of each sheet."""
+        """SHA-256 of each sheet, by its name."""
         return {path.name: digest for path, digest in self.hashes.items()}
 
     def sources(self) -> tuple[Path, ...]:
-        """The sheets."""
+        """Files of the sheets, which `save` leaves alone."""
         return tuple(path for path, _ in self.units)
 
 
@@ -341,7 +341,7 @@ class BaselineResult(Result):
         return self.hashes
 
     def sources(self) -> tuple[Path, ...]:
-        """Files that were read."""
+        """Files that `save` leaves alone: those read."""
         return self.read
 
 

@@ -104,7 +104,7 @@ class Result:
         return ()
 
     def __repr__(self) -> str:
-        said = [self.verdict.text, *(p.text for p in self.headline())]
+        said = [self.verdict.text, *(f"{p.title}: {p.text.rstrip('.')}." for p in self.headline())]
         return textwrap.fill(f"<{type(self).__name__}> " + " ".join(said), WIDTH)
 
     def headline(self) -> "Sequence[Passage]":

@@ -96,7 +96,7 @@ class PointingResult(Result):
         return {path.name: digest_of(path) for path in self.read}
 
     def sources(self) -> tuple[Path, ...]:
-        """Records that were read."""
+        """Records that `save` leaves alone: those read."""
         return self.read
 
 

@@ -1,19 +1,26 @@
-"""`air` and `sound`: the index of air and the speed of sound for one state of weather or arrays of them."""
+"""`air`, `sound`, `refractometer`: the index of air and the speed of sound, from weather or from a path itself."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from catseye.api.result import Result, quantities
+import numpy as np
+
+from catseye.api.reading import place_of
+from catseye.api.result import Progress, Result, quantities
 from catseye.atmosphere.index.model import IndexSensitivity
 
 if TYPE_CHECKING:
     from astropy.table import QTable
+    from matplotlib.figure import Figure
 
     from catseye.atmosphere.index.air import AirState
     from catseye.atmosphere.sound.model import SoundSensitivity
     from catseye.atmosphere.sound.speed import Sound
     from catseye.gateways.writers.passage import Passage
+    from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,8 +67,6 @@ class AirResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
-        import numpy as np
-
         columns = {
             "temperature": (self.temperature_c, "deg_C"),
             "pressure": (self.pressure_hpa, "hPa"),
@@ -174,8 +179,6 @@ class SoundResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
-        import numpy as np
-
         columns = {
             "temperature": (self.temperature_c, "deg_C"),
             "pressure": (self.pressure_hpa, "hPa"),
@@ -232,4 +235,103 @@ def sound(
         model,
         state,
         co2_ppm,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RefractometerResult(Result):
+    """A fixed path calibrated by a night of phases and weather: n readings.
+
+    mjd                        (n,) UTC
+    group_refractivity, u_group_refractivity   (n,) n_g - 1 along the path, from each phase
+    temperature_c, u_temperature_c             (n,) what the path's air would have to be
+    group_index, u_group_index   at the reference phase
+    calibration                everything else
+    path                       that was read
+    """
+
+    mjd: np.ndarray
+    group_refractivity: np.ndarray
+    u_group_refractivity: np.ndarray
+    temperature_c: np.ndarray
+    u_temperature_c: np.ndarray
+    group_index: float
+    u_group_index: float
+    calibration: "PathCalibration"
+    path: Path
+
+    def passages(self) -> "Sequence[Passage]":
+        """The readings, the index, the slope, the thermometers, what an absolute length would give."""
+        from catseye.gateways.air.refractometer_report import passages
+
+        return passages(self.calibration)
+
+    def to_object(self) -> dict[str, Any]:
+        """As `catseye refractometer --json`."""
+        from catseye.gateways.air.refractometer_report import refractometer_object
+
+        return refractometer_object(self.calibration)
+
+    def tables(self) -> "dict[str, QTable]":
+        """`index`: a row a reading."""
+        columns = {
+            "mjd": (self.mjd, "d"),
+            "group_refractivity": (1e6 * self.group_refractivity, ""),
+            "u_group_refractivity": (1e6 * self.u_group_refractivity, ""),
+            "temperature": (self.temperature_c, "deg_C"),
+            "u_temperature": (self.u_temperature_c, "K"),
+            "status": (self.calibration.status, ""),
+        }
+        return {"index": quantities(columns, refractivity="ppm")}
+
+    def figures(self) -> "dict[str, Figure]":
+        """The night with its residuals, and phase against weather."""
+        from catseye.gateways.air.refractometer_report import refractometer_figures
+
+        return refractometer_figures(self.calibration)
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """As `catseye refractometer --out`."""
+        from catseye.gateways.air.refractometer_report import write_refractometer
+
+        write_refractometer(self.calibration, directory, progress)
+
+    def sources(self) -> tuple[Path, ...]:
+        """The table that was read."""
+        return (self.path,)
+
+
+def refractometer(
+    readings: "str | os.PathLike[str]", sheet: "str | os.PathLike[str] | None" = None, **known: Any
+) -> RefractometerResult:
+    """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase.
+
+    readings   table (docs/formats/refractometer.md)
+    sheet      what is known of the path; the file beside the table with the ending .toml without
+    known      keys of the sheet, in its place: path_length_m, air_model and so on
+
+    Raises InputError for files that cannot be used.
+
+    >>> refractometer("refractometer/path-a.csv").verdict.word
+    'good'
+    """
+    from catseye.gateways.air.refractometer_report import refractometer_verdict
+    from catseye.reduction.air.refractometer_calibration import calibrate_path
+    from catseye.reduction.air.refractometer_night import read_path_readings, read_path_sheet
+
+    table = place_of(readings)
+    beside = table.with_suffix(".toml") if sheet is None else place_of(sheet)
+    path_sheet, hashes = read_path_sheet(beside, known, needed=sheet is not None)
+    found = calibrate_path(read_path_readings(table, path_sheet, hashes))
+    return RefractometerResult(
+        refractometer_verdict(found),
+        found.readings.mjd_utc,
+        found.refractivity,
+        found.u_refractivity,
+        found.temperature_c,
+        found.u_temperature_c,
+        1.0 + found.index_0,
+        found.u_index_0,
+        found,
+        table,
     )

@@ -12,7 +12,7 @@ EXAMPLE = ROOT / "examples" / "refractometer" / "path-a.csv"
 KEYS = {
     "path", "path_length", "group_index", "u_group_index", "phase", "mjd_utc", "temperature_c", "pressure_hpa",
     "humidity_percent", "phase_per_index", "budget", "slope", "thermometers", "drift", "noise", "variance_factor",
-    "degrees_of_freedom", "absolute", "sections", "notes", "series", "readings", "model", "wavelength_um",
+    "degrees_of_freedom", "absolute", "verdict", "sections", "notes", "series", "readings", "model", "wavelength_um",
     "modulation_hz", "co2_ppm",
 }  # fmt: skip
 HEADER = "mjd_utc,phase_rad,temperature_c,pressure_hpa,humidity_percent"

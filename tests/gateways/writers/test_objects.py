@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.gateways.air.objects import air_object
+from catseye.gateways.air.objects import air_object, air_verdict
 from catseye.gateways.epoch.objects import pose_object, reduction_object
 from catseye.gateways.writers.objects import json_line, json_page
 
@@ -85,7 +85,7 @@ def test_the_air_is_told_with_its_state_and_both_uncertainties():
     from catseye.atmosphere.index.air import air
 
     state = air(20.0, 933.0, 50.0)
-    told = air_object(state, 0.78, state.combined_uncertainty(0.3))
+    told = air_object(state, 0.78, u := state.combined_uncertainty(0.3), verdict=air_verdict(state, u))
     assert (told["temperature_c"], told["pressure_hpa"], told["humidity_percent"]) == (20.0, 933.0, 50.0)
     assert told["formula_uncertainty"] == state.standard_uncertainty
     # the slope as printed, four digits

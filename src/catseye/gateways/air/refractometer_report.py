@@ -22,6 +22,8 @@ from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles.whole import CycleStatus
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 FORMAT = "catseye-refractometer-1"
@@ -212,14 +214,18 @@ def series_csv(calibration: "PathCalibration") -> str:
     return stream.getvalue()
 
 
-def refractometer_figures(calibration: "PathCalibration") -> dict[str, str]:
-    """The night and its residuals, and phase against weather, as SVG text."""
-    from catseye.gateways.writers.drawing import STYLE, mpl, svg  # matplotlib is heavy
+def refractometer_figures(calibration: "PathCalibration") -> "dict[str, Figure]":
+    """The night and its residuals, and phase against weather."""
+    from catseye.gateways.writers.drawing import styled  # matplotlib is heavy
 
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        return {"night": svg(_night(calibration)), "slope": svg(_line(calibration))}
+    with styled():
+        return {"night": _night(calibration), "slope": _line(calibration)}
+
+
+def _svgs(calibration: "PathCalibration") -> dict[str, str]:
+    from catseye.gateways.writers.drawing import svgs  # matplotlib is heavy
+
+    return svgs(refractometer_figures(calibration))
 
 
 def _night(calibration: "PathCalibration"):
@@ -281,7 +287,7 @@ def _line(calibration: "PathCalibration"):
 
 def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     """The whole page; `when` in UTC."""
-    drawn, sheet = refractometer_figures(calibration), calibration.readings.sheet
+    drawn, sheet = _svgs(calibration), calibration.readings.sheet
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
     parameters = _parameters(calibration)["thermometers"]
     cards = [
@@ -345,7 +351,7 @@ def write_refractometer(
     files: Files = {
         "group_index.csv": lambda: series_csv(calibration),
         "refractometer.json": lambda: json_page(refractometer_object(calibration)),
-        "night.svg": lambda: refractometer_figures(calibration)["night"],
+        "night.svg": lambda: _svgs(calibration)["night"],
         "report.html": lambda: refractometer_report(calibration, when),
     }
     sheet = calibration.readings.sheet.model_dump(mode="json", exclude_none=True)

@@ -40,7 +40,8 @@ class SolvedPoints:
     hashes: dict[str, str]
 
     def __repr__(self) -> str:
-        return f"<Solved points of {self.campaign}: {len(self.names)} with their full covariance; from {self.file}>"
+        where = Path(self.file).name
+        return f"<Solved points of {self.campaign}: {len(self.names)} with their full covariance; from {where}>"
 
     def block(self, names: Sequence[str]) -> np.ndarray:
         """(3k, 3k) m^2, of some points in this order."""

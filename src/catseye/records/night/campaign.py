@@ -51,7 +51,7 @@ class Campaign(ObservedSite):
         return (
             f"<Campaign {self.site.campaign.name}: {count} shots of {samples} samples by {len(self.rangers)} rangers, "
             f"{len(self.target_names)} targets known, {len(self.weather.mjd_utc)} weather readings; "
-            f"from {self.directory}>"
+            f"from {self.directory.name}/>"
         )
 
 

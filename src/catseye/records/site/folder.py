@@ -44,7 +44,7 @@ class SiteFolder:
         return (
             f"<Site {self.site.campaign.name}: {len(self.monuments)} rangers on the ground and "
             f"{len(self.feedarm.ranger)} on the feed arm, {len(self.targets)} targets, {len(self.triplets)} triplets, "
-            f"{len(self.benchmarks)} benchmarks; from {self.directory}>"
+            f"{len(self.benchmarks)} benchmarks; from {self.directory.name}/>"
         )
 
     @property
