@@ -12,6 +12,7 @@ import pytest
 from repository import ROOT
 from wheel_scene import built, run_there, unpacked
 
+NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 LONGEST = 60.0  # s that a line may take without having said so beforehand
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -24,6 +25,13 @@ def pieces():
     ]
     found += [(m.start(), "python", m[1]) for m in re.finditer(r"(?ms)^```python\n(.*?)^```", TEXT)]
     return [(kind, text) for _, kind, text in sorted(found)]
+
+
+def cells(path):
+    """Source of each code cell of a notebook."""
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            yield "".join(cell["source"])
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +83,9 @@ def test_every_line_works_where_the_wheel_was_installed(wheel, tmp_path):
     (tmp_path / "work").mkdir()
     (site,) = (environment / "lib").glob("python*/site-packages")
     assert refused(run_there(tmp_path / "work", pieces(), python, site)) == []
+    notebooks = [("python", source) for path in NOTEBOOKS for source in cells(path)]
+    (tmp_path / "notebooks").mkdir()
+    assert [each for each in run_there(tmp_path / "notebooks", notebooks, python, site) if each["status"]] == []
     weather = "--temperature-c 20 --pressure-hpa 933 --humidity-percent 50"
     shown = subprocess.run(
         [environment / "bin" / "catseye", "air", *weather.split()],

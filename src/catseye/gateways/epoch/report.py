@@ -180,17 +180,22 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
 
 def _ways(reduction: Reduction) -> str:
     """The answers of three commands to where the dish is, with why they differ."""
+    ways = dish_ways(reduction)
+    fitted = "".join(f"<li>{escape(way.command)}: {escape(way.fitted)}</li>" for way in ways)
     rows = [
-        (
-            way.command,
-            way.fitted,
-            *(f"{v / MILLIMETRE:+.2f} ± {u / MILLIMETRE:.2f}" for v, u in zip(way.translation, way.u[:3], strict=True)),
-            *(f"{v / ARCSECOND:+.1f} ± {u / ARCSECOND:.1f}" for v, u in zip(way.rotation, way.u[3:], strict=True)),
-            *(f"{v / ARCSECOND:+.1f} ± {u / ARCSECOND:.1f}" for v, u in zip(way.axis, way.u_axis, strict=True)),
-        )
-        for way in dish_ways(reduction)
+        *(
+            (f"vertex off along {axis} (mm)", *(_both(w.translation[k], w.u[k], MILLIMETRE, 2) for w in ways))
+            for k, axis in enumerate("xyz")
+        ),
+        *(
+            (f"turned about {axis} (″)", *(_both(w.rotation[k], w.u[3 + k], ARCSECOND, 1) for w in ways))
+            for k, axis in enumerate("xyz")
+        ),
+        *(
+            (f"axis leans {which} elevation (″)", *(_both(w.axis[k], w.u_axis[k], ARCSECOND, 1) for w in ways))
+            for k, which in enumerate(("across", "in"))
+        ),
     ]
-    columns = ("command", "what is fitted", *(f"{a} (mm)" for a in "xyz"), *(f"about {a} (″)" for a in "xyz"))
     return "\n".join(
         (
             "<h3>The dish, as each command has it</h3>",
@@ -198,13 +203,18 @@ def _ways(reduction: Reduction) -> str:
                 "All against the nominal posture, ground axes, about the nominal vertex. What is fitted differs, not "
                 "the sign: a paraboloid does not show a turn about the dish's own axis and sets it to zero, points "
                 "held against their design show it, and their places across the surface count, too; a focal length "
-                "that is free takes part of an offset dish's turn with it. Compare the last two columns, how far the "
+                "that is free takes part of an offset dish's turn with it. Compare the last two rows, how far the "
                 "dish's axis leans: that is what pointing feels. Unless the focal length is free they agree within "
                 "their uncertainties."
             ),
-            table((*columns, "axis, across elevation (″)", "axis, in elevation (″)"), rows, "ttnnnnnnnn"),
+            f'<ul class="notes">{fitted}</ul>',
+            table(("", *(way.command.removeprefix("catseye ") for way in ways)), rows, "t" + "n" * len(ways)),
         )
     )
+
+
+def _both(value: float, u: float, unit: float, places: int) -> str:
+    return f"{value / unit:+.{places}f} ± {u / unit:.{places}f}"
 
 
 def _network(drawn: dict[str, str]) -> str:
