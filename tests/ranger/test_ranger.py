@@ -819,3 +819,13 @@ def test_the_ranger_s_own_sun_is_the_almanac_s_within_half_a_second_and_sets():
             assert np.linalg.norm(towards - true) < 8.0 / 3600 * DEGREE  # 15" a second, half a second
     assert seen == {True, False}
     assert source(52_889.7) is source(52_889.7 + 1e-6)
+
+
+def test_help_is_hlp_at_a_ranger_too():
+    told = ready()
+    told.turns(1)
+    listed, same = told.say("HLP")[-1], told.say("help")[-1]
+    assert same.command == "HELP"
+    assert same.values == listed.values
+    assert {"HLP", "HELP", "CMEAS"} <= set(listed.values[0].split())
+    assert told.say("HELP ABV")[-1].values == told.say("HLP ABV")[-1].values

@@ -118,6 +118,23 @@ def test_who_comes_later_hears_the_weather_of_that_moment():
     run(story)
 
 
+@pytest.mark.parametrize("word", ["HLP", "help"])
+def test_a_person_who_asks_is_told_what_comes_and_how_to_leave(word):
+    async def story(feed, world, network):
+        client = await network.connect(Listening, "h", 5250)
+        client.transport.write(f"{word}\r\n".encode())
+        await asyncio.sleep(0.1)
+        (told,) = client.lines(word.upper())
+        assert told.ok
+        assert "BYE closes the connection" in told.values[0]
+        assert not client.lost
+        client.transport.write(b"bye\n")
+        await asyncio.sleep(0.1)
+        assert client.lost
+
+    run(story)
+
+
 def test_a_silent_telescope_and_a_silent_station_have_no_lines():
     async def story(feed, world, network):
         world.faults.add(Fault("silent-telescope", "telescope", 2.0, 5.0))

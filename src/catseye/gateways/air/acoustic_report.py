@@ -10,9 +10,17 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.gateways.air.acoustic_figures import acoustic_figures
-from catseye.gateways.air.acoustic_objects import full_object, mean, path_temperatures_csv, shots_csv, words
+from catseye.gateways.air.acoustic_objects import (
+    acoustic_verdict,
+    full_object,
+    mean,
+    path_temperatures_csv,
+    shots_csv,
+    words,
+)
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 
 if TYPE_CHECKING:
@@ -54,7 +62,12 @@ def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
         f'<header><h1>Temperature by sound</h1><div class="faint">reduced by catseye on {when:%Y-%m-%d %H:%M} UTC; '
         f'u = standard uncertainty, 1σ</div><nav>{links}<a href="#provenance">Provenance</a></nav></header>'
     )
-    body = [header, *(_section(i, path) for i, path in enumerate(paths)), _provenance(_inputs(paths), when)]
+    body = [
+        header,
+        verdict_line(acoustic_verdict(paths)),
+        *(_section(i, path) for i, path in enumerate(paths)),
+        _provenance(_inputs(paths), when),
+    ]
     return page("catseye: temperature by sound", "\n".join(body))
 
 

@@ -15,7 +15,7 @@ from catseye.constants import PPM, TWO_PI
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
+from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
@@ -306,6 +306,7 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     body = [
         f"<header><h1>{escape(sheet.path)}: refractometer</h1><div class='faint'>calibrated by catseye on "
         f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>",
+        verdict_line(refractometer_verdict(calibration)),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "night",

@@ -55,7 +55,8 @@ def verdict(findings: Findings) -> Verdict:
         text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
     else:
         text = "the observations agree with each other as their uncertainties claim"
-    unchecked = int(np.sum(findings.table.active & ~findings.table.checked))
+    unchecked, out = int(np.sum(findings.table.active & ~findings.table.checked)), int(np.sum(~findings.table.active))
+    text += f", {out} left out" if out else ""
     return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
 
 
@@ -145,7 +146,7 @@ def _network(findings: Findings) -> str:
     kinds = ", ".join(f"{k.replace('_', ' ')} {n}" for k, n in zip(table.kinds, counts, strict=True))
     text = f"{total} points, stations among them: {stations}. {len(table)} observations: {kinds or 'none'}."
     out = int(np.sum(~table.active))
-    text += f" {out} were left out." if out else ""
+    text += f" {out} {'was' if out == 1 else 'were'} left out." if out else ""
     if findings.answered:
         text += f" Datum: {solution.datum}."
     if solution.approximate:
@@ -211,7 +212,8 @@ def _observations(findings: Findings) -> str:
     )
     text += f" {_suspects(findings)}." if len(findings.suspects) else ""
     if np.isfinite(table.standardised).any() and not len(findings.suspects):
-        text += f" No observation is suspect; the worst is {observation_words(findings, int(table.worst_first[0]))}."
+        took_part = table.worst_first[table.active[table.worst_first]]
+        text += f" No observation is suspect; the worst is {observation_words(findings, int(took_part[0]))}."
     return text
 
 

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.panels.objects import FORMAT, doubt_text, micrometres, panels_object, passages, screws
+from catseye.gateways.panels.objects import (
+    FORMAT,
+    doubt_text,
+    micrometres,
+    panels_object,
+    panels_verdict,
+    passages,
+    screws,
+)
 from catseye.gateways.panels.tables import actuators_csv, crew_csv, panels_csv, readings_csv, screws_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import join_tables
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.panels.crew import members, sessions, standing
 
@@ -78,6 +87,7 @@ def panels_report(work: "PanelWork", when: datetime) -> str:
     figures = {name: picture(drawn[name], text) for name, text in CAPTIONS.items() if name in drawn}
     body = [
         header,
+        verdict_line(panels_verdict(work)),
         _cards(work),
         section("result", "Result", f"<dl>{words}</dl>", *(figures[n] for n in ("corners", "lie", "surface"))),
         section("screws", "Screws", _screws(work)),

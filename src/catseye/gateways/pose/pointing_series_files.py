@@ -15,14 +15,17 @@ from catseye.gateways.pose.pointing_series_objects import (
     Observed,
     fit_object,
     fit_rows,
+    fit_verdict,
     fit_words,
     model_record,
     track_object,
+    track_verdict,
 )
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, csv_text, origin, write_files
 from catseye.records.files.toml_text import record_toml
 from catseye.records.site.pointing_model import FORMAT as MODEL
@@ -101,6 +104,7 @@ def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison 
     heads = ["term", "arcsec", "u"] + (["less the other", "u"] if compared is not None else [])
     body = [
         _header(f"Pointing series from {observed.source}", when),
+        verdict_line(fit_verdict(fit)),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "terms",
@@ -208,6 +212,7 @@ def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetim
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(profile))
     body = [
         _header("Track and azimuth bearing", when),
+        verdict_line(track_verdict(profile)),
         section("summary", "Summary", f"<dl>{words}</dl>"),
         section(
             "tilt",

@@ -218,12 +218,24 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
     )
 
 
+def track_verdict(profile: TrackProfile) -> Verdict:
+    """Whether poses and readings scatter about the profile as they claim."""
+    degrees = profile.degrees_of_freedom
+    if degrees < 1:
+        return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
+    factor = profile.pvv / degrees
+    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
+        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})")
+    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f})")
+
+
 def track_object(profile: TrackProfile) -> dict[str, Any]:
     """A track profile as `catseye pointing track --json` gives it: rad."""
     series = profile.series
     axis, spread = series.axis
     return {
         "format": TRACK,
+        "verdict": track_verdict(profile).to_object(),
         "frame": "ground: turns of the alidade about east and north",
         "harmonics": series.harmonics,
         "coefficients": dict(zip(series.names, series.values, strict=True)),
