@@ -119,8 +119,9 @@ def fit_verdict(fit: PointingFit) -> Verdict:
     """Whether the observations hold the terms apart and scatter as they claim, where they claim anything."""
     if fit.degrees_of_freedom < 1:
         return Verdict("doubtful", "as many observations as terms: nothing checks the series")
-    if fit.weak:
-        return Verdict("doubtful", f"the observations do not tell {fit.weak[0].parts} apart")
+    lost = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
+    if lost:
+        return Verdict("doubtful", f"the observations do not tell {', '.join(lost[0].parts)} apart")
     if not fit.scaled and fit.variance_factor > 1.0 + 3.0 * (2.0 / fit.degrees_of_freedom) ** 0.5:
         return Verdict(
             "doubtful", f"observations scatter more than claimed (variance factor {fit.variance_factor:.2f})"
