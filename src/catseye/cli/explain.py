@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
+from catseye.cli.results import Strict, judge
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.reduction.epoch.settings import ReductionSettings
 
@@ -25,7 +26,7 @@ def _draws(value: int) -> int:
 
 
 @app.command(epilog="\b\nExample: catseye explain examples/night-01 300 --page shot-300.html")
-def explain(
+def explain(  # noqa: PLR0913 - its options are its command line
     campaign: Annotated[
         Path, typer.Argument(metavar="CAMPAIGN", help="Directory of a campaign, laid out as examples/night-01.")
     ],
@@ -40,6 +41,7 @@ def explain(
     air_model: AirModel = ReductionSettings.air_model,
     json: Json = False,
     quiet: Quiet = False,
+    strict: Strict = False,
 ) -> None:
     """The range of one shot and every cause of its uncertainty, before any adjustment."""
     progress = ProgressLine(quiet)
@@ -62,6 +64,10 @@ def explain(
         say(json_line(explanation_object(explanation, seed if monte_carlo else None)))
     elif not quiet:
         _tell(explanation, page)
+    if strict:
+        from catseye.gateways.epoch.explain import explanation_verdict
+
+        judge(explanation_verdict(explanation), strict=strict)
 
 
 def _page(page: Path | None) -> AbstractContextManager[list[str]]:
@@ -82,8 +88,9 @@ def _page_of(explanation: "Explanation", night: "Campaign") -> str:
 
 
 def _tell(explanation: "Explanation", page: Path | None) -> None:
-    from catseye.gateways.epoch.explain import budget_lines, explanation_passages
+    from catseye.gateways.epoch.explain import budget_lines, explanation_passages, explanation_verdict
 
+    say(wrapped("Verdict", explanation_verdict(explanation).text))
     for passage in explanation_passages(explanation):
         say(wrapped(passage.title, passage.text))
     lines = budget_lines(explanation)

@@ -1,7 +1,7 @@
 """How commands end: a result told to people or programs, written where asked, and the exit status it deserves."""
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -46,6 +46,12 @@ def tell(
             if what is not None:
                 say(wrapped(title, str(what)))
     judge(result.verdict, strict=strict)
+
+
+def say_verdict(answer: "Mapping[str, Any]") -> None:
+    """Say the verdict of an answer that is an object already."""
+    word, why = answer["verdict"]["word"], answer["verdict"]["why"]
+    say(wrapped("Verdict", f"{word.capitalize()}: {why}."))
 
 
 def judge(verdict: "Verdict", *, strict: bool) -> None:

@@ -35,7 +35,7 @@ def replay(
     quiet: Quiet = False,
 ) -> None:
     """A run again: the same to the last bit, or how far other calibrations move each point."""
-    from catseye.service.replay import replay_object, replay_passages, replayed
+    from catseye.service.replay import replay_object, replay_passages, replay_verdict, replayed
 
     progress = ProgressLine(quiet)
     try:
@@ -47,6 +47,7 @@ def replay(
 
         say(json_line(replay_object(outcome)))
     elif not quiet:
+        say(wrapped("Verdict", replay_verdict(outcome).text))
         for title, text in replay_passages(outcome):
             say(wrapped(title, text))
     if calibrations is None and not outcome.same:

@@ -103,7 +103,7 @@ def _view(*, json: bool, quiet: bool) -> "View":
 
 
 def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
-    from catseye.service.objects import simulation_object, summary
+    from catseye.service.objects import simulation_object, simulation_verdict, summary
 
     book, world, journal = simulation.book, simulation.world, simulation.orders.journal
     totals: dict[str, Any] = {"seconds": simulation.seconds, "rangers": len(simulation.site.rangers)}
@@ -112,5 +112,6 @@ def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
 
         say(json_line(simulation_object(book, world, journal, **totals)))
     elif not quiet:
+        say(wrapped("Verdict", simulation_verdict(book).text))
         for title, text in summary(book, world, journal, **totals):
             say(wrapped(title, text))

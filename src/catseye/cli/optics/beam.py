@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.results import say_verdict
 from catseye.cli.terminal import say
 
 
@@ -49,6 +50,7 @@ def beam(
         return
     if quiet:
         return
+    say_verdict(beam_object(beam_path))
     for line in lines(beam_path):
         say(line)
     if out is not None:

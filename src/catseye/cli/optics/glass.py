@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, app
+from catseye.cli.results import say_verdict
 from catseye.cli.terminal import say, wrapped
 
 
@@ -36,5 +37,6 @@ def glass(
     if json:
         say(json_line(answer))
         return
+    say_verdict(answer)
     for title, text in table_rows() if name is None else glass_rows(answer):
         say(wrapped(title, text))

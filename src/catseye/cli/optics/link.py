@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catseye.cli.commands import Json, app
+from catseye.cli.results import say_verdict
 from catseye.cli.terminal import say
 from catseye.constants import DEGREE
 from catseye.reduction.optics.link import Link, LinkReflector
@@ -66,9 +67,11 @@ def link(  # noqa: PLR0913 - its options are its command line
         head = head.scaled(link_budget(head, reflector, distance).amplitude_volt, measured_volt)
     light = {"incidence": incidence_deg * DEGREE, "background": background_uw * 1e-6}
     budget = link_budget(head, reflector, distance, offset=offset_mm * 1e-3, **light)
+    answer = _object(budget, head, distance)
     if json:
-        say(json_line(_object(budget, head, distance)))
+        say(json_line(answer))
         return
+    say_verdict(answer)
     _tell(budget, head)
 
 

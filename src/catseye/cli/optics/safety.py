@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, app
+from catseye.cli.results import say_verdict
 from catseye.cli.terminal import say, wrapped
 from catseye.cli.vocabularies import EDITIONS, one_of
 
@@ -70,6 +71,7 @@ def safety(  # noqa: PLR0913 - its options are its command line
     if json:
         say(json_line(answer))
         return
+    say_verdict(answer)
     for title, text in safety_passages(answer):
         say(wrapped(title, text))
     say("\n" + safety_table(answer) + "\n")
